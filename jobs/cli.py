@@ -31,10 +31,7 @@ VERBS: Final = {
     "plan": ("plan:print_plan", "Show what would run and why, with rows, bytes and time; nothing is computed."),
     "generate": ("run:generate", "Compute the ground truth: the shards of a recipe's data set."),
     "evaluate": ("evaluate:evaluate", "Evaluate a file of queries on a fabric: its rows with the BSDF values."),
-    "check": (
-        "check:check",
-        "Check all files of a recipe, the shards of a data set, or the ground truth of a fabric.",
-    ),
+    "check": ("check:check", "Check all files of a recipe, the shards of a data set, or the ground truth of a fabric."),
     "train": ("run:train", "Train the models of a recipe on its data set."),
     "bench": (
         "run:bench",

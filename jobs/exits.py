@@ -68,8 +68,11 @@ def _handle(raised: BaseException, tokens: Sequence[str], out: Path) -> int:
         # The reader of the output has closed it, such as `head`.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    if isinstance(error, Exception) and (explained := _storage_error(error)):
-        return _end(str(explained), explained.exit_code)
+    if "upath" in sys.modules:  # object storage is in use
+        from pipeline.storage import explained
+
+        if told := explained(error):
+            return _end(str(told), told.exit_code)
     if isinstance(error, OSError) and error.errno in _NO_FILE:
         return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
     saved = _save_crash(tokens, "".join(traceback.format_exception(raised)), out)
@@ -113,15 +116,6 @@ def _signals() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _storage_error(error: Exception) -> BadInput | WorkFailed | None:
-    """Return an error of object storage as a sentence; None if it is another error, or no storage is in use."""
-    if "upath" not in sys.modules:
-        return None
-    from pipeline.storage import explained
-
-    return explained(error)
 
 
 def _end(sentence: str, code: int) -> int:

@@ -92,13 +92,7 @@ def evaluate(
     with progress("evaluating") as advance, threads:
         try:
             summary = evaluate_file(
-                cloth,
-                queries,
-                out,
-                answerer,
-                skip_bad,
-                threads=workers or cores(),
-                progress=advance,
+                cloth, queries, out, answerer, skip_bad, threads=workers or cores(), progress=advance
             )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"stopped; {out} was not written") from None

@@ -91,10 +91,9 @@ def export_fabric(
     paths = {"mesh": mesh, "wif": wif, "maps": maps, "shader": shader}
     options: dict[str, Any] = {"vertices": vertices, "repeats": repeats, "size": size, "model": model, "level": level}
     options |= {"language": language, "kind": kind}
-    flags = [f"--{kind}" for kind in paths]
     chosen = {kind: path for kind, path in paths.items() if path is not None}
     if len(chosen) != 1:
-        allowed = f"one of {', '.join(flags[:-1])} and {flags[-1]} is needed"
+        allowed = "one of --mesh, --wif, --maps and --shader is needed"
         raise BadInput("export", "", " and ".join(f"--{kind}" for kind in chosen) or "nothing", allowed)
     ((what, path),) = chosen.items()
     given = {key: value for key, value in options.items() if value not in (None, [])}

@@ -20,7 +20,6 @@ from jobs.run.store import LEDGER
 from jobs.terminal import MOST_SENTENCES, print_lines
 from jobs.verbs.parameters import Local
 from pipeline.atomic import link
-from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
 
 if TYPE_CHECKING:
@@ -73,8 +72,8 @@ def merge(
             there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
             manifest.without({shard.file for shard in manifest.shards} - there).save(folder)
     left = [damaged[task] for task in sorted(damaged.keys() - chosen.keys())]
-    for task in left[:MOST_SENTENCES]:
-        print_lines(f"{task}: a product is missing or damaged; it is left out", stderr=True)
+    sentences = [f"{task}: a product is missing or damaged; it is left out" for task in left]
+    print_lines(*sentences[:MOST_SENTENCES], stderr=True)
     if len(left) > MOST_SENTENCES:
         print_lines(f"and {len(left) - MOST_SENTENCES:,} more", stderr=True)
     counts = Counter(str(part.ledger.out) for part in chosen.values())
@@ -87,12 +86,9 @@ def _parts(ledger: Ledger) -> Iterator[MergedTask]:
     """Yield the finished tasks of a folder but its pages, each with the products whose bytes are as they were made."""
     for receipt in ledger.receipts([]):
         if receipt.stage != "report":
-            places = []
-            for place in ledger.places(receipt):
-                path, expected = ledger.out / place, receipt.files[Path(place).name]
-                if path.stat().st_size == expected.bytes and file_sha256(path) == expected.sha256:
-                    places.append(place)
-            yield MergedTask(ledger, receipt, places)
+            products = {place: Product.of(ledger.out / place) for place in ledger.places(receipt)}
+            sound = [place for place, product in products.items() if product == receipt.files[Path(place).name]]
+            yield MergedTask(ledger, receipt, sound)
 
 
 def _refuse_conflict(first: MergedTask, second: MergedTask) -> None:

@@ -24,13 +24,10 @@ def _place(type_: object, tokens: Sequence[Token]) -> Path:
 
 def _local(type_: object, tokens: Sequence[Token]) -> Path:
     """Return the path of a folder or file of this machine; refuse an address of object storage."""
-    name = tokens[0].value
-    if "://" in name:
-        path = _place(type_, tokens)
-        if not isinstance(path, Path):
-            raise ValueError(f"{one_line(name, 80)} is an address; a path of this machine is needed here")
-        return path
-    return Path(name)
+    path = _place(type_, tokens)
+    if not isinstance(path, Path):
+        raise ValueError(f"{one_line(tokens[0].value, 80)} is an address; a path of this machine is needed here")
+    return path
 
 
 FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]

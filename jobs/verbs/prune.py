@@ -68,13 +68,9 @@ def prune(
         if delete:
             _delete(unneeded, out)
     named = ", ".join(recipes)
-    if not unneeded:
-        said = f"nothing to remove: {named} need all products"
-    elif delete:
-        said = f"{len(unneeded):,} files removed; {named} need the others"
-    else:
-        said = f"{len(unneeded):,} files are not needed by {named}; --delete removes them"
-    print_lines(f"{out}: {said}")
+    count = f"{len(unneeded):,} files"
+    end = f"removed; {named} need the others" if delete else f"are not needed by {named}; --delete removes them"
+    print_lines(f"{out}: {count} {end}" if unneeded else f"{out}: nothing to remove: {named} need all products")
 
 
 def _files(out: Path) -> dict[str, _Content]:

@@ -47,8 +47,6 @@ RATE: Final = 24
 _LAYERS: Final = {"normal": "XYZ", "uv": "UV", "sigma": ("major", "minor")}
 _HALF: Final = ("normal", "sigma", "fabric")  # three digits are enough
 
-_SUFFIXES: Final = (".png", ".exr", ".mp4", "")
-
 
 @dataclass(frozen=True)
 class RenderLook:
@@ -74,15 +72,11 @@ def look(size: str, samples: int, directions: int, tone: Tone, exposure: float) 
         raise BadInput(WHERE, "--directions", directions, error.allowed) from error
     if not -STOPS <= exposure <= STOPS:
         raise BadInput(WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
-    return RenderLook(_size_of(size) if size else None, round(samples**0.5), options, tone, exposure)
-
-
-def _size_of(text: str) -> tuple[int, int]:
-    """Return width and height from a text such as ``640x480``; BadInput if it is none."""
-    found = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
-    if not found or not all(1 <= int(side) <= MOST_PIXELS for side in found.groups()):
-        raise BadInput(WHERE, "--size", text, f"must be WIDTHxHEIGHT, such as 1024x1024, each from 1 to {MOST_PIXELS}")
-    return int(found[1]), int(found[2])
+    sides = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", size)
+    film = (int(sides[1]), int(sides[2])) if sides else None
+    if size and not (film and min(film) >= 1 and max(film) <= MOST_PIXELS):
+        raise BadInput(WHERE, "--size", size, f"must be WIDTHxHEIGHT, such as 1024x1024, each from 1 to {MOST_PIXELS}")
+    return RenderLook(film, round(samples**0.5), options, tone, exposure)
 
 
 def render(
@@ -156,7 +150,7 @@ def dressed(scene: Scene, fabrics: Sequence[str]) -> Scene:
 
 def _frames(frames: int | None, scene: Scene, out: Path) -> int:
     """Return the number of frames; BadInput if it does not go with the file."""
-    if out.suffix not in _SUFFIXES:
+    if out.suffix not in (".png", ".exr", ".mp4", ""):
         raise BadInput(WHERE, "--out", str(out), "must end in .png, .exr or .mp4, or be a folder without a suffix")
     if frames is not None and not 1 <= frames <= MOST_FRAMES:
         raise BadInput(WHERE, "--frames", frames, f"must be from 1 to {MOST_FRAMES}")
@@ -223,8 +217,8 @@ class FilmMaker:
                     planes[name] = np.zeros((self.size[1], self.size[0], plane.shape[-1]), np.float32)
                 planes[name][_place(part)] = plane
         channels = {channel: planes["rgb"][..., index] for index, channel in enumerate(RGB)}
-        channels |= {"A": planes["cloth"][..., 0], "depth.Z": planes["depth"][..., 0]}
-        channels |= {"fabric.id": planes["fabric"][..., 0]}
+        flat = {"A": "cloth", "depth.Z": "depth", "fabric.id": "fabric"}
+        channels |= {name: planes[layer][..., 0] for name, layer in flat.items()}
         for layer, parts in {**dict.fromkeys(("backdrop", *COMPONENTS), RGB), **_LAYERS}.items():
             channels |= {f"{layer}.{name}": planes[layer][..., index] for index, name in enumerate(parts)}
         half = [name for name in channels if name.split(".")[0] in _HALF]

@@ -88,12 +88,12 @@ def require(
     table = predictions(sizes, requirement.sizes, requirement.queries_per_frame, shares, fallback)
     table = with_measured(table, scene_table(records), requirement.scene)
     _print_requirement(requirement)
-    cells, front = [], dict[int, str]()
-    for index, row in enumerate(rows(table)):
+    cells = []
+    for row in rows(table):
         of_truth = f"{100 * row.error:.2g} %" if row.error > 0 else "in the noise"
         name = display(row.method, row.setting)
         cells.append((name, of_truth, f"{row.ms:,.3g}", f"{100 * row.fallback:.0f} %", row.known))
-        front |= {index: "bold"} if row.front else {}
+    front = {index: "bold" for index, row in enumerate(rows(table)) if row.front}
     print_table(("method", "error", "ms per frame", "fallback share", ""), cells, text=("",), styles=front)
     print_lines("")
     if method and (table := of_method(table, method)).empty:

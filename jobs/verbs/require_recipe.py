@@ -86,6 +86,7 @@ def write_recipe(
     named = Added(add).model_of(model.options) if isinstance(model.options, AddedMethod) else model.options.model
     general = general.trainer_of(model)
     queries = requirement.queries(model.options.kinds)
+    chosen = [k for k in model.options.settings if setting_of(k) == setting]
     worn = {name: fabrics[name] for name in requirement.fabrics}
     table: dict[str, Any] = {
         "name": f"require-{requirement.scene}",
@@ -99,7 +100,7 @@ def write_recipe(
             **_truths(general, queries, [fabric for _, fabric in worn.values()]),
         },
         "models": [
-            {"model": named} | _model(model, _setting(model, setting), effort, _bent(model, queries) | dict(options)),
+            {"model": named} | _model(model, chosen, effort, _bent(model, queries) | dict(options)),
             *_baseline(general, method),
         ],
         "bench": _bench(general, _beside(path, scene)),
@@ -131,11 +132,9 @@ def savings(path: Path, general: Recipe, add: Sequence[str] = ()) -> str:
     same = alone(general, {model.options.name for model in own.models})
     (rows, learnt), (rows_general, learnt_general) = effort_of(own), effort_of(same)
     said = f"{rows:,} rows to generate in place of {rows_general:,} ({rows_general / rows:.1f} times fewer)"
-    if learnt:
-        said += (
-            f", {learnt:,} queries to learn from in place of {learnt_general:,} ({learnt_general / learnt:.1f} times)"
-        )
-    return f"Against {general.name} with this method alone: {said}{'' if learnt else ', nothing to train'}."
+    times = learnt_general / learnt if learnt else 0.0
+    training = f"{learnt:,} queries to learn from in place of {learnt_general:,} ({times:.1f} times)"
+    return f"Against {general.name} with this method alone: {said}, {training if learnt else 'nothing to train'}."
 
 
 def _rows(general: Recipe, effort: float) -> dict[str, int]:
@@ -147,15 +146,14 @@ def _rows(general: Recipe, effort: float) -> dict[str, int]:
 
 def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> dict[str, Any]:
     """Return how rows are answered: as in the general recipe, where its estimators know the queries."""
-    dataset = general.dataset
-    physics = {name: getattr(dataset.truth, name) for name in PHYSICS}
-    truth, training = dataset.truth, dataset.training_truth
-    if not _knows(truth, queries, fabrics):
-        truth = truth.model_copy(update={"estimator": SAMPLED.estimator})
-    if training is not None and not _knows(training, queries, fabrics):
-        training = SAMPLED.model_copy(update=physics)
-    found = {"truth": _truth_table(truth)}
-    return found if training is None else found | {"training_truth": _truth_table(training)}
+    truth, training = general.dataset.truth, general.dataset.training_truth
+    physics = {name: getattr(truth, name) for name in PHYSICS}
+    sampled = truth.model_copy(update={"estimator": SAMPLED.estimator}), SAMPLED.model_copy(update=physics)
+    return {
+        name: _truth_table(stated if _knows(stated, queries, fabrics) else other)
+        for name, stated, other in zip(("truth", "training_truth"), (truth, training), sampled, strict=True)
+        if stated is not None
+    }
 
 
 def _truth_table(truth: TruthOptions) -> dict[str, Any]:
@@ -178,18 +176,13 @@ def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:
 def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
     """Return point sampling with 2 points, the baseline, if the general recipe has it."""
     found = [model for model in general.models if model.options.name == _BASELINE != method]
-    return [{"model": _BASELINE} | _model(model, 2, 1.0) for model in found]
-
-
-def _setting(model: ModelRecipe, setting: str) -> int | None:
-    """Return the setting k that tables show as `setting`."""
-    return next((k for k in model.options.settings if setting_of(k) == setting), None)
+    return [{"model": _BASELINE} | _model(model, [2], 1.0) for model in found]
 
 
 def _model(
-    model: ModelRecipe, k: int | None, effort: float, other: Mapping[str, Any] = MappingProxyType({})
+    model: ModelRecipe, settings: list[int], effort: float, other: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
-    """Return a model's table without `model`, with one setting, if given, and a shortened training."""
+    """Return a model's table without `model`, with the one setting in `settings`, if any, and a shortened training."""
     if isinstance(model.options, AddedMethod):
         options = {"name": model.options.name, "limit": model.options.limit} | model.options.own | dict(other)
     else:
@@ -197,15 +190,12 @@ def _model(
         options["name"] = model.options.name
         validated(type(model.options), options, "--set")
         options.pop("model", None)
-    if k is not None and model.options.parameter:
-        options[model.options.parameter] = [k]
+    if settings:
+        options[model.options.parameter] = settings
     if model.learns:
         training = model.training
-        # The running average of the weights spans the same share of the training.
-        shorter = {
-            "steps": max(1, round(effort * training.steps)),
-            "average": round(training.average ** (1 / effort), 6),
-        }
+        average = round(training.average ** (1 / effort), 6)  # it spans the same share of the training
+        shorter = {"steps": max(1, round(effort * training.steps)), "average": average}
         options["training"] = training.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | shorter
     return options
 

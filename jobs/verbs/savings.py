@@ -16,7 +16,7 @@ import io
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 from cyclopts import Parameter
 
@@ -36,9 +36,6 @@ from pipeline.models.card import read_card
 from pipeline.models.options import setting_of
 from pipeline.scenes.catalogue import load_scene
 from weaves.errors import BadInput
-
-if TYPE_CHECKING:
-    from reports.record import Record
 
 ENOUGH: Final = 3.0
 """Least factor by which a scene's recipe should reduce rows and training."""
@@ -110,16 +107,16 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[s
     same = next((one for one in general.models if one.options.name == name), None)
     if same is None:
         raise BadInput(str(path), "models.0.name", name, f"{general.name} has no such method; require the scene again")
-    sides = []
+    both = []
     for whole, chosen, called in ((general, same, run or general.name), (own, model, str(path))):
         costs = _costs(alone(whole, {name}), chosen, worn, Ledger(out), plan(whole), called)
-        sides.append(costs | _measured(out, whole.name, scene, model, called))
+        both.append(costs | _measured(out, whole.name, scene, model, called))
     if Ledger(out).state(plan(own)[-1]) != "done":
         raise BadInput("savings", "recipe", own.name, f"its page is older than the recipe; `twillight run {path}`")
-    theirs, ours = sides
-    found = [SceneSaving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
-    found += _difference(scene, out, (general, own), model)
-    return found + list(_elsewhere(scene, out, general, same, own, model))
+    theirs, ours = both
+    rows = [SceneSaving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
+    rows += _difference(scene, out, (general, own), model)
+    return [*rows, *_elsewhere(scene, out, ((same, general), (model, own)))]
 
 
 def conclusion(rows: Sequence[SceneSaving]) -> str:
@@ -179,7 +176,8 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
     if lacking := [metric for metric in MEASURED if metric not in found]:
         allowed = f"the page of {page} has no {lacking[0]} of {method} there; `twillight run {run}`"
         raise BadInput("savings", "scene", scene, allowed)
-    values = {(metric, found[metric].unit): _value(found[metric]) for metric in MEASURED}
+    measured = [found[metric] for metric in MEASURED]
+    values = {(record.metric, record.unit): Value(record.value, record.low, record.high) for record in measured}
     base = next((one for one in here if (one.method, one.setting) == BASELINE and one.metric == "frame_time"), None)
     relative = found["frame_time"].value / base.value if base else math.nan
     return values | {("frame_time over 2 points", "1"): Value(relative)}
@@ -192,21 +190,15 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
     from reports.measure.scene.shot import read_shot
 
     name, setting, ledger = model.options.name, _setting(model), Ledger(out)
-    pictures, frames = [], None
-    for task in (task for recipe in recipes for task in plan(recipe)):
-        if isinstance(task, SceneShot) and task.scene == scene and ledger.is_sound(task):
-            frames = out / task.made.path
-        if (
-            isinstance(task, OnScene)
-            and (task.scene, task.model.options.name) == (scene, name)
-            and setting in task.shown
-            and ledger.is_sound(task)
-        ):
-            pictures.append(out / task.picture(setting))
-    if len(pictures) != 2 or frames is None:
+    tasks = [task for recipe in recipes for task in plan(recipe) if isinstance(task, SceneShot | OnScene)]
+    tasks = [task for task in tasks if task.scene == scene]
+    shots = [task for task in tasks if isinstance(task, SceneShot) and ledger.is_sound(task)]
+    shown = [task for task in tasks if isinstance(task, OnScene) and task.model.options.name == name]
+    shown = [task for task in shown if setting in task.shown and ledger.is_sound(task)]
+    if len(shown) != 2 or not shots:
         return []
-    shot = read_shot(frames)
-    a, b = (read_exr(path).stack(*RGB) for path in pictures)
+    shot = read_shot(out / shots[-1].made.path)
+    a, b = (read_exr(out / task.picture(setting)).stack(*RGB) for task in shown)
     difference = mse_difference(a, b, shot.pictures()[0], shot.lit[0], recipes[0].bench.scenes.image)
     return [SceneSaving(scene, name, DIFFERENCE, "1", Value(0.0), Value(*difference))]
 
@@ -216,24 +208,19 @@ def _setting(model: ModelRecipe) -> str:
     return setting_of(next(iter(model.options.settings), None))
 
 
-def _elsewhere(
-    scene: str, out: Path, general: Recipe, same: ModelRecipe, own: Recipe, model: ModelRecipe
-) -> Iterator[SceneSaving]:
+def _elsewhere(scene: str, out: Path, models: Sequence[tuple[ModelRecipe, Recipe]]) -> Iterator[SceneSaving]:
     """Yield the fallback shares of both models in the general recipe's other scenes whose frames exist."""
     from reports.measure.scene.shot import read_shot
 
+    (same, general), _ = models
     for task in plan(general):
         if not isinstance(task, SceneShot) or not Ledger(out).is_sound(task):
             continue
         shot = read_shot(out / task.made.path)
         if shot.name != scene:
             queries = [(cloth.fabric, cloth.queries) for cloth in shot.cloths]
-            shares = (Value(fallback_share(*of, queries)) for of in ((same, general), (model, own)))
-            yield SceneSaving(scene, model.options.name, f"fallback_share in {shot.name}", "1", *shares)
-
-
-def _value(record: Record) -> Value:
-    return Value(record.value, record.low, record.high)
+            shares = (Value(fallback_share(*of, queries)) for of in models)
+            yield SceneSaving(scene, same.options.name, f"fallback_share in {shot.name}", "1", *shares)
 
 
 def _print(rows: Sequence[SceneSaving]) -> None:

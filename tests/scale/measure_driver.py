@@ -93,14 +93,7 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
             manifest = ManifestFile(DataSet(recipe), ledger)
             manifest.save()
             quiet = Console(file=io.StringIO())
-            summary = execute(
-                tasks,
-                ledger,
-                scheduler=connection,
-                workers=2,
-                manifests=[manifest],
-                console=quiet,
-            )
+            summary = execute(tasks, ledger, scheduler=connection, workers=2, manifests=[manifest], console=quiet)
             assert len(summary.ran) + len(summary.before) == count, summary
 
         if here:

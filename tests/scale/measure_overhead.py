@@ -51,13 +51,7 @@ def main() -> None:
         tasks = [task for task in tasks if task.stage == "generate"]
         log = io.StringIO()
         ledger = Ledger(folder)
-        execute(
-            tasks,
-            ledger,
-            workers=options.workers,
-            console=Console(file=log),
-            progress="json",
-        )
+        execute(tasks, ledger, workers=options.workers, console=Console(file=log), progress="json")
         seconds = {task.id: ledger.seconds(task) for task in tasks}
     events = [json.loads(line) for line in log.getvalue().splitlines()]
     ends = {event["task"]: event["time"] for event in events if event["event"] == "end"}

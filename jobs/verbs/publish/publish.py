@@ -46,13 +46,12 @@ def publish(
     BadInput if the licence is missing or unknown, the folder to write is not empty, or the data set is not whole;
     WorkFailed if another process writes the same folder.
     """
-    folder = dataset
     identifier = licence_id(licence)
-    target = _free(to, folder)
-    manifest = Manifest.load(folder)
-    _refuse_unfinished(folder, manifest)
-    recipe, first = recipe_files(manifest, folder), own_shards(manifest)[0]
-    truth = int(read_about(folder / first.file).get("task", {}).get("version", 0))
+    target = _free(to, dataset)
+    manifest = Manifest.load(dataset)
+    _refuse_unfinished(dataset, manifest)
+    recipe, first = recipe_files(manifest, dataset), own_shards(manifest)[0]
+    truth = int(read_about(dataset / first.file).get("task", {}).get("version", 0))
     about = About(manifest, parts_of(manifest), identifier, tuple(author) or AUTHORS, truth)
     staging = target.with_name(f".tmp-{target.name}")
     left = {path.name for path in staging.iterdir()} if staging.is_dir() else set()
@@ -65,7 +64,7 @@ def publish(
     lock = FileLock(staging / _LOCK)
     try:
         with lock.acquire(timeout=0):
-            files = _write(about, recipe, folder, staging)
+            files = _write(about, recipe, dataset, staging)
             _remove_others(staging, {*files, MANIFEST, _LOCK})
             (staging / _LOCK).unlink()
             if target.exists():
@@ -140,12 +139,11 @@ def _facts(about: About, part: PublishedPart) -> dict[str, Any]:
 
 def _listing(about: About, staging: Path, files: Sequence[str]) -> bytes:
     """Return the manifest: every other file with its size and hash, and what is in the files of rows."""
-    parts = {part.file: part for part in about.parts}
+    parts = {part.file: part.entry() for part in about.parts}
     listed = []
     for file in sorted(files):
-        path, part = staging / file, parts.get(file)
-        entry = PublishedFile(file=file, bytes=path.stat().st_size, sha256=file_sha256(path))
-        listed.append(entry.model_copy(update=part.entry()) if part else entry)
+        path, rows = staging / file, parts.get(file, {})
+        listed.append(PublishedFile(file=file, bytes=path.stat().st_size, sha256=file_sha256(path), **rows))
     return Published(
         name=about.manifest.name,
         version=about.version,

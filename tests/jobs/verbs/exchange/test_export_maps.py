@@ -131,12 +131,7 @@ def test_the_sample_is_read_by_other_libraries(folder):
     assert (
         set(material.extensions)
         == set(document.extensionsUsed)
-        == {
-            "KHR_materials_anisotropy",
-            "KHR_materials_ior",
-            "KHR_materials_sheen",
-            "KHR_materials_specular",
-        }
+        == {"KHR_materials_anisotropy", "KHR_materials_ior", "KHR_materials_sheen", "KHR_materials_specular"}
     )
     assert material.alphaMode == "BLEND" and material.doubleSided
     assert len(document.images) == 5
