@@ -107,22 +107,17 @@ def check_fabric(fabric: Fabric) -> None:
     from pipeline.truth.invariants import INVARIANTS
 
     results = [result for invariant in tracked(INVARIANTS, "checking") for result in invariant(fabric)]
-    rows = [(one.name, _measured(one), _should_be(one), _holds(one), one.note) for one in results]
+    rows = []
+    for result in results:
+        value = f"{result.measured:.4g}" + (f" ± {result.standard_error:.1g}" if result.standard_error else "")
+        wanted = "–" if result.relation == "reported" else f"{result.relation} {result.expected:g}"
+        rows.append((result.name, value, wanted, _holds(result), result.note))
     broken = {index: "bold red" for index, one in enumerate(results) if one.status == "broken"}
     columns = ("invariant", "value", "should be", "holds", "")
     print_table(columns, rows, text=("should be", "holds", ""), title=fabric.name, styles=broken)
     if broken:
         names = ", ".join(results[index].name for index in broken)
         raise WorkFailed(f"{fabric.name}: {len(broken)} of {len(results)} invariants do not hold: {names}")
-
-
-def _measured(result: CheckResult) -> str:
-    value = f"{result.measured:.4g}"
-    return f"{value} ± {result.standard_error:.1g}" if result.standard_error else value
-
-
-def _should_be(result: CheckResult) -> str:
-    return "–" if result.relation == "reported" else f"{result.relation} {result.expected:g}"
 
 
 def _holds(result: CheckResult) -> str:

@@ -99,8 +99,7 @@ def _print(found: Sequence[Fault], out: Path) -> None:
     """Print a sentence a fault, those of damage first, and count the others beyond a number."""
     order = ["damaged", "cut", "odd", "foreign", "outdated", "missing"]
     found = sorted(found, key=lambda fault: order.index(fault.kind))
-    for fault in found[:MOST_SENTENCES]:
-        print_lines(f"{out / fault.path}: {fault.kind}: {fault.why}", stderr=True)
+    print_lines(*(f"{out / one.path}: {one.kind}: {one.why}" for one in found[:MOST_SENTENCES]), stderr=True)
     if more := Counter(fault.kind for fault in found[MOST_SENTENCES:]):
         print_lines(f"and {', '.join(f'{count:,} {kind}' for kind, count in more.items())} more", stderr=True)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from jobs.run.cluster import MOST_WORKERS
 from jobs.terminal import number, print_lines, print_table, progress
-from jobs.verbs.parameters import FabricName, Place
+from jobs.verbs.parameters import FabricName, Place, given
 from pipeline.cores import cores
 from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file, truth_answerer
 from pipeline.truth.estimator import ESTIMATORS
@@ -38,17 +38,12 @@ class TruthFlags:
     normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None
 
 
-def truth_options(**chosen: object) -> TruthOptions:
-    """Return the options of the truth from the command line; those not given have their defaults.
-
-    BadInput if one cannot be used, named as it is spelt on the command line.
-    """
-    given = {name: value for name, value in chosen.items() if value is not None}
-    estimator = given.get("estimator", TruthOptions().estimator)
-    if estimator not in ESTIMATORS:
-        raise BadInput(WHERE, "--estimator", estimator, nearest(str(estimator), ESTIMATORS))
+def _truth_options(chosen: dict[str, Any]) -> TruthOptions:
+    """Return the options of the truth; BadInput if one cannot be used, named as it is spelt on the command line."""
+    if "estimator" in chosen and chosen["estimator"] not in ESTIMATORS:
+        raise BadInput(WHERE, "--estimator", chosen["estimator"], nearest(chosen["estimator"], ESTIMATORS))
     try:
-        return validated(TruthOptions, given, WHERE)
+        return validated(TruthOptions, chosen, WHERE)
     except BadInput as error:
         if not error.key:
             raise
@@ -72,18 +67,18 @@ def evaluate(
     BadInput as `pipeline.shards.evaluate.evaluate_file`, and if an option, the model, the seed or the number of threads
     cannot be used.
     """
-    chosen = asdict(truth)
-    options, cloth = truth_options(**chosen), load_fabric(fabric)
+    chosen = given(truth)
+    options, cloth = _truth_options(chosen), load_fabric(fabric)
     answerer = truth_answerer(cloth, options, seed)
     threads: AbstractContextManager[None] = nullcontext()
     if model is not None:
         from pipeline.models.network import one_thread
 
         threads = one_thread()
-        for name, value in (chosen | {"seed": seed or None}).items():
-            if value is not None:
-                allowed = "leave it out with --model: it is an option of the ground truth"
-                raise BadInput(WHERE, _flag(name), value, allowed)
+        if idle := list((chosen | ({"seed": seed} if seed else {})).items()):
+            (name, value), *_ = idle
+            allowed = "leave it out with --model: it is an option of the ground truth"
+            raise BadInput(WHERE, _flag(name), value, allowed)
         answerer = _model_answerer(model, cloth, extrapolate)
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput(WHERE, "--workers", workers, f"must be from 0 (one per core) to {MOST_WORKERS}")

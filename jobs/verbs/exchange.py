@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from jobs.terminal import Terminal, print_lines
-from jobs.verbs.parameters import NOTHING, FabricName, Local
+from jobs.verbs.parameters import NOTHING, FabricName, Local, given
 from pipeline.atomic import atomic_write
 from reports.exports.export import export
 from weaves.draft_files.read import read_draft
@@ -28,10 +28,6 @@ class YarnFlags:
     bend: Annotated[float | None, Parameter(help="Largest inclination along a float, degrees.")] = None
     twist: Annotated[float | None, Parameter(help="Angle of the fibres to the yarn's axis, degrees.")] = None
     roughness: Annotated[float | None, Parameter(help="Roughness of the fibres.")] = None
-
-    def given(self) -> dict[str, float]:
-        """Return the numbers that are given."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
 
 
 def import_draft(
@@ -53,7 +49,7 @@ def import_draft(
     file = read_draft(draft)
     yarns = load_fabric(like)
     own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", draft.stem).strip("_")[:60] or "draft"
-    drafted = fabric_of(file, yarns, own, str(draft), {"warp": warp.given(), "weft": weft.given()})
+    drafted = fabric_of(file, yarns, own, str(draft), {"warp": given(warp), "weft": given(weft)})
     atomic_write(out, drafted.fabric.to_toml().encode())
     program = f", written by {file.program}" if file.program else ""
     print_lines(f"{out}: fabric {own} from the draft {file.title!r}{program}")
@@ -96,8 +92,8 @@ def export_fabric(
         allowed = "one of --mesh, --wif, --maps and --shader is needed"
         raise BadInput("export", "", " and ".join(f"--{kind}" for kind in chosen) or "nothing", allowed)
     ((what, path),) = chosen.items()
-    given = {key: value for key, value in options.items() if value not in (None, [])}
-    _write("export", fabric, what, path, given)
+    stated = {key: value for key, value in options.items() if value not in (None, [])}
+    _write("export", fabric, what, path, stated)
 
 
 def view(

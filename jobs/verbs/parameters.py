@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -28,6 +28,11 @@ def _local(type_: object, tokens: Sequence[Token]) -> Path:
     if not isinstance(path, Path):
         raise ValueError(f"{one_line(tokens[0].value, 80)} is an address; a path of this machine is needed here")
     return path
+
+
+def given(flags: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass of flags that are given, not None."""
+    return {name: value for name, value in asdict(flags).items() if value is not None}
 
 
 FabricName = Annotated[str, Parameter(help="Name of a preset, or path of a .toml file.")]

@@ -178,8 +178,8 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
         raise BadInput("savings", "scene", scene, allowed)
     measured = [found[metric] for metric in MEASURED]
     values = {(record.metric, record.unit): Value(record.value, record.low, record.high) for record in measured}
-    base = next((one for one in here if (one.method, one.setting) == BASELINE and one.metric == "frame_time"), None)
-    relative = found["frame_time"].value / base.value if base else math.nan
+    base = [one.value for one in here if (one.method, one.setting) == BASELINE and one.metric == "frame_time"]
+    relative = found["frame_time"].value / base[0] if base else math.nan
     return values | {("frame_time over 2 points", "1"): Value(relative)}
 
 

@@ -95,7 +95,8 @@ def _print_fabric(fabric: Fabric) -> None:
     print_lines(fabric.weave.text(), "")
     rows = []
     for name in Yarn.model_fields:
-        warp, weft = (_value(getattr(yarn, name)) for yarn in (fabric.warp, fabric.weft))
+        values = [getattr(yarn, name) for yarn in (fabric.warp, fabric.weft)]
+        warp, weft = (f"{value:g}" if isinstance(value, float) else str(value) for value in values)
         rows.append((name, warp, weft, _UNITS.get(name, "")))
     print_table(("yarn", "warp", "weft", "unit"), rows, text=("warp", "weft", "unit"))
     if fabric.colours:
@@ -110,7 +111,3 @@ def _colours(order: ColourOrder) -> Iterator[str]:
         more = f", and {len(runs) - _RUNS} more runs" if len(runs) > _RUNS else ""
         threads = len(order.threads(axis))
         yield f"{axis}: {shown}{more}; repeats after {threads}" if runs else f"{axis}: all of one colour"
-
-
-def _value(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -27,11 +27,13 @@ class End(NamedTuple):
     code: int
     stderr: str
 
-    def assert_sentence(self):
-        """One sentence of at most 300 letters ends stderr, and no traceback is in it."""
+    @property
+    def sentence(self):
+        """The sentence of at most 300 letters that ends stderr, in which no traceback is."""
         assert "Traceback" not in self.stderr, self.stderr
         last = self.stderr.strip().splitlines()[-1]
         assert 0 < len(last) <= 300, last
+        return last
 
 
 def write_recipe(folder):
@@ -66,8 +68,18 @@ def end(process, timeout=TIMEOUT):
     return End(process.returncode, stderr)
 
 
-def run(recipe, out, *arguments, **others):
-    return end(start(recipe, out, *arguments, **others))
+def run(recipe, out, *arguments, code=0, **others):
+    """Run the command line to its end; fail if its exit code is another."""
+    ended = end(start(recipe, out, *arguments, **others))
+    assert ended.code == code, ended.stderr
+    return ended
+
+
+def finish(recipe, out, undisturbed, *arguments):
+    """Run the recipe to its end: it has the bytes of an undisturbed run, and nothing half-written is left."""
+    run(recipe, out, *arguments)
+    assert hashes(recipe, out) == undisturbed[1]
+    assert not leftovers(out)
 
 
 def hashes(recipe, out):
@@ -78,9 +90,9 @@ def hashes(recipe, out):
     return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-def assert_no_leftovers(out):
-    """Nothing half-written is left by a run that has ended well."""
-    assert not list(out.rglob(".tmp-*"))
+def leftovers(out):
+    """Return what a run has left half-written: nothing, if it has ended well."""
+    return list(out.rglob(".tmp-*"))
 
 
 def gone(processes, seconds=20.0):

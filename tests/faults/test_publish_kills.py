@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,8 +24,7 @@ name = "tiny"
 [dataset]
 seen = ["denim", "satin_8", "crepe", "voile"]
 shard_rows = 4096
-[dataset.rows]
-train = 65536
+rows = { train = 65536 }
 """
 
 
@@ -52,7 +52,7 @@ def test_a_killed_run_leaves_nothing_and_is_continued(tmp_path):
         process.wait()
         if target.exists():  # it was done, or as good as done
             assert made_up.contents(target) == made_up.contents(whole)
-            subprocess.run(["rm", "-r", str(target)], check=True)
+            shutil.rmtree(target)
             continue
         kills += 1
         inside += staging.exists()

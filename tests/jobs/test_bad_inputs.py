@@ -1,5 +1,6 @@
 """Bad inputs: each ends with exit code 1 or 2 and one short sentence, in little time and memory."""
 
+import contextlib
 import json
 import os
 import resource
@@ -148,29 +149,25 @@ VALUES = [
 """Values that none of the keys allows."""
 
 SINGLE = [
-    ({"dataset.rows.train": "10000000000"}, "recipe"),
-    ({"dataset.rows.test": "64000001"}, "recipe"),
-    ({"dataset.population.count": "100001"}, "recipe"),
-    ({"dataset.unseen_population.count": "1001"}, "recipe"),
-    ({"dataset.unseen_population.exclude": '["plaid"]'}, "recipe"),
-    ({"dataset.unseen_population.balanced": "1"}, "recipe"),
-    ({"dataset.truth.max_count": str(2**62)}, "recipe"),
-    ({"dataset.truth.max_count": "100"}, "recipe"),
-    ({"dataset.queries.sigma": "[1.0, 0.1]"}, "recipe"),
-    ({"dataset.seen": '["denim", "denim"]'}, "recipe"),
-    ({"dataset.seen": '["../../../etc/passwd"]'}, "recipe"),
-    ({"dataset.seen": '["x\\u0000.toml"]'}, "recipe"),
-    ({"dataset.seen": f'["{"a" * 300}.toml"]'}, "recipe"),
-    ({"name": '"../x"'}, "recipe"),
-    ({"name": f'"{"x" * 61}"'}, "recipe"),
-    ({"bench.scenes.names": f'["{"a" * 300}.xml"]'}, "recipe"),
-    ({"bench.scenes.names": '["pipe.xml"]'}, "recipe"),
-    ({"source": '"pipe.xml"'}, "described scene"),
-    ({"source": f'"{"a" * 5000}"'}, "described scene"),
-    ({"source": '"a\\u0000.xml"'}, "described scene"),
-    ({"draft.over": "[" + "100, " * 300 + "]"}, "fabric"),
-    ({"draft.over": "[128]", "draft.under": "[128]"}, "fabric"),
+    ("recipe", "dataset.rows.train", "10000000000"),
+    ("recipe", "dataset.rows.test", "64000001"),
+    ("recipe", "dataset.population.count", "100001"),
+    ("recipe", "dataset.unseen_population.count", "1001"),
+    ("recipe", "dataset.unseen_population.exclude", '["plaid"]'),
+    ("recipe", "dataset.unseen_population.balanced", "1"),
+    *(("recipe", "dataset.truth.max_count", value) for value in ("100", str(2**62))),
+    ("recipe", "dataset.queries.sigma", "[1.0, 0.1]"),
+    *(
+        ("recipe", "dataset.seen", f'["{name}"]')
+        for name in ('denim", "denim', "../../../etc/passwd", "x\\u0000.toml", "a" * 300 + ".toml")
+    ),
+    *(("recipe", "name", f'"{name}"') for name in ("../x", "x" * 61)),
+    *(("recipe", "bench.scenes.names", f'["{name}"]') for name in ("pipe.xml", "a" * 300 + ".xml")),
+    *(("described scene", "source", f'"{name}"') for name in ("pipe.xml", "a" * 5000, "a\\u0000.xml")),
+    ("fabric", "draft.over", "[" + "100, " * 300 + "]"),
+    ("fabric", "draft.over", "[254]"),
 ]
+"""Subjects, keys and values that are refused for a reason of their own."""
 
 LINES = Path(__file__).with_name("bad_commands.txt").read_text(encoding="utf-8").splitlines()
 """Commands as bodies of f-strings, then words of the sentence that refuses each."""
@@ -178,14 +175,7 @@ LINES = Path(__file__).with_name("bad_commands.txt").read_text(encoding="utf-8")
 COMMANDS = [(eval(f"f'''{line}'''"), words) for line, _, words in (line.partition(" => ") for line in LINES)]
 
 CONTENTS = [
-    "",
-    "{",
-    "[]",
-    "{}",
-    "null",
-    "3",
-    '"text"',
-    "NaN",
+    *("", "{", "[]", "{}", "null", "3", '"text"', "NaN"),
     "[" * 100_000,
     "[" + "0," * 100_000 + "0]",
     "[" + "{}," * 100_000 + "{}]",
@@ -216,7 +206,8 @@ ALLOWED = {("source", 6), ("source", 7)}
 
 
 def put(name, content):
-    """Write a file below the folder `broken`, and the others that its reader needs."""
+    """Write a file below the folder `broken`, and the others that its reader needs; a bad one before is removed."""
+    clear()
     path = Path("broken", name)
     path.parent.mkdir(parents=True)
     if name == "report/smoke/records.machine.json":
@@ -226,9 +217,12 @@ def put(name, content):
 
 def surroundings():
     """Write the good files that commands name, and bad ones that stay."""
-    Path("good.json").write_text('[{"method": "a"}]')
-    Path("good.xml").write_text("<scene/>")
-    Path("good.wif").write_text(wif_text(load_fabric("denim")))
+    texts = {"good.json": '[{"method": "a"}]', "good.xml": "<scene/>", "good.wif": wif_text(load_fabric("denim"))}
+    texts |= {"file": "no table and no folder", "broken.toml": "name = \n", "neither.toml": 'name = "x"\n'}
+    texts |= {"threadless.wif": wif(THREADING=None)}
+    texts |= {"bare.xml": '<scene version="3.0.0"><shape type="sphere"/></scene>'}
+    for name, text in texts.items():
+        Path(name).write_text(text, encoding="utf-8")
     for folder in ("folder.ply", "folder.png", "twill_4_4"):
         Path(folder).mkdir()
     os.mkfifo("pipe.xml")
@@ -245,22 +239,16 @@ def surroundings():
     rows["wi_z"][[4, 9]] = 3.0
     pq.write_table(pa.table(rows), "long.parquet")
     Path("cut.parquet").write_bytes(Path("good.parquet").read_bytes()[:-100])
-    Path("file").write_text("no table and no folder")
     Path("twill_4_4/x").touch()
-    Path("threadless.wif").write_text(wif(THREADING=None), encoding="utf-8")
-    Path("broken.toml").write_text("name = \n")
-    Path("neither.toml").write_text('name = "x"\n')
     write(Path("nan.toml"), FABRIC, {"warp.bend": "nan"})
     write(Path("satin.toml"), {key: text for key, text in FABRIC.items() if "draft" not in key}, SATIN)
-    Path("bare.xml").write_text('<scene version="3.0.0"><shape type="sphere"/></scene>')
 
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
     """Return a folder with the good files."""
     folder = tmp_path_factory.mktemp("good")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
+    with contextlib.chdir(folder):
         surroundings()
     return folder
 
@@ -278,6 +266,12 @@ def clear():
     for path in (*Path().glob("bad.*"), *Path().glob("a.*")):
         shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
     shutil.rmtree("broken", ignore_errors=True)
+
+
+def place_bad(kind, file):
+    """Put a broken file in the place of the one before."""
+    clear()
+    KINDS[kind](Path(file))
 
 
 def faults(code, sentence, shown, words=()):
@@ -318,8 +312,7 @@ def _late(number, frame):
 def test_a_broken_file_is_refused_in_every_format_and_by_every_verb(file, command, kinds, place, capsys):
     wrong = []
     for kind in kinds:
-        clear()
-        KINDS[kind](Path(file))
+        place_bad(kind, file)
         wrong += [(kind, *end) for end in wrong_end(command, capsys)]
     assert not wrong
 
@@ -350,9 +343,9 @@ def test_a_bad_value_at_any_key_is_refused(subject, key, place):
 @pytest.mark.parametrize("subject", BASES)
 def test_single_bad_values_are_refused(subject, place, capsys):
     wrong = []
-    for change in (change for change, of in SINGLE if of == subject):
-        write(Path("bad.toml"), BASES[subject][0], change)
-        wrong += [(str(change)[:100], *end) for end in wrong_end(FORMATS[subject][1], capsys)]
+    for key, value in (bad for of, *bad in SINGLE if of == subject):
+        write(Path("bad.toml"), BASES[subject][0], {key: value})
+        wrong += [(key, value[:100], *end) for end in wrong_end(FORMATS[subject][1], capsys)]
     assert not wrong
 
 
@@ -360,7 +353,6 @@ def test_single_bad_values_are_refused(subject, place, capsys):
 def test_any_other_json_is_refused(name, place, capsys):
     wrong = []
     for index, content in enumerate(CONTENTS):
-        clear()
         put(name, content)
         wrong += [(index, *end) for end in wrong_end(FOLDERS[name], capsys)]
     assert not wrong
@@ -377,7 +369,6 @@ def test_a_command_that_cannot_be_used_is_refused(verb, place, capsys):
 
 
 LARGE_KINDS = ("huge", "device", "quoted dots", "dotted", "brackets", "unknown keys")
-LARGE_CONTENTS = (8, 9, 10, 12)
 
 
 @pytest.mark.slow
@@ -395,13 +386,11 @@ def alone():
         surroundings()
         for file, command in FORMATS.values():
             for kind in LARGE_KINDS:
-                clear()
-                KINDS[kind](Path(file))
+                place_bad(kind, file)
                 main(command.split(" "))
         for name, command in FOLDERS.items():
-            for index in LARGE_CONTENTS:
-                clear()
-                put(name, CONTENTS[index])
+            for content in CONTENTS:
+                put(name, content)
                 main(command.split(" "))
         os.chdir("/")
     return int(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 > MEMORY)

@@ -42,14 +42,17 @@ RECIPE = """
 name = "many"
 [dataset]
 seen = ["denim"]
-shard_rows = 64
-[dataset.rows]
-train = {train}
-validation = 64
-test = 64
+shard_rows = {rows}
+rows = {{ train = {train}, validation = 64, test = 64 }}
 [[models]]
 model = "woven"
 """
+
+
+def write_many(folder: Path, shards: int, rows: int = 64) -> Path:
+    """Write a recipe of so many shards of training rows, and two others; return its path."""
+    (folder / "many.toml").write_text(RECIPE.format(rows=rows, train=shards * rows))
+    return folder / "many.toml"
 
 
 class ShortShard(Shard):
@@ -78,9 +81,8 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
     result = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "many.toml").write_text(RECIPE.format(train=(count - 2) * 64))
         (folder / "out").mkdir()
-        recipe = load_recipe(str(folder / "many.toml"))
+        recipe = load_recipe(write_many(folder, count - 2))
         parts: list[Shard] = []
         result["plan"] = timed(count, lambda: parts.extend(plan(recipe)))  # type: ignore[arg-type]
         sys.modules["measure_driver"] = sys.modules["__main__"]

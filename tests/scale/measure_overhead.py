@@ -21,19 +21,7 @@ from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import DatasetOptions
 from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
-
-RECIPE = """
-name = "overhead"
-[dataset]
-seen = ["denim"]
-shard_rows = {rows}
-[dataset.rows]
-train = {train}
-validation = 64
-test = 64
-[[models]]
-model = "woven"
-"""
+from tests.scale.measure_driver import write_many
 
 
 def main() -> None:
@@ -45,10 +33,8 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        content = RECIPE.format(rows=options.rows, train=options.rows * options.shards)
-        (folder / "overhead.toml").write_text(content)
-        tasks = [task for task in plan(load_recipe(folder / "overhead.toml")) if " train " in task.title]
-        tasks = [task for task in tasks if task.stage == "generate"]
+        recipe = write_many(folder, options.shards, options.rows)
+        tasks = [task for task in plan(load_recipe(recipe)) if task.stage == "generate" and " train " in task.title]
         log = io.StringIO()
         ledger = Ledger(folder)
         execute(tasks, ledger, workers=options.workers, console=Console(file=log), progress="json")

@@ -28,7 +28,7 @@ from jobs.run.receipt import Product
 from jobs.verbs.plan import facts_of
 from pipeline.storage import place
 from tests.jobs.s3_server import serving
-from tests.scale.measure_driver import RECIPE
+from tests.scale.measure_driver import write_many
 
 
 def fill(tasks: list[Shard], folder: Path, address: str) -> None:
@@ -54,8 +54,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name, serving() as (server, switch):
         secret = {"AWS_ACCESS_KEY_ID": "key", "AWS_SECRET_ACCESS_KEY": "secret", "AWS_DEFAULT_REGION": "us-east-1"}
         os.environ |= {"AWS_ENDPOINT_URL": server, "XDG_CACHE_HOME": f"{name}/cache"} | secret
-        (Path(name) / "many.toml").write_text(RECIPE.format(train=(count - 2) * 64))
-        tasks = [task for task in plan(load_recipe(f"{name}/many.toml")) if isinstance(task, Shard)]
+        recipe = load_recipe(write_many(Path(name), count - 2))
+        tasks = [task for task in plan(recipe) if isinstance(task, Shard)]
         fill(tasks, Path(name) / "out", "s3://products/many")
         out = place("s3://products/many")
 

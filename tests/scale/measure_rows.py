@@ -27,15 +27,8 @@ RECIPE = """
 name = "rows"
 [dataset]
 seen = ["polyester_lining"]
-[dataset.rows]
-train = {rows}
-validation = 64
-test = 64
-[dataset.truth]
-estimator = "owen"
-relative_error = 0.5
-min_count = 64
-max_count = 64
+rows = {{ train = {rows}, validation = 64, test = 64 }}
+truth = {{ estimator = "owen", relative_error = 0.5, min_count = 64, max_count = 64 }}
 [[models]]
 model = "neumip"
 """

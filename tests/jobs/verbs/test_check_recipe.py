@@ -2,6 +2,7 @@
 
 import random
 import shutil
+from functools import partial
 
 import pytest
 
@@ -37,24 +38,19 @@ def whole(tmp_path_factory):
 
 
 @pytest.fixture
-def run(whole, tmp_path, monkeypatch, twillight):
+def run(whole, tmp_path, monkeypatch, call):
     """Return a copy of that folder, and the command line on it: code and both outputs."""
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     monkeypatch.setattr("jobs.verbs.run.execute", made_up.execute)
     monkeypatch.setattr("jobs.verbs.run._print_methods", lambda records: None)
-
-    def run(*more):
-        code, said, told = twillight("check", tmp_path / "tiny.toml", "--out", tmp_path / "out", *more)
-        return code, said.replace("\n", " "), told
-
+    run = partial(call, "check", tmp_path / "tiny.toml", "--out", tmp_path / "out")
     run.out = tmp_path / "out"
     run.tasks = made_up.plan(made_up.load_recipe(tmp_path / "tiny.toml"))
     run.of = lambda kind: next(task for task in run.tasks if isinstance(task, kind))
     return run
 
 
-def flip(path, chance=None):
-    chance = chance or random.Random(0)
+def flip(path, chance=random.Random(0)):  # noqa: B008, any byte will do
     content = bytearray(path.read_bytes())
     content[chance.randrange(len(content))] ^= chance.randrange(1, 256)
     path.write_bytes(content)
@@ -67,7 +63,7 @@ def same(found, expected, but=()):
     assert changed <= set(but), changed
 
 
-def test_a_finished_recipe_is_sound_and_an_empty_folder_is_not(run):
+def test_a_finished_recipe_is_sound_and_what_is_left_to_do_is_missing(run):
     code, said, told = run()
     assert code == 0 and told == ""
     assert "4 shards with 224 rows, 2 models" in said and "are sound" in said
@@ -76,10 +72,6 @@ def test_a_finished_recipe_is_sound_and_an_empty_folder_is_not(run):
     assert code == 1 and "sound" not in said
     assert len(told.splitlines()) == 5  # a sentence a stage, and what to run
     assert "nor does any product of the 4 tasks of generate" in told
-
-
-def test_what_is_left_to_do_is_missing(run):
-    shutil.rmtree(run.out)
     made_up.finished(run.out.parent / "tiny.toml", run.out, ["generate"])
     code, _, told = run()
     assert code == 1 and "of train" in told and "of generate" not in told
@@ -88,18 +80,14 @@ def test_what_is_left_to_do_is_missing(run):
     assert code == 1 and Ledger(run.out).state(run.of(Training)) == "missing"
 
 
-def test_a_shard_that_is_gone_is_named_and_made_again(run):
-    expected, shard = made_up.contents(run.out), run.of(Shard)
+def test_a_shard_that_is_gone_and_files_cut_short_are_named_and_made_again(run):
+    expected, shard, training = made_up.contents(run.out), run.of(Shard), run.of(Training)
     (run.out / shard.products[0]).unlink()
     code, _, told = run()
     assert code == 1 and f"{run.out / shard.products[0]}: missing" in told
     assert run("--repair")[0] == 0
     same(made_up.contents(run.out), expected, but=[f"ledger/{shard.id}.json"])
-
-
-def test_files_cut_short_are_named_and_made_again(run):
-    expected = made_up.contents(run.out)
-    for path in (run.of(Shard).products[0], run.of(Training).products[0]):
+    for path in (shard.products[0], training.products[0]):
         (run.out / path).write_bytes(expected[path][:-1])
     code, _, told = run()
     assert code == 2 and told.count(": cut: it has") == 2
@@ -139,7 +127,7 @@ def test_values_that_were_never_right_are_odd(run):
     assert code == 2 and f"{path}: odd: column diffuse_warp spans [-1.0" in told
 
 
-def test_a_measurement_of_time_is_taken_again_and_shown(run):
+def test_a_measurement_of_time_is_taken_again_and_shown(run, twillight):
     timing, page = next(task for task in run.tasks if task.slots == "all"), run.of(Page)
     expected = made_up.contents(run.out)
     flip(run.out / timing.records)
@@ -148,15 +136,11 @@ def test_a_measurement_of_time_is_taken_again_and_shown(run):
     changed = [timing.records, page.products[0], f"ledger/{timing.id}.json", f"ledger/{page.id}.json"]
     same(found, expected, but=changed)
     assert found[page.products[0]] != expected[page.products[0]]
-
-
-def test_a_run_writes_the_page_again_if_times_are_missing(run, twillight):
-    timing, page = next(task for task in run.tasks if task.slots == "all"), run.of(Page)
-    before = (run.out / page.products[0]).read_bytes()
+    # A run too writes the page again if times are missing.
     (run.out / timing.records).unlink()
     assert twillight("bench", "tiny.toml")[0] == 0 and not (run.out / page.products[0]).exists()
-    assert twillight("report", "tiny.toml")[0] == 0 and (run.out / page.products[0]).read_bytes() != before
-    assert run()[0] == 0
+    assert twillight("report", "tiny.toml")[0] == 0
+    assert (run.out / page.products[0]).read_bytes() != found[page.products[0]] and run()[0] == 0
 
 
 def test_many_faults_are_counted(run):
@@ -168,37 +152,26 @@ def test_many_faults_are_counted(run):
     assert told.splitlines()[20] == f"and {len(struck) - 20} damaged more"
 
 
-def rounds(run, count, flips):
-    """Flip bytes of random files, each of another kind in turn; each is named, and all come back."""
+@pytest.mark.parametrize("count", [4, pytest.param(40, marks=pytest.mark.slow)])
+def test_five_flips_a_round_in_files_of_all_kinds_are_found_and_repaired(run, count):
+    """Each file is named, and all come back."""
     chance = random.Random(1)
     kinds = ["datasets/*/*.parquet", "datasets/*/manifest.json", "ledger/*.json", "models/*/model.safetensors"]
     kinds += ["models/*/card.json", "records/*", "report/*/index.html", "report/*/files.json", "report/*/figures/*"]
     expected = made_up.contents(run.out)
+    times = {path for task in run.tasks if task.slots == "all" or isinstance(task, Page) for path in task.products}
+    times |= {f"ledger/{task.id}.json" for task in run.tasks if task.stage == "bench" or isinstance(task, Page)}
     for _ in range(count):
-        struck = {chance.choice(sorted(run.out.glob(kind))) for kind in chance.sample(kinds, flips)}
+        struck = {chance.choice(sorted(run.out.glob(kind))) for kind in chance.sample(kinds, 5)}
         for path in struck:
             flip(path, chance)
         code, _, told = run()
         assert code == 2
-        by_task = {path for path in struck if any(str(path) in line for line in told.splitlines())}
         receipts = {path.stem for path in struck if path.parent.name == "ledger"}
         # A product whose receipt was struck too is not named: it is made again with it.
-        for path in struck - by_task:
+        for path in (path for path in struck if str(path) not in told):
             tasks = [task for task in run.tasks if str(path.relative_to(run.out)) in task.products]
             assert any(task.id in receipts for task in tasks) or "report" in str(path), (path, told)
-        assert run("--repair")[0] == 0
-        assert run()[0] == 0
-        found = made_up.contents(run.out)
-        times = {path for task in run.tasks if task.slots == "all" or isinstance(task, Page) for path in task.products}
-        times |= {f"ledger/{task.id}.json" for task in run.tasks if task.stage == "bench" or isinstance(task, Page)}
-        same(found, expected, but=times)
+        assert run("--repair")[0] == run()[0] == 0
+        same(made_up.contents(run.out), expected, but=times)
         assert not receipts & {task.id for task in run.tasks if Ledger(run.out).receipt(task) is None}
-
-
-def test_flips_of_all_kinds_of_files_are_found_and_repaired(run):
-    rounds(run, 4, 5)
-
-
-@pytest.mark.slow
-def test_two_hundred_flips_are_found_and_repaired(run):
-    rounds(run, 40, 5)

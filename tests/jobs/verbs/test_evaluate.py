@@ -1,61 +1,74 @@
-"""`twillight evaluate` as a user meets it: what it prints, one sentence for whatever is wrong, what a kill leaves."""
+"""`twillight evaluate` by the truth and by a trained model: answers, refusals, and what a kill leaves."""
 
+import json
 import signal
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import safetensors.torch
+import torch
 
 import pipeline.shards.evaluate
-from jobs.verbs.evaluate import truth_options
-from pipeline.truth.options import TruthOptions
+from pipeline.fingerprint import IDENTITY
+from pipeline.models.card import read_card, read_weights, write_model
+from pipeline.models.domain import Domain
+from pipeline.models.woven import WovenOptions
+from pipeline.models.woven.model import Woven, WovenNetwork
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.conventions import COMPONENTS
+from weaves.fabric import load_fabric
 
 ROWS = 40
+SMALL = WovenOptions(map_texels=16, encoder_channels=4, hidden=16, latent=8)
 
 
-def query_columns():
-    rng = np.random.default_rng(2)
-    ones = np.ones(ROWS)
-    wi = {"wi_x": 0.6 * ones, "wi_y": 0.0 * ones, "wi_z": 0.8 * ones}
-    wo = {"wo_x": 0.0 * ones, "wo_y": 0.28 * ones, "wo_z": 0.96 * ones}
-    return {"id": np.arange(ROWS), "u": rng.random(ROWS), "v": rng.random(ROWS), "sigma": ones, **wi, **wo}
+def drawn(rows=ROWS, **options):
+    return draw_queries(QueryOptions(**options), (4, 4), 1, 0, rows)
+
+
+QUERIES = drawn()
 
 
 @pytest.fixture
 def evaluate(twillight, tmp_path):
-    """Run the verb on a file of queries; return exit code, output and complaint."""
-    pq.write_table(pa.table(query_columns()), tmp_path / "queries.parquet")
-    return partial(twillight, "evaluate", "denim", "queries.parquet", "--out")
+    """Evaluate queries by the verb; return the exit code, output and complaint, each in one line, and the answers."""
+
+    def evaluate(*more, fabric="denim", queries=QUERIES, out="result.parquet"):
+        columns = {"id": np.arange(len(queries.u))} | {name: getattr(queries, name) for name in ("u", "v", "sigma")}
+        for name in ("wi", "wo"):
+            columns |= {f"{name}_{axis}": getattr(queries, name)[:, k] for k, axis in enumerate("xyz")}
+        pq.write_table(pa.table(columns), tmp_path / "queries.parquet")
+        code, text, complaint = twillight("evaluate", fabric, "queries.parquet", "--out", out, *more)
+        answers = pq.read_table(tmp_path / out) if (tmp_path / out).exists() else None
+        return code, text, " ".join(complaint.split()), answers
+
+    return evaluate
 
 
 def test_a_summary_tells_what_was_done(evaluate, tmp_path):
-    code, text, complaint = evaluate("deep/result.parquet", "--relative-error", "0.1")
-    assert (code, complaint) == (0, "")
-    table = pq.read_table(tmp_path / "deep" / "result.parquet")
+    path, coarse = tmp_path / "deep" / "result.parquet", ("--relative-error", "0.1")
+    code, text, complaint, table = evaluate(*coarse, out="deep/result.parquet")
+    assert (code, complaint) == (0, "") and "deep/result.parquet" in text
     assert table["id"].to_pylist() == list(range(ROWS))
     cells = text.splitlines()[1].split()
     assert cells[:2] == [str(ROWS), str(ROWS)] and cells[2].endswith("%")
     assert float(cells[3].replace(",", "")) == pytest.approx(table["count"].to_numpy().mean(), rel=0.01)
-    assert "deep/result.parquet" in text
     # The same command writes the same bytes on any number of threads; another seed, estimator or footprint does not.
-    first = (tmp_path / "deep" / "result.parquet").read_bytes()
-    evaluate("deep/one.parquet", "--relative-error", "0.1", "--workers", "1")
-    assert (tmp_path / "deep" / "one.parquet").read_bytes() == first
-    for choice in ((), ("--seed", "1"), ("--estimator", "mc"), ("--footprint", "box")):
-        evaluate("deep/result.parquet", "--relative-error", "0.1", *choice)
-        assert ((tmp_path / "deep" / "result.parquet").read_bytes() == first) == (not choice), choice
+    first = path.read_bytes()
+    for choice in ((), ("--workers", "1"), ("--seed", "1"), ("--estimator", "mc"), ("--footprint", "box")):
+        evaluate(*coarse, *choice, out="deep/result.parquet")
+        assert (path.read_bytes() == first) == (not choice or choice[0] == "--workers"), choice
 
 
 def test_bad_rows_are_listed_when_skipped(evaluate, tmp_path):
-    columns = query_columns()
-    columns["sigma"][3] = 0.0
-    pq.write_table(pa.table(columns), tmp_path / "queries.parquet")
-    code, text, complaint = evaluate("result.parquet", "--skip-bad")
+    sigma = QUERIES.sigma.copy()
+    sigma[3] = 0.0
+    code, text, complaint, _ = evaluate("--skip-bad", queries=QUERIES._replace(sigma=sigma))
     assert (code, complaint) == (0, "") and "1 bad row has no answer; see result.bad.csv" in text
     listed = (tmp_path / "result.bad.csv").read_text().splitlines()
     assert listed == ["row,column,value,reason", "3,sigma,0.0,must be greater than 0"]
@@ -66,8 +79,7 @@ def test_ctrl_c_says_that_nothing_was_written(evaluate, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pipeline.shards.evaluate, "estimate", stop)
-    code, _, complaint = evaluate("result.parquet")
-    assert code == 130 and complaint == "stopped; result.parquet was not written\n"
+    assert evaluate() == (130, "", "stopped; result.parquet was not written", None)
     assert [path.name for path in tmp_path.iterdir()] == ["queries.parquet"]
 
 
@@ -83,18 +95,69 @@ def test_a_kill_leaves_no_half_file_and_the_next_run_clears_up(evaluate, tmp_pat
         "e.evaluate_file(denim, Path('queries.parquet'), Path('result.parquet'), truth,\n"
         "    skip_bad=True, progress=lambda share: share < 0.5 or os.kill(os.getpid(), signal.SIGKILL))\n"
     )
-    root = Path(__file__).parents[3]
-    done = subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(root)!r})\n{code}"], cwd=tmp_path
-    )
-    assert done.returncode == -signal.SIGKILL
+    evaluate()
+    (tmp_path / "result.parquet").unlink()
+    start = f"import sys; sys.path.insert(0, {str(Path(__file__).parents[3])!r})\n{code}"
+    assert subprocess.run([sys.executable, "-c", start], cwd=tmp_path).returncode == -signal.SIGKILL
     left = {path.name for path in tmp_path.iterdir()}
     assert left <= {"queries.parquet", ".tmp-result.parquet", ".tmp-result.bad.csv"} and ".tmp-result.parquet" in left
-    assert evaluate("result.parquet", "--skip-bad")[0] == 0
+    code, _, _, table = evaluate("--skip-bad")
+    assert code == 0 and table.num_rows == ROWS
     assert sorted(path.name for path in tmp_path.iterdir()) == ["queries.parquet", "result.bad.csv", "result.parquet"]
-    assert pq.read_table(tmp_path / "result.parquet").num_rows == ROWS
 
 
-def test_options_that_are_left_out_keep_their_defaults():
-    assert truth_options(estimator=None, relative_error=None) == TruthOptions()
-    assert truth_options(estimator="mc").estimator == "mc"
+@pytest.fixture(scope="module")
+def network():
+    torch.manual_seed(3)
+    return WovenNetwork(SMALL).eval()
+
+
+@pytest.fixture
+def folder(network, tmp_path):
+    """Return a folder with a model as training leaves it, taught on two fabrics."""
+    domain = Domain.of({}, [load_fabric("denim"), load_fabric("silk_charmeuse")])
+    card = {"model": "woven", "version": {"model": 1}, "domain": domain.model_dump(mode="json")}
+    card |= {"options": SMALL.model_dump(mode="json", context=IDENTITY)}
+    write_model(tmp_path / "model", safetensors.torch.save(network.state_dict()), card)
+    return tmp_path / "model"
+
+
+def test_a_model_answers_and_states_no_error(network, evaluate, folder):
+    code, _, _, table = evaluate("--model", folder)
+    assert code == 0
+    found = np.stack([table[name].to_numpy() for name in COMPONENTS], axis=1)
+    np.testing.assert_allclose(found, Woven(network).predict(load_fabric("denim"), QUERIES), rtol=1e-5, atol=1e-7)
+    assert table["specular_warp_standard_error"].null_count == ROWS
+    about = json.loads(table.schema.metadata[b"twillight"])
+    assert about["model"] == "woven" and json.loads(about["card"])["model"] == "woven"
+
+
+def test_a_fabric_that_it_was_not_taught_is_refused_unless_it_is_asked_to_extrapolate(evaluate, folder):
+    code, _, complaint, table = evaluate("--model", folder, fabric="gauze")
+    assert code == 2 and "roughness = 0.6: the model woven was trained on" in complaint and table is None
+    code, _, _, table = evaluate("--model", folder, "--extrapolate", fabric="gauze")
+    assert code == 0 and table.num_rows == ROWS
+
+
+def test_rows_it_was_not_taught_are_named_before_anything_is_computed_and_can_be_skipped(evaluate, folder, tmp_path):
+    """Row 3,000 of 3,001 lies beyond the first run of rows that a thread answers."""
+    queries = drawn(3001)
+    queries.wi[3000] *= np.float32([1, 1, -1])
+    code, _, complaint, table = evaluate("--model", folder, queries=queries)
+    assert code == 2 and "row 3000" in complaint and table is None
+    assert "the model woven was trained for light from the viewer's side only" in complaint
+    code, _, _, table = evaluate("--model", folder, "--skip-bad", queries=queries)
+    assert code == 0 and table["diffuse_warp"].null_count == 1
+    assert "3000" in (tmp_path / "result.bad.csv").read_text()
+
+
+def test_a_model_of_another_version_with_other_weights_or_a_damaged_file_is_named(evaluate, folder):
+    card = read_card(folder)
+    write_model(folder, read_weights(folder, card), card | {"version": {"model": 99}})
+    assert "version = 99: this is version 1 of woven" in evaluate("--model", folder)[2]
+    write_model(folder, safetensors.torch.save({"a": torch.zeros(2)}), card)
+    assert "do not fit together" in evaluate("--model", folder)[2]
+    for name, content in (("model.safetensors", b"\x80\x04pickle"), ("card.json", b"{")):
+        (folder / name).write_bytes(content)
+        code, _, complaint, _ = evaluate("--model", folder)
+        assert code == 2 and name in complaint

@@ -1,35 +1,27 @@
 """`twillight plan`: reasons and schedules of a recipe whose shards are partly done."""
 
+from pathlib import Path
+
 import pytest
 
 from jobs.cli import main
-from jobs.plan.plan import plan
-from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.reasons import ELSEWHERE
 from jobs.run.receipt import Product
 from jobs.verbs.plan import facts_of
 
 
-def finish(ledger, task, seconds):
-    """Write products of one byte, and a receipt."""
-    files = {}
-    for path in task.products:
-        (ledger.out / path).parent.mkdir(parents=True, exist_ok=True)
-        (ledger.out / path).write_bytes(b"x")
-        files[path.rpartition("/")[2]] = Product(sha256="0" * 64, bytes=1)
-    ledger.finish(task, files, seconds)
-
-
 @pytest.fixture
 def out(files, tmp_path):
-    out = tmp_path / "out"
-    (out / "ledger").mkdir(parents=True)
-    ledger = Ledger(out)
-    for task in plan(load_recipe(files.write())):
-        if task.stage == "generate":
-            finish(ledger, task, 200 * task.cost)
-    return out
+    """Return a folder with products of one byte, and receipts, of all shards."""
+    ledger = Ledger(tmp_path / "out")
+    for task in (task for task in files.plan() if task.stage == "generate"):
+        for path in map(ledger.out.joinpath, task.products):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(b"x")
+        product = Product(sha256="0" * 64, bytes=1)
+        ledger.finish(task, {Path(path).name: product for path in task.products}, 200 * task.cost)
+    return ledger.out
 
 
 def test_the_changed_key_of_a_recipe_is_named(files, out, capsys):
@@ -45,7 +37,7 @@ def test_the_changed_key_of_a_recipe_is_named(files, out, capsys):
 
 
 def test_estimates_are_scaled_by_what_was_measured(files, out):
-    tasks = plan(load_recipe(files.exchange("train = 2500", "train = 4500").write()))
+    tasks = files.exchange("train = 2500", "train = 4500").plan()
     facts = facts_of(tasks, Ledger(out))
     new = [task for task in facts.left(tasks) if task.stage == "generate"]
     # The data set has another folder now; what both have is only linked.
@@ -58,7 +50,7 @@ def test_estimates_are_scaled_by_what_was_measured(files, out):
 
 
 def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, capsys):
-    assert main(["plan", str(files.path), "--out", str(out), "--workers", "3"]) == 0
+    assert main(["plan", files.write(), "--out", str(out), "--workers", "3"]) == 0
     told = capsys.readouterr().out.replace("\n", " ")
     for part in ("3 workers: ", "workers save less than 5%", "durations are measured"):
         assert part in " ".join(told.split())

@@ -23,7 +23,7 @@ from weaves.fabric import load_fabric
 from weaves.families import Satin
 
 SMALL = ("--size", "32x24", "--directions", "4")
-COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
+FAST = ("--size", "16x12", "--directions", "4", "--method", "soft_nodes")
 
 
 @pytest.fixture
@@ -44,7 +44,8 @@ def test_a_picture_is_the_frame_of_the_benchmark(render, tmp_path):
 
     Where no light reaches the cloth, the benchmark asks for nothing and shows nothing through it.
     """
-    options = ShotOptions(size=(32, 24), frames=3, options=SceneOptions(environment_directions=4), frame_truth=COARSE)
+    coarse = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
+    options = ShotOptions(size=(32, 24), frames=3, options=SceneOptions(environment_directions=4), frame_truth=coarse)
     shoot("dinner_table", options, tmp_path / "shot.npz")
     shot = read_shot(tmp_path / "shot.npz")
     pictures = shot.pictures(shot.answers(named_method("soft_nodes", "render", "--method"), 0))
@@ -114,24 +115,25 @@ def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
 
 
 def test_a_folder_holds_the_frames_and_the_tone_changes_them(render, tmp_path):
-    fast = "--size", "16x12", "--directions", "4", "--method", "soft_nodes"
-    assert render("plane", "--out", "film", "--frames", "2", *fast)[0] == 0
-    assert render("plane", "--out", "one.png", *fast)[0] == 0
-    assert render("plane", "--out", "dark.png", "--exposure", "-1", "--tone", "reinhard", *fast)[0] == 0
+    assert render("plane", "--out", "film", "--frames", "2", *FAST)[0] == 0
+    assert render("plane", "--out", "one.png", *FAST)[0] == 0
+    assert render("plane", "--out", "dark.png", "--exposure", "-1", "--tone", "reinhard", *FAST)[0] == 0
     assert sorted(path.name for path in (tmp_path / "film").iterdir()) == ["frame-0001.png", "frame-0002.png"]
     first, second = ((tmp_path / "film" / f"frame-000{index}.png").read_bytes() for index in (1, 2))
     assert first == (tmp_path / "one.png").read_bytes() != second
     assert codes_of(tmp_path / "dark.png").mean() < codes_of(tmp_path / "one.png").mean()
 
 
-def test_a_film_has_the_frames_that_are_asked_for(render, tmp_path):
+def test_a_film_has_the_frames_that_are_asked_for_and_needs_its_library(render, tmp_path, monkeypatch):
     av = pytest.importorskip("av")
-    fast = "--size", "16x12", "--directions", "4", "--method", "soft_nodes"
-    assert render("plane", "--out", "a.mp4", "--frames", "3", *fast)[0] == 0
+    assert render("plane", "--out", "a.mp4", "--frames", "3", *FAST)[0] == 0
     with av.open(str(tmp_path / "a.mp4")) as film:
         assert len(list(film.decode(video=0))) == 3
     code, _, complaint = render("plane", "--out", "a.mp4", "--size", "15x12")
     assert code == 2 and "even" in complaint
+    monkeypatch.setitem(sys.modules, "av", None)
+    code, _, complaint = render("plane", "--out", "a.mp4", *FAST)
+    assert code == 2 and "pip install 'twillight[video]'" in complaint
 
 
 def test_a_stopped_picture_leaves_what_was_there(render, tmp_path, monkeypatch):
@@ -167,9 +169,3 @@ def test_a_mitsuba_file_has_its_own_size_and_wears_the_fabric_that_is_named(rend
     exr = read_exr(tmp_path / "a.exr")
     assert exr.channels["R"].shape == (10, 20) and exr.attributes["fabrics"] == "1 mine"
     assert exr.stack(*"RGB")[exr.channels["A"] == 1].mean() > 0.05
-
-
-def test_without_the_library_for_films_a_sentence_names_it(render, monkeypatch):
-    monkeypatch.setitem(sys.modules, "av", None)
-    code, _, complaint = render("drape", "--out", "a.mp4")
-    assert code == 2 and "pip install 'twillight[video]'" in complaint

@@ -35,7 +35,7 @@ ERRORS = {
 
 
 @pytest.fixture
-def require(tmp_path, twillight):
+def require(tmp_path, call):
     """Call the command in a folder that holds a page with errors and times by size."""
     pytest.importorskip("mitsuba")
     (tmp_path / "wide.toml").write_text(RECIPE)
@@ -44,15 +44,10 @@ def require(tmp_path, twillight):
         one = Record(method=method, setting=setting)
         for metric, value in (("size_colour", error), ("size_time", ns)):
             records.append(one.of(metric, value, 9, curve=tuple((low, value) for low in EDGES[:-1])))
-    folder = tmp_path / "out" / "report" / "wide"
-    folder.mkdir(parents=True)
-    write_records(folder / OF_A_PAGE, records, this_machine(1))
-
-    def call(*tokens):
-        code, text, told = twillight("require", *tokens, "--recipe", "wide.toml", "--frames", "1")
-        return code, " ".join(text.split()), told
-
-    return call
+    page = tmp_path / "out" / "report" / "wide" / OF_A_PAGE
+    page.parent.mkdir(parents=True)
+    write_records(page, records, this_machine(1))
+    return lambda *tokens: call("require", *tokens, "--recipe", "wide.toml", "--frames", "1")
 
 
 def test_the_wish_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, monkeypatch):
@@ -92,12 +87,9 @@ def test_a_wish_that_nothing_meets_names_the_nearest_points(require):
     assert code == 2 and "woven: " in told and "point_sampled" not in told
 
 
-def test_a_method_that_was_not_measured_is_refused(require):
+def test_a_method_that_was_not_measured_or_that_only_an_old_page_has_is_refused(require, tmp_path):
     code, _, told = require("plane", "--method", "neumip")
     assert code == 2 and told.count("\n") == 1 and "--method = 'neumip': it was not measured" in told
-
-
-def test_a_method_that_only_an_old_page_has_is_refused(require, tmp_path):
     path = tmp_path / "out" / "report" / "wide" / OF_A_PAGE
     best = Record(method="sums", scene="plane", threads=1)
     numbers = {"mse": 1e-6, "colour_rrmse": 0.001, "fallback_share": 0.0, "frame_time": 1e-6}
@@ -107,9 +99,6 @@ def test_a_method_that_only_an_old_page_has_is_refused(require, tmp_path):
     assert code == 2 and told.count("\n") == 1
     assert "the page of wide: method = 'sums'" in told
     assert require("plane", "--method", "point_sampled")[0] == 0
-
-
-def test_without_a_page_it_says_so(require, tmp_path):
-    (tmp_path / "out" / "report" / "wide" / OF_A_PAGE).unlink()
+    path.unlink()
     code, _, told = require("plane")
     assert code == 2 and told.count("\n") == 1 and "no page of the recipe wide" in told

@@ -1,0 +1,103 @@
+"""`twillight import`, `export --mesh`, `export --wif` and `view`: the files, what is printed, what cannot be used."""
+
+import numpy as np
+
+from reports.viewer import view
+from tests.reports.viewer.conftest import shown_of
+from tests.weaves.draft_files.drafts import numbered, wif
+from weaves.fabric import load_fabric
+from weaves.mesh import repeat_mesh
+
+
+def test_a_draft_becomes_a_fabric_that_other_verbs_load(twillight, tmp_path):
+    (tmp_path / "Scarf #2.wif").write_text(wif(WARP_COLORS=numbered([1, 2] * 4)), encoding="utf-8")
+    code, text, complaint = twillight("import", "Scarf #2.wif", "--out", "deep/scarf.toml", "--like", "denim")
+    assert (code, complaint) == (0, "")
+    assert "it repeats after 4 ends and 4 picks" in text and "Assumed:" in text and "bend 12° and 38°" in text
+    fabric = load_fabric(tmp_path / "deep" / "scarf.toml")
+    assert fabric.name == "Scarf_2" and fabric.warp.bend == load_fabric("denim").warp.bend
+    code, text, _ = twillight("show", "deep/scarf.toml")
+    assert code == 0 and "4 ends × 4 picks" in text
+
+
+def test_options_replace_numbers_of_single_yarns(twillight, tmp_path):
+    (tmp_path / "a.wif").write_text(wif(), encoding="utf-8")
+    options = ["--warp.bend", "7", "--weft.width", "0.6", "--weft.roughness", "0.2", "--name", "own"]
+    assert twillight("import", "a.wif", "--out", "a.toml", *options)[0] == 0
+    fabric = load_fabric(tmp_path / "a.toml")
+    like = load_fabric("cotton_twill")
+    assert (fabric.name, fabric.warp.bend, fabric.weft.width, fabric.weft.roughness) == ("own", 7, 0.6, 0.2)
+    assert (fabric.weft.bend, fabric.warp.roughness) == (like.weft.bend, like.warp.roughness)
+
+
+def test_a_fabric_that_was_exported_is_imported(twillight, tmp_path):
+    code, text, _ = twillight("export", "herringbone", "--wif", "h.wif")
+    assert code == 0 and "h.wif" in text and "no spacing" in text
+    assert twillight("import", "h.wif", "--out", "h.toml", "--like", "herringbone")[0] == 0
+    first, again = load_fabric("herringbone"), load_fabric(tmp_path / "h.toml")
+    assert again.weave == first.weave and again.optics() == first.optics()
+
+
+FLOAT, BYTE = "<f4", "u1"
+
+
+def read_ply(path):
+    """Return places, colours and triangles of a binary PLY with float places, byte colours and triangles."""
+    content = path.read_bytes()
+    header, body = content.split(b"end_header\n", 1)
+    lines = header.decode("ascii").split("\n")
+    assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
+    count = {line.split()[1]: int(line.split()[2]) for line in lines if line.startswith("element")}
+    properties = [line for line in lines if line.startswith("property")]
+    assert properties[:3] == [f"property float {axis}" for axis in "xyz"]
+    assert properties[3:7] == [f"property uchar {name}" for name in ("red", "green", "blue", "alpha")]
+    assert properties[7].startswith("property list uchar int") and len(properties) == 8
+    vertex = np.dtype([("place", FLOAT, 3), ("colour", BYTE, 4)])
+    face = np.dtype([("corners", BYTE), ("index", "<i4", 3)])
+    vertices = np.frombuffer(body, vertex, count["vertex"])
+    faces = np.frombuffer(body[vertices.nbytes :], face)
+    assert len(faces) == count["face"] and (faces["corners"] == 3).all()
+    return vertices["place"], vertices["colour"], faces["index"]
+
+
+def test_the_file_holds_the_mesh_in_the_colours_of_its_yarns(twillight, tmp_path):
+    command = "export", "denim", "--mesh", "deep/cloth.ply", "--vertices", "6", "--repeats", "2"
+    code, text, complaint = twillight(*command)
+    assert (code, complaint) == (0, "") and "deep/cloth.ply" in text
+    places, colours, faces = read_ply(tmp_path / "deep" / "cloth.ply")
+    denim = load_fabric("denim")
+    meshes = repeat_mesh(denim, 6, (2, 2))
+    assert f"{len(faces):,} triangles" in text
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    np.testing.assert_array_equal(places, np.concatenate([mesh.vertices for mesh in meshes]).astype(np.float32))
+    np.testing.assert_array_equal(faces, np.concatenate([m.faces + n for m, n in zip(meshes, starts, strict=False)]))
+    warp, weft, core = (np.unique(part, axis=0) for part in np.split(colours, starts[1:-1]))
+    assert (warp[:, 3] == 255).all() and len(warp) == len(weft) == len(core) == 1 and (core[0, :3] < 64).all()
+    np.testing.assert_allclose(warp[0, :3], _srgb(denim.warp.diffuse_rgb), atol=0.6)
+    np.testing.assert_allclose(weft[0, :3], _srgb(denim.weft.diffuse_rgb), atol=0.6)
+    # Nothing but the file is left, and the same command writes the same bytes.
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["cloth.ply"]
+    first = (tmp_path / "deep" / "cloth.ply").read_bytes()
+    twillight(*command)
+    assert (tmp_path / "deep" / "cloth.ply").read_bytes() == first
+
+
+def _srgb(linear):
+    """Encode as IEC 61966-2-1 does, in 8 bits."""
+    linear = np.asarray(linear)
+    return 255 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def test_a_view_of_a_large_repeat_is_refused_before_any_work(twillight, monkeypatch, tmp_path):
+    monkeypatch.setattr(view, "MOST_REPEAT_CELLS", 3)
+    monkeypatch.setattr(view, "content", None)
+    code, _, told = twillight("view", "gingham", "--out", "x.html")
+    assert code == 2 and "at most 3 cells" in told and not list(tmp_path.iterdir())
+
+
+def test_a_page_of_a_fabric_is_written_whole(twillight, monkeypatch, tmp_path):
+    found = shown_of(0, (2,), (1.0,), 32)
+    monkeypatch.setattr(view, "content", lambda fabric, truth: found)
+    code, said, _ = twillight("view", "gingham", "--out", "a/x.html")
+    assert code == 0 and "5 views" in said
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["x.html"]
