@@ -173,7 +173,9 @@ def copy(source: Path, target: Path) -> None:
 
 def explained(error: BaseException) -> BadInput | WorkFailed | None:
     """Return an error of a storage as a sentence; None if it is another error."""
-    if type(error).__module__.split(".")[0] not in _LIBRARIES and not _from_library(error):
+    # Errors of Python's own kinds may be raised on behalf of a library.
+    raised = error, error.__cause__ or error.__context__
+    if _LIBRARIES.isdisjoint(type(each).__module__.split(".")[0] for each in raised):
         return None
     reason = one_line(error, 120)
     if isinstance(error, PermissionError):
@@ -181,12 +183,6 @@ def explained(error: BaseException) -> BadInput | WorkFailed | None:
     if isinstance(error, FileNotFoundError) and "bucket" in reason.lower():
         return BadInput("--out", "", "not found", f"an existing bucket is needed ({reason})")
     return WorkFailed(f"--out: the storage fails ({reason}); finished work is kept, and the same command continues")
-
-
-def _from_library(error: BaseException) -> bool:
-    """Return whether an error of Python's own kinds was raised on behalf of a storage library."""
-    cause = error.__cause__ or error.__context__
-    return cause is not None and type(cause).__module__.split(".")[0] in _LIBRARIES
 
 
 @cache

@@ -172,3 +172,15 @@ def test_the_readme_asks_for_the_python_of_the_package():
     project = tomllib.loads(text_of(ROOT / "pyproject.toml"))["project"]
     least = project["requires-python"].removeprefix(">=")
     assert f"Python {least} or newer" in text_of(ROOT / "README.md")
+
+
+def test_the_changelog_begins_with_the_package_version():
+    version = tomllib.loads(text_of(ROOT / "pyproject.toml"))["project"]["version"]
+    assert re.search(r"^## (\S+)", text_of(ROOT / "CHANGELOG.md"), re.M)[1] == version
+
+
+def test_reference_keys_that_docstrings_cite_are_in_the_bibliography():
+    listed = set(re.findall(r"@\w+\{(\w+),", text_of(ROOT / "BIBLIOGRAPHY.bib")))
+    sources = [path for room in ROOMS for path in (ROOT / room).rglob("*.py")]
+    cited = {key for path in sources for key in re.findall(r"\[([A-Z][a-z]+\d{4}[A-Za-z]*)\]", text_of(path))}
+    assert cited and cited <= listed

@@ -15,12 +15,10 @@ import pytest
 import torch
 
 import twillight
-from pipeline.fingerprint import file_sha256
-from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.query import Answers
-from twillight import BadInput, Dataset, Fabric, Queries, evaluate, load_fabric, load_model, open_dataset, to_rgb
+from tests.datasets import write_dataset
+from twillight import BadInput, Dataset, Queries, evaluate, load_fabric, load_model, open_dataset
 
 ROOT = Path(__file__).parents[1]
 ROWS = {("denim", "train"): (200, 150), ("denim", "test"): (40,), ("twill_4_4", "test"): (30,)}
@@ -30,22 +28,14 @@ ROWS = {("denim", "train"): (200, 150), ("denim", "test"): (40,), ("twill_4_4", 
 @pytest.fixture
 def dataset(tmp_path, monkeypatch):
     """A data set where the docstrings expect one; the components of row n of a fabric are n + 1."""
-    folder = tmp_path / "out" / "datasets" / "tiny"
-    folder.mkdir(parents=True)
-    fabrics, shards = {name: load_fabric(name) for name, _ in ROWS}, []
+    parts = []
     for (name, split), counts in ROWS.items():
-        start = 0
-        for rows in counts:
-            queries = draw_queries(QueryOptions(), fabrics[name].weave.repeat, len(name), start, rows)
+        for start, rows in zip(np.cumsum([0, *counts]).tolist(), counts, strict=False):
+            queries = draw_queries(QueryOptions(), load_fabric(name).weave.repeat, len(name), start, rows)
             mean = np.repeat(np.arange(start, start + rows, dtype=np.float32)[:, None] + 1, 4, axis=1)
-            file = f"{name}-{split}-{start}.parquet"
-            answers = Answers.opaque(mean, mean, np.ones(rows, np.int32))
-            write_columns(folder / file, "components", name, columns_of(queries, answers), {})
-            sha256 = file_sha256(folder / file)
-            shards.append(ShardEntry(file=file, fabric=name, split=split, start=start, rows=rows, sha256=sha256))
-            start += rows
-    roles = {"seen": ["denim"], "population": [], "unseen": ["twill_4_4"]}
-    Manifest(name="tiny", fingerprint="0", roles=roles, fabrics=fabrics, about={}, shards=shards).save(folder)
+            parts.append((name, split, start, queries, Answers.opaque(mean, mean, np.ones(rows, np.int32))))
+    folder = tmp_path / "out" / "datasets" / "tiny"
+    write_dataset(folder, {"seen": ["denim"], "population": [], "unseen": ["twill_4_4"]}, parts)
     monkeypatch.chdir(tmp_path)
     return open_dataset(folder)
 
@@ -104,21 +94,15 @@ def test_the_door_opens_without_heavy_libraries(tmp_path):
     assert run(code, tmp_path) == (0, "[]\n")
 
 
-@pytest.mark.parametrize("name", ["weaves", "pipeline", "reports", "jobs"])
-def test_a_package_that_hides_ours_is_named_with_both_paths(name, tmp_path):
-    (tmp_path / name).mkdir()
-    (tmp_path / name / "__init__.py").touch()
+@pytest.mark.parametrize("file", ["weaves/__init__.py", "pipeline/__init__.py", "reports/__init__.py", "jobs.py"])
+def test_what_hides_a_package_of_ours_is_named_with_both_paths(file, tmp_path):
+    path, name = tmp_path / file, Path(file).parts[0].removesuffix(".py")
+    path.parent.mkdir(exist_ok=True)
+    path.touch()
     code, said = run("import twillight", tmp_path)
-    assert code == 1
     last = said.strip().splitlines()[-1]
-    assert last.startswith("ImportError: ")
+    assert code == 1 and last.startswith("ImportError: ")
     assert str(tmp_path / name) in last and str(ROOT / name) in last
-
-
-def test_a_module_that_hides_ours_is_named_too(tmp_path):
-    (tmp_path / "jobs.py").touch()
-    code, said = run("import twillight", tmp_path)
-    assert code == 1 and str(tmp_path / "jobs.py") in said.splitlines()[-1]
 
 
 def test_a_folder_without_code_hides_nothing_where_ours_is_on_the_path(tmp_path):
@@ -157,15 +141,6 @@ def test_bad_input_of_evaluate_is_one_sentence(change, options, sentence):
 def test_a_model_that_does_not_exist(name):
     with pytest.raises(BadInput, match="selvage"):
         load_model(name)
-
-
-def test_transmitted_light_takes_other_colours():
-    text = load_fabric("voile").to_toml()
-    assert "diffuse_transmission" in text, "the example needs a fabric with colours of transmission"
-    queries = Queries.round([0, 0], [0, 0], [1, 1], [[0, 0, 1], [0, 0, -1]], [[0, 0, 1]] * 2)
-    front, behind = to_rgb(load_fabric("voile"), [[0, 0, 1, 0]] * 2, queries)
-    warp = load_fabric("voile").warp
-    assert tuple(front) == warp.diffuse_rgb and tuple(behind) == warp.diffuse_transmission_rgb
 
 
 def test_rows_are_the_same_in_every_form(dataset):
@@ -210,17 +185,6 @@ def test_all_fabrics_of_a_split(dataset):
 def test_bad_input_of_a_dataset_is_one_sentence(call, sentence, dataset):
     with pytest.raises(BadInput, match=re.escape(sentence)):
         call(dataset)
-
-
-def test_a_damaged_shard_is_refused(dataset, tmp_path):
-    path = tmp_path / "out" / "datasets" / "tiny" / "denim-test-0.parquet"
-    path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(BadInput, match="not a whole Parquet file"):
-        dataset.pandas("test")
-
-
-def test_fabrics_are_models_of_pydantic():
-    assert Fabric.model_validate(load_fabric("denim").model_dump()) == load_fabric("denim")
 
 
 FORKED = """

@@ -24,13 +24,20 @@ KEPT = ROOT / "docs" / "pictures" / "cloth.png"
 
 
 @pytest.fixture
-def example(tmp_path, monkeypatch):
-    """Return a function that runs the example of the page and returns its picture."""
-    (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S)
+def mi():
+    """Return Mitsuba in the variant that the import would choose, without its warning of the scalar one."""
     import mitsuba as mi
 
     before = mi.variant()
-    mitsuba()  # the import would choose the same variant, and warn of the scalar one
+    yield mitsuba()
+    if before is not None:
+        mi.set_variant(before)
+
+
+@pytest.fixture
+def example(mi, tmp_path, monkeypatch):
+    """Return a function that runs the example of the page and returns its picture."""
+    (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S)
     monkeypatch.chdir(tmp_path)
 
     def run(**changed):
@@ -41,9 +48,7 @@ def example(tmp_path, monkeypatch):
         exec(compile(text, "mitsuba.md", "exec"), {})
         return matplotlib.image.imread(tmp_path / "cloth.png")[..., :3].astype(float)
 
-    yield run
-    if before is not None:
-        mi.set_variant(before)
+    return run
 
 
 @pytest.mark.slow
@@ -64,18 +69,10 @@ def test_the_example_with_small_pixels(example):
 
 
 @pytest.mark.slow
-def test_the_cover_shows_cloth_with_light_behind_it():
+def test_the_cover_shows_cloth_with_light_behind_it(mi):
     """Twelve columns of pixels: the organza in the middle is brighter than the tartan beside it."""
-    import mitsuba as mi
-
-    before = mi.variant()
-    mitsuba()
-    try:
-        scene = runpy.run_path(str(ROOT / "docs" / "pictures" / "cover.py"))["scene"](12, 5)
-        picture = np.asarray(mi.render(scene, spp=16), float)
-    finally:
-        if before is not None:
-            mi.set_variant(before)
+    scene = runpy.run_path(str(ROOT / "docs" / "pictures" / "cover.py"))["scene"](12, 5)
+    picture = np.asarray(mi.render(scene, spp=16), float)
     assert np.isfinite(picture).all() and picture[1:4, 5:7].mean() > 1.5 * picture[1:4, 2:4].mean()
 
 

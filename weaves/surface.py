@@ -23,7 +23,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from weaves.draft import Cells, cells
+from weaves.draft import cells
 from weaves.fabric import Fabric
 from weaves.yarn import Yarn
 
@@ -80,10 +80,12 @@ def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> ClothSurfa
     normal[..., 2] = 1.0
     for family, specification in ((WARP, fabric.warp), (WEFT, fabric.weft)):
         here = yarn == family
-        length, offset = _float_at(draft, pick[here], end[here], beneath[here])
+        cell, under = (pick[here], end[here]), beneath[here]
+        length = np.where(under, draft.under_length[cell], draft.top_length[cell])
+        offset = np.where(under, draft.under_offset[cell], draft.top_offset[cell])
         across, along = (from_end, from_pick) if family == WARP else (from_pick, from_end)
         sign = 1.0 if family == WARP else -1.0
-        height[here], n, t = _torus(specification, length, across[here], sign * (along[here] + offset), beneath[here])
+        height[here], n, t = _torus(specification, length, across[here], sign * (along[here] + offset), under)
         normal[here], tangent[here] = (n, t) if family == WARP else (_weft_to_fabric(n), _weft_to_fabric(t))
     return ClothSurface(yarn, beneath, height, normal, tangent)
 
@@ -107,15 +109,6 @@ def curvature(yarn: Yarn, length: npt.ArrayLike) -> Floats:
     length = np.asarray(length, np.float64)
     sine = np.sin(np.radians(yarn.bend))
     return np.where(yarn.width * sine >= length, 0.0, 2 * sine / length)
-
-
-def _float_at(
-    draft: Cells, pick: npt.NDArray[np.intp], end: npt.NDArray[np.intp], under: npt.NDArray[np.bool_]
-) -> tuple[Floats, Floats]:
-    """Return length of the visible float, and place of the cell's centre along it."""
-    length = np.where(under, draft.under_length[pick, end], draft.top_length[pick, end])
-    offset = np.where(under, draft.under_offset[pick, end], draft.top_offset[pick, end])
-    return length, offset
 
 
 def _torus(

@@ -37,7 +37,7 @@ from pipeline.scenes.gbuffer import reduced
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.places import tilted
-from pipeline.scenes.scene import Cloth, Yarns
+from pipeline.scenes.scene import Yarns
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -82,11 +82,6 @@ class ClothOptions(Frozen):
     pixel_angle: float | None = Field(default=None, gt=0, le=1)
     """Angle of a pixel as the camera sees it, in radians: the footprint of a ray that has no differentials. It is too
     small after a bounce."""
-
-    @property
-    def cloth(self) -> Cloth:
-        """The cloth, as scenes describe it."""
-        return Cloth(fabric=self.fabric, yarns=(self.yarns, self.yarns_v or self.yarns), turn=self.turn)
 
 
 class Footprints(NamedTuple):
@@ -203,7 +198,8 @@ class Worn:
 
     def _looks(self, hits: RayHits) -> Queries:
         """Return the footprint and viewer of each hit as queries, lit from the viewer."""
-        yarns = np.stack([np.ones_like(hits.handed), hits.handed], axis=-1) * self.options.cloth.yarns
+        own = (self.options.yarns, self.options.yarns_v or self.options.yarns)
+        yarns = np.stack([np.ones_like(hits.handed), hits.handed], axis=-1) * own
         place = (hits.uv * yarns) @ self._turn.T
         facing = np.einsum("ni,ni->n", hits.outward, hits.viewer)
         side = np.where(np.where(facing == 0.0, hits.viewer[:, 2], facing) < 0.0, -1.0, 1.0)

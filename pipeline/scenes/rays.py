@@ -27,19 +27,17 @@ class FirstHits(NamedTuple):
 def in_sight(
     mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats, among: npt.NDArray[np.bool_]
 ) -> npt.NDArray[np.int64]:
-    """Return which rays `among` N, (N,), hit nothing nearer than `distance`, as indices."""
-    rays = np.flatnonzero(among)
-    return rays[~_blocked(mi, world, origin[rays], direction[rays], distance[rays] * (1.0 - 1e-4))]
-
-
-def _blocked(mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats) -> npt.NDArray[np.bool_]:
-    """Return which of N rays hit anything nearer than `distance` (inf: anything)."""
+    """Return which rays `among` N, (N,), hit nothing nearer than `distance` (inf: nothing at all), as indices."""
+    index = np.flatnonzero(among)
+    origin, direction, distance = origin[index], direction[index], distance[index] * (1.0 - 1e-4)
     if mi.variant().startswith("scalar") or not len(origin):
         # Points and vectors made here: Mitsuba takes longer to convert lists than to trace the ray.
         rays = zip(origin.tolist(), direction.tolist(), distance.tolist(), strict=True)
         made = (mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d), t, 0.0, []) for o, d, t in rays)
-        return np.fromiter(map(world.ray_test, made), np.bool_, len(origin))
-    return np.asarray(world.ray_test(_rays(mi, origin, direction, distance)))
+        blocked = np.fromiter(map(world.ray_test, made), np.bool_, len(origin))
+    else:
+        blocked = np.asarray(world.ray_test(_rays(mi, origin, direction, distance)))
+    return index[~blocked]
 
 
 def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> FirstHits:

@@ -7,6 +7,7 @@ cone, and uv are the flat cloth's own lengths. The sphere alone is stretched.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -245,51 +246,30 @@ def _rgb(*values: float) -> dict[str, Any]:
     return {"type": "rgb", "value": list(values)}
 
 
+def _scene(source: Callable[[Any], dict[str, Any]], step: tuple[float, float, float], **cloths: Cloth) -> Scene:
+    """Return a scene that is called as the function that makes it."""
+    return Scene(name=source.__name__.removeprefix("_"), source=source, cloths=cloths, step=step)
+
+
 _SCENES: Final = (
-    Scene(
-        name="plane",
-        source=_plane,
-        cloths={"denim": Cloth(yarns=(_PLANE_SIDE / 0.12, _PLANE_SIDE / 0.12), turn=24.0)},
-        step=(0.003, 0.0, 0.002),
+    _scene(_plane, (0.003, 0.0, 0.002), denim=Cloth(yarns=(_PLANE_SIDE / 0.12, _PLANE_SIDE / 0.12), turn=24.0)),
+    _scene(_sphere, (0.003, 0.002, 0.0), silk_charmeuse=Cloth(yarns=(24.0, 24.0), turn=24.0)),
+    _scene(_drape, (0.003, 0.001, 0.0), wool_gabardine=Cloth(yarns=(DRAPE_YARNS, DRAPE_YARNS))),
+    _scene(
+        _roll,
+        (0.001, 0.0008, 0.0),
+        cotton_twill=Cloth(yarns=(_ROLL_AROUND, _ROLL_AROUND * _ROLL_LENGTH / (2.0 * math.pi * _ROLL_RADIUS))),
     ),
-    Scene(
-        name="sphere",
-        source=_sphere,
-        cloths={"silk_charmeuse": Cloth(yarns=(24.0, 24.0), turn=24.0)},
-        step=(0.003, 0.002, 0.0),
+    _scene(_curtain, (0.002, 0.0015, 0.0), voile=Cloth(yarns=(60.0, 60.0))),
+    _scene(
+        _dinner_table,
+        (0.0015, 0.001, 0.0),
+        table_cloth=Cloth(fabric="polyester_lining", yarns=(2.6 / _SPACING, 2.0 / _SPACING)),
+        mat=Cloth(fabric="basket", yarns=(0.72 / (2 * _SPACING), 0.52 / (2 * _SPACING))),
+        runner=Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
+        napkin=Cloth(fabric="denim", yarns=(36.0, math.dist(_NEAR, _FAR) / _SPACING)),
     ),
-    Scene(
-        name="drape",
-        source=_drape,
-        cloths={"wool_gabardine": Cloth(yarns=(DRAPE_YARNS, DRAPE_YARNS))},
-        step=(0.003, 0.001, 0.0),
-    ),
-    Scene(
-        name="roll",
-        source=_roll,
-        cloths={
-            "cotton_twill": Cloth(yarns=(_ROLL_AROUND, _ROLL_AROUND * _ROLL_LENGTH / (2.0 * math.pi * _ROLL_RADIUS)))
-        },
-        step=(0.001, 0.0008, 0.0),
-    ),
-    Scene(name="curtain", source=_curtain, cloths={"voile": Cloth(yarns=(60.0, 60.0))}, step=(0.002, 0.0015, 0.0)),
-    Scene(
-        name="dinner_table",
-        source=_dinner_table,
-        cloths={
-            "table_cloth": Cloth(fabric="polyester_lining", yarns=(2.6 / _SPACING, 2.0 / _SPACING)),
-            "mat": Cloth(fabric="basket", yarns=(0.72 / (2 * _SPACING), 0.52 / (2 * _SPACING))),
-            "runner": Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
-            "napkin": Cloth(fabric="denim", yarns=(36.0, math.dist(_NEAR, _FAR) / _SPACING)),
-        },
-        step=(0.0015, 0.001, 0.0),
-    ),
-    Scene(
-        name="swatch",
-        source=_swatch,
-        cloths={"swatch": Cloth(fabric="herringbone", yarns=(48.0, 48.0))},
-        step=(0.001, 0.0005, 0.0),
-    ),
+    _scene(_swatch, (0.001, 0.0005, 0.0), swatch=Cloth(fabric="herringbone", yarns=(48.0, 48.0))),
 )
 
 SHIPPED: Final[dict[str, Scene]] = {scene.name: scene for scene in _SCENES}

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.domain import Domain
+from pipeline.scenes.shade import colours as linear_colours
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.golden import ANSWER_COLUMNS, DENSITY_COLUMN, GOLDEN_COLUMNS, TRANSPARENCY_COLUMN, Golden
 from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
@@ -189,15 +190,8 @@ class Shader(NamedTuple):
 
 def colours(fabric: Fabric) -> Colours:
     """Return the colours of the yarns."""
-    mean = fabric.average()
-    return Colours(
-        specular_warp=mean.warp.specular_rgb,
-        specular_weft=mean.weft.specular_rgb,
-        diffuse_warp=mean.warp.diffuse_rgb,
-        diffuse_weft=mean.weft.diffuse_rgb,
-        transmitted_warp=mean.warp.diffuse_transmission_rgb,
-        transmitted_weft=mean.weft.diffuse_transmission_rgb,
-    )
+    rows = (*linear_colours(fabric), *linear_colours(fabric, transmitted=True)[2:])
+    return Colours(**{name: tuple(rgb.tolist()) for name, rgb in zip(Colours.model_fields, rows, strict=True)})
 
 
 def descriptor(fabric: Fabric, level: int, tables: ClothTables, kinds: Collection[str]) -> Descriptor:

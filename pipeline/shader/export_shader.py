@@ -13,7 +13,7 @@ from pipeline.models.registry import covering_model
 from pipeline.models.runtimes import no_onnx
 from pipeline.models.selvage.model import Selvage
 from pipeline.shader.descriptor import GOLDEN, Shader, vectors
-from pipeline.shader.languages import ALL, ONNX, SOURCE, compiler_for, made, refuse_unknown, translate
+from pipeline.shader.languages import ALL, LANGUAGES, ONNX, SOURCE, compiler_for, refuse_unknown, translate
 from pipeline.shader.networks import NEUMIP, SELVAGE, neumip_shader, selvage_shader
 from pipeline.shader.soft_nodes import SOFT_NODES, soft_nodes_shader
 from pipeline.shader.tables import wanted_kinds
@@ -58,7 +58,7 @@ def write_shader(
     """
     refuse_unknown(language)
     known = wanted_kinds(kind)
-    wanted = made(language)
+    wanted = [name for name in LANGUAGES if ALL in language or name in language]
     compiler = compiler_for(wanted) if wanted else None
     shader = shader_of(model, fabric, level, known)
     source, network = _source(shader), _network(shader, language)

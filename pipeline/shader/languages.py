@@ -82,11 +82,6 @@ def refuse_unknown(languages: Sequence[str]) -> None:
             raise BadInput("export", "language", one_line(name, 40), allowed)
 
 
-def made(languages: Sequence[str]) -> list[str]:
-    """Return the languages that slangc must make, of names that `refuse_unknown` lets pass."""
-    return [name for name in LANGUAGES if ALL in languages or name in languages]
-
-
 def slangc() -> Path | None:
     """Return the compiler: that of the package slangtorch, else the one on the search path; None if there is none."""
     spec = find_spec("slangtorch")

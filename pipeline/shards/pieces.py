@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -53,10 +53,18 @@ class DatasetRows(NamedTuple):
     def load(cls, folder: Path) -> DatasetRows:
         """Read the manifest of a data set; BadInput if it is missing or damaged."""
         if (folder / _OF_PUBLISHED).exists():
-            contents = Published.load(folder)
-            return cls(folder, dict(contents.fabrics), dict(contents.roles), list(_joined(contents, folder)))
+            published = Published.load(folder)
+            pieces = [
+                RowPiece(folder / entry.file, fabric, entry.split or "", rows, joined=True)
+                for entry in published.files
+                for fabric, rows in entry.rows.items()
+            ]
+            return cls(folder, dict(published.fabrics), dict(published.roles), pieces)
         manifest = Manifest.load(folder)
-        return cls(folder, dict(manifest.fabrics), dict(manifest.roles), list(_shards(manifest, folder)))
+        # Extra rows of single models have other columns or no splits.
+        shards = sorted((s for s in manifest.shards if s.kind == "components"), key=lambda shard: shard.start)
+        pieces = [RowPiece(folder / s.file, s.fabric, s.split, s.rows, joined=False) for s in shards]
+        return cls(folder, dict(manifest.fabrics), dict(manifest.roles), pieces)
 
     def of(self, split: str, fabrics: Sequence[str] | None = None) -> list[RowPiece]:
         """Return the pieces of a split, train, validation or test, of some fabrics or all that have it, one by one.
@@ -78,16 +86,3 @@ class DatasetRows(NamedTuple):
         if not chosen:
             raise BadInput(str(self.folder), "split", split, "no fabric has such rows")
         return [piece for name in chosen for piece in by_fabric[name]]
-
-
-def _shards(manifest: Manifest, folder: Path) -> Iterator[RowPiece]:
-    """Yield the shards that every model may read; extra rows of single models have other columns or no splits."""
-    for shard in sorted(manifest.shards, key=lambda shard: shard.start):
-        if shard.kind == "components":
-            yield RowPiece(folder / shard.file, shard.fabric, shard.split, shard.rows, joined=False)
-
-
-def _joined(contents: Published, folder: Path) -> Iterator[RowPiece]:
-    for entry in contents.files:
-        for fabric, rows in entry.rows.items():
-            yield RowPiece(folder / entry.file, fabric, entry.split or "", rows, joined=True)

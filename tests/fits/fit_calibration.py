@@ -17,14 +17,15 @@ reports.truth.calibration then held on other fabrics.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import math
 
+import cyclopts
 import numpy as np
 
 from pipeline.truth.calibration import COARSE_TABLE, FINE_TABLE, QUADRATURE, QUADRATURE_CURVED, REFINED, SAMPLED
 from pipeline.truth.estimator import ESTIMATORS
+from pipeline.truth.options import EstimatorName
 from reports.truth.calibration import samples
 
 SEED = 2_000
@@ -62,14 +63,9 @@ def fitted(
     return sorted(found, key=lambda one: one[0])
 
 
-def main() -> None:
-    """Print the best factors of each stage."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--fabrics", type=int, default=16)
-    parser.add_argument("--rows", type=int, default=60)
-    parser.add_argument("--estimator", choices=ESTIMATORS, action="append", help="all, if left out")
-    arguments = parser.parse_args()
-    found = list(samples(arguments.fabrics, arguments.rows, tuple(arguments.estimator or ESTIMATORS), 1 << 15, SEED))
+def main(fabrics: int = 16, rows: int = 60, estimator: list[EstimatorName] | None = None) -> None:
+    """Print the best factors of each stage, for all estimators if none is named."""
+    found = list(samples(fabrics, rows, tuple(estimator or ESTIMATORS), 1 << 15, SEED))
     sides = {"components": (slice(4), False), "components, behind": (slice(4), True)}
     for title, (columns, back) in {**sides, "transparency": (slice(4, 5), False)}.items():
         for stage, number in STAGES.items():
@@ -88,4 +84,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    cyclopts.run(main)

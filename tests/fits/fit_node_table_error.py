@@ -13,10 +13,10 @@ the values in use (.0005 and .002) are not too small; the size by default tells 
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable
 
+import cyclopts
 import numpy as np
 
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -83,23 +83,19 @@ def smallest(covered: Callable[[float], float], values: np.ndarray) -> float:
     return next((float(value) for value in values if covered(value) >= COVERED), math.nan)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--fabrics", type=int, default=10)
-    parser.add_argument("--queries", type=int, default=500)
-    parser.add_argument("--points", type=int, default=32768)
-    size = parser.parse_args()
-    population = Population(count=size.fabrics, seed=77, plain=WILD, twill=WILD, satin=WILD)
-    many = {"min_count": size.points, "max_count": size.points}
+def main(fabrics: int = 10, queries: int = 500, points: int = 32768) -> None:
+    """Print both constants as fitted and in use."""
+    population = Population(count=fabrics, seed=77, plain=WILD, twill=WILD, satin=WILD)
+    many = {"min_count": points, "max_count": points}
     converged = TruthOptions(estimator="owen", relative_error=1e-9, absolute_error=0.0, **many)
     columns = []
     for fabric in population_fabrics(population):
-        queries = draw_queries(QueryOptions(sigma=(0.1, 50.0)), fabric.weave.repeat, 78, 0, size.queries)
-        answers = estimate(fabric, queries, TruthOptions(estimator="node_table"), 1)
-        exact = estimate(fabric, queries, converged, 2)
+        drawn = draw_queries(QueryOptions(sigma=(0.1, 50.0)), fabric.weave.repeat, 78, 0, queries)
+        answers = estimate(fabric, drawn, TruthOptions(estimator="node_table"), 1)
+        exact = estimate(fabric, drawn, converged, 2)
         mean, error = answers.mean.astype(np.float64), answers.standard_error.astype(np.float64)
         wrong, reference = (np.linalg.norm(v, axis=1) for v in (mean - exact.mean, exact.standard_error))
-        columns.append((wrong, reference, mean, error - UNSEEN * mean, curvature_terms(fabric, queries)))
+        columns.append((wrong, reference, mean, error - UNSEEN * mean, curvature_terms(fabric, drawn)))
     wrong, reference, mean, base, terms = (np.concatenate(parts) for parts in zip(*columns, strict=True))
 
     def covered(smooth: float, unseen: float) -> float:
@@ -116,4 +112,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    cyclopts.run(main)

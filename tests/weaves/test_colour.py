@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from weaves.colour import Spectrum, delta_e, encoded, linear_rgb
-from weaves.yarn import Yarn
 
 
 def test_hex_is_decoded_by_the_srgb_curve():
@@ -31,12 +30,6 @@ def test_saturated_spectra_are_clipped_to_the_gamut():
     rgb = linear_rgb(Spectrum(wavelengths=(500, 505, 515, 520), values=(0, 1, 1, 0)))
     assert all(0 <= channel <= 1 for channel in rgb)
     assert min(rgb) == 0
-
-
-def test_yarn_gives_both_colours_in_linear_rgb():
-    yarn = Yarn(bend=10, roughness=0.2, specular=(0.5, 0.4, 0.3), diffuse="#ff0000")
-    assert yarn.specular_rgb == (0.5, 0.4, 0.3)
-    assert yarn.diffuse_rgb == pytest.approx((1, 0, 0))
 
 
 def test_encoding_inverts_the_srgb_curve():

@@ -144,16 +144,6 @@ def test_volume_of_straight_yarns_is_that_of_inscribed_prisms(steps, width):
         assert volume == pytest.approx(polygon * length, rel=2e-5)
 
 
-def test_wall_area_of_a_plain_weave_of_straight_yarns():
-    """The end of every yarn, half an ellipse cut to a polygon, stands as a wall over the side of the next."""
-    fabric = _cloth("polyester_lining", (1, 1), {"bend": 0.0, "relief": 1.0}, {"bend": 0.0, "relief": 0.5})
-    steps = 32
-    polygon = steps / 2 * math.sin(math.pi / steps) * 0.25
-    # The vertices along the side of a yarn lie on its own height, 0 but for the place where it is looked at.
-    area = np.linalg.norm(_areas(repeat_mesh(fabric, steps).walls)[0], axis=1).sum()
-    assert area == pytest.approx(4 * (1.0 + 0.5) * polygon, rel=2e-5)
-
-
 def test_mean_height_converges_to_the_surface_with_the_square_of_the_step():
     fabric = _cloth("denim", (0.8, 0.9))
     ends, picks = fabric.weave.repeat

@@ -231,11 +231,8 @@ def _pattern(wif: _Wif, yarns: dict[str, Any], where: str) -> PatternData:
         name: {thread: set(numbers) for thread, numbers in getattr(wif, name).items()}
         for name in ("threading", "tieup", "treadling", "liftplan")
     }
-    lengths: dict[str, Any] = {
-        f"{axis}_{kind}": getattr(wif, f"{axis}_{kind}")
-        for axis in yarns
-        for kind in ("colors", "spacing", "thickness")
-    }
+    names = [f"{axis}_{kind}" for axis in yarns for kind in ("colors", "spacing", "thickness")]
+    lengths: dict[str, Any] = {name: getattr(wif, name) for name in names}
     return PatternData(
         name=wif.text.title or where,
         color_table=wif.color_table,

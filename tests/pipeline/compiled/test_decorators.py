@@ -5,6 +5,7 @@ read the cache, and every process uses the kernels in an order of its own.
 """
 
 import ast
+import itertools
 import os
 import shutil
 import subprocess
@@ -65,9 +66,7 @@ def twice(x):
     return first + out.sum()
 """
 
-ASK = """
-import sys
-import numpy as np
+SMALL = """
 from pipeline.truth import small
 
 x = (np.random.default_rng(5).random(61) - 0.3).astype(np.float32)
@@ -75,17 +74,11 @@ def smooth():
     out = np.zeros(5, np.float32)
     small.smooth(x, out)
     return out
-asked = {name: (lambda name=name: getattr(small, name)(x)) for name in ("fast", "plain", "twice")}
-asked |= {"smooth": smooth, "shared": lambda: small.shared(x)}
-answers = {name: asked[name]() for name in sys.argv[1:]}
-for name in sorted(answers):
-    print(name, np.asarray(answers[name], np.float32).tobytes().hex())
+asked = {name: (lambda name=name: getattr(small, name)(x)) for name in ("fast", "plain", "twice", "shared")}
+asked["smooth"] = smooth
 """
 
 REAL = """
-import hashlib
-import sys
-import numpy as np
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
@@ -100,6 +93,9 @@ asked = {
     "soft_nodes": lambda: SoftNodes().predict(fabric, queries),
     "points": lambda: sample_horizons(tabulate(fabric, 16, 32), queries, 16, True, 1),
 }
+"""
+
+ANSWERS = """
 answers = {name: asked[name]() for name in sys.argv[1:]}
 for name in sorted(answers):
     print(name, hashlib.sha256(np.ascontiguousarray(answers[name]).tobytes()).hexdigest())
@@ -141,18 +137,6 @@ def copies(tmp_path: Path) -> list[Path]:
         (truth / "__init__.py").touch()
         (truth / "small.py").write_text(KERNELS)
     return folders
-
-
-@pytest.mark.slow
-def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies):
-    order = ("fast", "plain", "twice", "smooth", "shared")
-    cold = answers(start(copies[0], ASK, *order))
-    warm = answers(start(copies[0], ASK, *order))
-    warm_other = answers(start(copies[0], ASK, *order[::-1]))
-    cold_other = answers(start(copies[1], ASK, *order[::-1]))
-    assert cold == warm == warm_other == cold_other and len(cold.split()) == 10
-    together = [start(copies[2], ASK, *order), start(copies[2], ASK, *order[::-1])]
-    assert [answers(process) for process in together] == [cold, cold]
 
 
 CACHED = """
@@ -274,11 +258,21 @@ def test_kernels_that_borrow_arrays_call_none_that_returns_them():
 
 
 @pytest.mark.slow
-def test_real_kernels_answer_the_same_cold_and_warm_in_any_order(tmp_path):
-    for name in "ab":
-        for package in ("weaves", "pipeline"):
-            shutil.copytree(ROOT / package, tmp_path / name / package, ignore=shutil.ignore_patterns("__pycache__"))
-    order = ("node_table", "soft_nodes", "points")
-    cold = answers(start(tmp_path / "a", REAL, *order))
-    assert answers(start(tmp_path / "a", REAL, *order[::-1])) == cold
-    assert answers(start(tmp_path / "b", REAL, *order[::-1])) == cold
+@pytest.mark.parametrize(
+    ("asked", "order"),
+    [(SMALL, ("fast", "plain", "twice", "smooth", "shared")), (REAL, ("node_table", "soft_nodes", "points"))],
+    ids=["small", "real"],
+)
+def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies, asked, order):
+    if asked is REAL:
+        for copy, package in itertools.product(copies, ("weaves", "pipeline")):
+            ignored = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(ROOT / package, copy / package, ignore=ignored, dirs_exist_ok=True)
+    script = f"import hashlib, sys\nimport numpy as np\n{asked}{ANSWERS}"
+    cold = answers(start(copies[0], script, *order))
+    assert len(cold.split()) == 2 * len(order)
+    assert answers(start(copies[0], script, *order[::-1])) == cold
+    assert answers(start(copies[1], script, *order[::-1])) == cold
+    if asked is SMALL:
+        together = [start(copies[2], script, *order), start(copies[2], script, *order[::-1])]
+        assert [answers(process) for process in together] == [cold, cold]

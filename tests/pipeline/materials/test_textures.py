@@ -12,8 +12,8 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
-from tests.presets import PRESETS
-from weaves.fabric import load_fabric
+from tests.presets import slow
+from weaves.fabric import load_fabric, preset_names
 from weaves.surface import GAP, surface_at
 
 
@@ -39,22 +39,12 @@ def diffuse_albedo(fabric, side):
     return np.pi * (mean[:, 2:, None] * colours[:, 2:] / z[:, None, None]).sum(axis=1).mean(axis=0)
 
 
-def check_base_color(name, side):
+@pytest.mark.parametrize(("name", "side"), [("denim", 16), ("gauze", 16), *(slow(name, 24) for name in preset_names())])
+def test_the_mean_base_colour_is_the_diffuse_albedo_of_the_truth(name, side):
     fabric = load_fabric(name)
     maps = maps_of(fabric, 1024 if name == "tartan" else 256)
     found = (maps.base_color * maps.opacity[..., None]).mean(axis=(0, 1))
     np.testing.assert_allclose(found, diffuse_albedo(fabric, side), rtol=0.03)
-
-
-@pytest.mark.parametrize("name", ["denim", "gauze"])
-def test_the_mean_base_colour_is_the_diffuse_albedo_of_the_truth(name):
-    check_base_color(name, 16)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", PRESETS)
-def test_the_mean_base_colour_of_every_preset(name):
-    check_base_color(name, 24)
 
 
 def test_on_one_fibre_the_roughness_is_that_of_the_fibre():

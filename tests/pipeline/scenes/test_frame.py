@@ -1,4 +1,4 @@
-"""G-buffers of Mitsuba scenes against closed forms: plane, cylinder, spheres, shadows and lights."""
+"""Frames of Mitsuba scenes against closed forms: plane, cylinder, spheres, shadows, lights and backdrops."""
 
 import math
 
@@ -19,17 +19,22 @@ WEARS = {"type": "diffuse", "id": "fabric_denim"}
 SUN = {"type": "directional", "direction": [0.3, 0.2, -1.0]}
 
 
-def shot(parts, eye=(0.0, -3.0, 2.0), target=(0.0, 0.0, 0.0), camera=None, cloth=None, frame=0.0, options=SCALAR):
-    """Return the G-buffer of the cloth `denim` in a scene of some parts, given as a function of mitsuba."""
+def framed(parts, eye=(0.0, -3.0, 2.0), camera=None, cloth=None, frame=0.0):
+    """Return a frame of the cloth `denim` in a scene of some parts, given as a function of mitsuba."""
 
     def build(mi):
-        look = mi.ScalarTransform4f().look_at(list(eye), list(target), [0, 0, 1])
+        look = mi.ScalarTransform4f().look_at(list(eye), [0, 0, 0], [0, 0, 1])
         sensor = {"type": "perspective", "fov": 40, "fov_axis": "x", "to_world": look}
         film = {"type": "hdrfilm", "width": SIZE[0], "height": SIZE[1]}
         return {"type": "scene", "camera": {**(camera(mi) if camera else sensor), "film": film}, **parts(mi)}
 
     scene = Scene(name="test", source=build, cloths={"denim": cloth or Cloth()}, step=(0.1, 0.0, 0.0))
-    return render(load(scene, options), frame).gbuffers["denim"]
+    return render(load(scene, SCALAR), frame)
+
+
+def shot(parts, **choices):
+    """Return the G-buffer of a frame."""
+    return framed(parts, **choices).gbuffers["denim"]
 
 
 def floor(mi):
@@ -176,6 +181,33 @@ def test_a_blocker_throws_its_shadow():
     assert 50 < (~lit).sum() < len(lit) / 2
 
 
+def test_a_backdrop_is_matte_and_the_shadow_of_the_cloth_is_not_seen_behind_it():
+    """albedo / pi times 2 cos 45; the cloth lies 1/2 above the floor, its shadow 1/2 to the left."""
+
+    def camera(mi):
+        look = mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0])
+        return {"type": "orthographic", "to_world": look @ mi.ScalarTransform4f().scale([2, 2, 1])}
+
+    def parts(mi):
+        move = mi.ScalarTransform4f
+        matte = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.2, 0.4, 0.6]}}
+        return {
+            "floor": {"type": "rectangle", "to_world": move().scale(1.25), "matte": matte},
+            "cloth": {"type": "rectangle", "to_world": move().translate([0, 0, 0.5]).scale(0.5), "b": WEARS},
+            "sun": {"type": "directional", "direction": [-1, 0, -1], "irradiance": 2.0},
+            "sky": {"type": "constant", "radiance": 0.0},
+        }
+
+    frame = framed(parts, camera=camera)
+    x, y = np.meshgrid((np.arange(SIZE[0]) + 0.5) / 16 - 2, 1.5 - (np.arange(SIZE[1]) + 0.5) / 16)
+    cloth, floor = (np.maximum(np.abs(x), np.abs(y)) < side for side in (0.5, 1.25))
+    assert (frame.gbuffers["denim"].mask == cloth).all()
+    shadow = (np.abs(x + 0.5) < 0.5) & (np.abs(y) < 0.5) & ~cloth
+    assert shadow.sum() == 128
+    lit = np.array([0.2, 0.4, 0.6]) * 2 * math.cos(math.pi / 4) / math.pi
+    np.testing.assert_allclose(frame.backdrop, np.where((floor & ~shadow)[..., None], lit, 0.0), rtol=1e-5, atol=1e-12)
+
+
 def test_point_lights_fall_off_with_the_square():
     def parts(mi):
         lamp = {"type": "point", "position": [0.5, 0, 2], "intensity": {"type": "rgb", "value": [1, 2, 3]}}
@@ -210,29 +242,22 @@ def test_frames_move_the_camera_to_the_right():
     assert u[1] - u[0] == pytest.approx(0.4 * 100 / 8, abs=1e-3)
 
 
-@pytest.fixture
-def in_variants():
-    """Return a shipped scene's G-buffers in Mitsuba's scalar and in its LLVM variant."""
-    if not llvm_works():
-        pytest.skip("no LLVM that Mitsuba can use")
-    options = SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"})
-    return lambda name: [render(load(SHIPPED[name], o), size=SIZE).gbuffers for o in options]
-
-
 @pytest.mark.external
-def test_variants_agree(in_variants):
+@pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
+def test_variants_agree():
+    """A table with four cloths, other shapes and a point light, which is made in another order than it is shown."""
+
+    def in_variants(name):
+        options = SCALAR, SCALAR.model_copy(update={"variant": "llvm_ad_rgb"})
+        return [render(load(SHIPPED[name], o), size=SIZE).gbuffers for o in options]
+
+    scalar, vector = in_variants("dinner_table")
+    for key, ours in scalar.items():
+        assert (ours.mask == vector[key].mask).mean() > 0.999 and ours.mask.any(), key
+        np.testing.assert_allclose(ours.irradiance.sum(axis=0), vector[key].irradiance.sum(axis=0), rtol=2e-3)
     ours, other = (gbuffers["silk_charmeuse"] for gbuffers in in_variants("sphere"))
     assert (ours.pixel == other.pixel).all()
     for name in ("u", "v", "sigma", "sigma_minor", "wo", "curvature"):
         # Places on the edge of two triangles may fall to either.
         assert np.isclose(getattr(ours, name), getattr(other, name), rtol=1e-3, atol=1e-4).mean() > 0.99, name
     assert abs(len(ours.place) - len(other.place)) < 0.002 * len(ours.place)
-
-
-@pytest.mark.external
-def test_variants_agree_on_who_wears_what_and_on_the_lamp(in_variants):
-    """A table with four cloths, other shapes and a point light, which is made in another order than it is shown."""
-    scalar, vector = in_variants("dinner_table")
-    for key, ours in scalar.items():
-        assert (ours.mask == vector[key].mask).mean() > 0.999 and ours.mask.any(), key
-        np.testing.assert_allclose(ours.irradiance.sum(axis=0), vector[key].irradiance.sum(axis=0), rtol=2e-3)

@@ -7,7 +7,7 @@ from pipeline.shader.golden import GROUPS, read_sides, rows_of
 from pipeline.shader.tables import EVERY, tabulate_sides, wanted_kinds
 from pipeline.truth.query import Queries
 from tests.pipeline.shader.conftest import ALLOWED, FORMS, check_answers, read, worst
-from tests.presets import PRESETS, slow
+from tests.presets import KINDS, slow
 from weaves.fabric import load_fabric, preset_names
 
 pytestmark = pytest.mark.external  # slangc and g++
@@ -26,33 +26,21 @@ def hemisphere(count):
     return directions, np.repeat(0.5 * weights * 2.0 * np.pi / count, count)
 
 
-def check_golden(cpp, cloth, allowed):
-    """Check components, bounds, transparency and density of the C++ form against the golden vectors."""
+CASES = [(name, 2, ()) if name in KINDS else slow(name, 2, ()) for name in preset_names()]
+CASES += [(name, 2, (EVERY,)) if name in FEW else slow(name, 2, (EVERY,)) for name in preset_names()]
+CASES += [("gingham", level, ()) for level in (1, 4, 8)]
+
+
+@pytest.mark.parametrize(("form", "allowed"), FORMS)
+@pytest.mark.parametrize(("name", "level", "kinds"), CASES)
+def test_golden_vectors_are_answered(cpp, exported, name, level, kinds, form, allowed):
+    """Components, bounds, transparency and density of the C++ form."""
+    cloth = read(exported(name, level, kinds=kinds), form)
+    assert list(cloth.groups) == (list(GROUPS) if kinds else ["front"])
     check_answers(cpp(cloth.buffers, cloth.queries), cloth, allowed)
     scattered = cpp(cloth.buffers, cloth.queries, "scatter")
     assert worst(scattered[:, [12, 11]], cloth, 8) < allowed
     assert (scattered[:, 12] >= 0.0).all() and (scattered[:, 12] <= 1.0).all()
-
-
-@pytest.mark.parametrize(("form", "allowed"), FORMS)
-@pytest.mark.parametrize("name", PRESETS)
-def test_golden_vectors_are_answered(cpp, exported, name, form, allowed):
-    cloth = read(exported(name), form)
-    assert list(cloth.groups) == ["front"]
-    check_golden(cpp, cloth, allowed)
-
-
-@pytest.mark.parametrize(("form", "allowed"), FORMS)
-@pytest.mark.parametrize("name", [name if name in FEW else slow(name) for name in preset_names()])
-def test_golden_vectors_of_every_kind_are_answered(cpp, exported, name, form, allowed):
-    cloth = read(exported(name, kinds=(EVERY,)), form)
-    assert list(cloth.groups) == list(GROUPS)
-    check_golden(cpp, cloth, allowed)
-
-
-@pytest.mark.parametrize("level", [1, 4, 8])
-def test_other_levels_are_answered(cpp, exported, level):
-    check_golden(cpp, read(exported("gingham", level)), ALLOWED["C++"])
 
 
 def drawn(rng, count, group, extreme):

@@ -1,4 +1,4 @@
-"""Models with a network as C++, GLSL ES and ONNX against the Python that they mirror, from exported files alone."""
+"""Models with a network as C++ and ONNX against the Python that they mirror, from exported files alone."""
 
 import numpy as np
 import onnxruntime
@@ -14,9 +14,6 @@ from tests.pipeline.shader.conftest import ALLOWED, CLOTH, FORMS, bytes_of, chec
 from tests.pipeline.shader.test_evaluate import UNSEEN
 from tests.presets import PRESETS, slow
 from weaves.fabric import load_fabric, preset_names
-
-SOME = ("crepe", "gauze", "gingham", "silk_charmeuse")
-"""Fabrics of the fast tests: the largest repeat, open cloth, the smallest repeat, long floats."""
 
 TWO = ("crepe", "polyester_lining")
 """The largest repeat, and the smallest: in all fabrics the network is the same."""
@@ -76,17 +73,6 @@ def test_neumip_answers_beyond_its_repeat_and_its_levels(programs, neumip, expor
     queries = queries._replace(u=queries.u - np.float32(64.0), v=queries.v + np.float32(32.0))
     answers = programs(neumip)(cloth.buffers, rows_of(queries))
     assert differences(answers, method.predict(fabric, queries)).max() < ALLOWED["C++"]
-
-
-@pytest.mark.parametrize("fabrics", [SOME, slow(preset_names())], ids=["some", "all"])
-@pytest.mark.parametrize(
-    ("half", "allowed"), [(False, ALLOWED["browser"]), slow(True, ALLOWED["16 bits"])], ids=["float32", "float16"]
-)
-def test_networks_answer_in_a_browser(webgl, exported, neumip, half, allowed, fabrics):
-    for model, names in (("selvage", fabrics), (neumip, [CLOTH])):
-        cloths = [read(exported(name, model=model)) for name in names]
-        for cloth, answers in zip(cloths, webgl(cloths, half, model=model), strict=True):
-            check_answers(answers, cloth, allowed)
 
 
 def forward(cloth, network, inputs):
