@@ -153,7 +153,7 @@ def _costs(
     trainings = [task for task in tasks if isinstance(task, Training)]
     cards = [read_card(ledger.out / task.folder) for task in trainings]
     needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.fabrics)]
-    weights = sum(ledger.products(task)[Path(task.products[0]).name].bytes for task in needed)
+    weights = sum(ledger.store.size(task.products[0]) or 0 for task in needed)
     return {
         ("queries generated", "1"): Value(sum(task.rows for task in shards)),
         ("generation", "s"): Value(sum(ledger.seconds(task) for task in shards)),
@@ -194,13 +194,13 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
     name, setting, ledger = model.options.name, _setting(model), Ledger(out)
     pictures, frames = [], None
     for task in (task for recipe in recipes for task in plan(recipe)):
-        if isinstance(task, SceneShot) and task.scene == scene and ledger.is_sound(task):
+        if isinstance(task, SceneShot) and task.scene == scene and ledger.done(task, verify=True):
             frames = out / task.made.path
         if (
             isinstance(task, OnScene)
             and (task.scene, task.model.options.name) == (scene, name)
             and setting in task.shown
-            and ledger.is_sound(task)
+            and ledger.done(task, verify=True)
         ):
             pictures.append(out / task.picture(setting))
     if len(pictures) != 2 or frames is None:
@@ -223,7 +223,7 @@ def _elsewhere(
     from reports.measure.scene.shot import read_shot
 
     for task in plan(general):
-        if not isinstance(task, SceneShot) or not Ledger(out).is_sound(task):
+        if not isinstance(task, SceneShot) or not Ledger(out).done(task, verify=True):
             continue
         shot = read_shot(out / task.made.path)
         if shot.name != scene:

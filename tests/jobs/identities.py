@@ -3,7 +3,7 @@
 import re
 
 LEARNT = "^train|latents|extremes of (woven|neumip)|errors|noise|timing|^report"
-"""What changes of the recipe `tiny` with its training rows; test rows count as one data set with them."""
+"""Tasks of the recipe `tiny` that depend on its training rows; measurements on test rows name the whole data set."""
 
 
 def ids(tasks, pattern=""):

@@ -37,22 +37,10 @@ frames = 5
 """
 OTHER = '\n[[models]]\nmodel = "curved"\nrecipe = "bent.toml"\n'
 
-GENERAL = """
-name = "sheer"
-
-[dataset]
-seen = ["denim", "own.toml", "organza"]
-shard_rows = 1000
-seed = 9
-rows = { train = 1500, validation = 200, test = 300 }
-queries = { sigma = [0.05, 8.0], behind = 0.25 }
-truth = { relative_error = 0.1 }
-
-[[models]]
-model = "woven"
-name = "woven_sheer"
-transmission = true
-"""
+# The same rows of flat cloth, for a general model.
+GENERAL = TRAINER[: TRAINER.index("\n[[models]]")].replace("curvature = [0.01, 0.4]", "sigma = [0.05, 8.0]")
+GENERAL = GENERAL.replace('"bent"', '"sheer"').replace('"voile"', '"organza"')
+GENERAL += '\n[[models]]\nmodel = "woven"\nname = "woven_sheer"\ntransmission = true\n'
 
 FINE = '\n[[models]]\nmodel = "neumip"\nname = "fine"\nrecipe = "twin.toml"\n'
 SHEER = '\n[[models]]\nname = "woven_sheer"\nrecipe = "sheer.toml"\n'
@@ -137,26 +125,8 @@ def test_it_is_measured_where_it_was_taught_and_the_page_says_where_not(asks, fi
     assert set(trained.values()) < set(titles["timing of all methods"].needs)
 
 
-def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files):
-    """The other recipe has the same rows of denim: one task, two files."""
-    same = files.recipe.replace('name = "tiny"', 'name = "twin"').replace('"own.toml"]', '"voile"]')
-    same = same.replace('model = "neumip"', 'model = "neumip"\nname = "fine"')
-    recipe = asks(same, FINE, "twin")
-    tasks = plan(recipe)
-    assert len({task.id for task in tasks}) == len(tasks)
-    products = [path for task in tasks for path in task.products]
-    assert len(set(products)) == len(products)
-    shared = [task for task in tasks if task.stage == "generate" and len(task.products) == 2]
-    assert {task.shard.fabric.name for task in shared} == {"denim", "twill_4_4"}
-    for task in shared:
-        first, second = task.products
-        assert first.startswith("datasets/tiny-") and second.startswith("datasets/twin-")
-        assert first.split("/")[-1] == second.split("/")[-1]
-
-
-@pytest.mark.external
-def test_a_shared_shard_is_written_to_both_folders(asks, files, tmp_path):
-    """`generate` makes the rows of both recipes; either folder is whole, with a manifest of its own."""
+def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files, tmp_path, here):
+    """The other recipe has the same rows of denim and of the twill: one task, two files, and a manifest in each."""
     for old, new in (
         ("train = 2500", "train = 150"),
         ("validation = 100", "validation = 70"),
@@ -165,15 +135,18 @@ def test_a_shared_shard_is_written_to_both_folders(asks, files, tmp_path):
         ("relative_error = 0.05", 'estimator = "owen"\nrelative_error = 0.5\nmax_count = 256'),
     ):
         files.recipe = files.recipe.replace(old, new)
-    twin = files.recipe.replace('name = "tiny"', 'name = "twin"').replace('"neumip"', '"neumip"\nname = "fine"')
-    asks(twin, FINE, "twin")
+    twin = files.recipe.replace('name = "tiny"', 'name = "twin"').replace('"own.toml"]', '"voile"]')
+    tasks = plan(asks(twin.replace('model = "neumip"', 'model = "neumip"\nname = "fine"'), FINE, "twin"))
+    products = [path for task in tasks for path in task.products]
+    assert len({task.id for task in tasks}) == len(tasks) and len(set(products)) == len(products)
+    rows = [task for task in tasks if task.stage == "generate"]
+    shared = [task.products for task in rows if len(task.products) == 2]
+    assert {task.shard.fabric.name for task in rows if task.products in shared} == {"denim", "twill_4_4"}
+    assert all(a.startswith("datasets/tiny-") and b.startswith("datasets/twin-") for a, b in shared)
     out = tmp_path / "out"
-    assert main(["generate", str(files.path), "--out", str(out), "--workers", "1"]) == 0
-    ledger = Ledger(out)
-    tasks = [task for task in plan(load_recipe(files.path)) if task.stage == "generate"]
-    assert all(ledger.state(task) == "done" for task in tasks)
-    for task in tasks:
-        assert len({(out / path).read_bytes() for path in task.products}) == 1
+    assert main(["generate", str(files.path), "--out", str(out)]) == 0
+    assert all(Ledger(out).state(task) == "done" for task in rows)
+    assert all((out / a).read_bytes() == (out / b).read_bytes() for a, b in shared)
     for name, splits in (("tiny", {"train", "validation", "test"}), ("twin", {"train", "validation"})):
         (folder,) = (out / "datasets").glob(f"{name}-*")
         manifest = Manifest.load(folder)
