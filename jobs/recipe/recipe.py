@@ -220,12 +220,13 @@ class Recipe:
         rows = self.dataset.rows
         named: dict[Split, int] = {"train": rows.train, "validation": rows.validation, "test": rows.test}
         population: dict[Split, int] = {"train": rows.population}
+        test: dict[Split, int] = {"test": rows.test}
         learners = [model for model in self.own_models if model.learns]  # those of other recipes read rows of their own
         if self.models and not learners:
-            named, population = {"test": rows.test}, {}
+            named, population = test, {}
         # Only a model of one material learns from an unseen fabric; without one, there is nobody to read those rows.
-        unseen: dict[Split, int] = named if any(model.of_one_material for model in learners) else {"test": rows.test}
-        splits = {"seen": named, "population": population, "unseen": unseen, "unseen_population": {"test": rows.test}}
+        unseen = named if any(model.of_one_material for model in learners) else test
+        splits = {"seen": named, "population": population, "unseen": unseen, "unseen_population": test}
         for role, fabrics in self.by_role.items():
             for fabric in fabrics:
                 for split, total in splits[role].items():
