@@ -130,7 +130,7 @@ def _rows(recipe: Recipe) -> Iterator[tuple[str, AnyShardTask]]:
         for start in range(0, total, dataset.shard_rows):
             part: dict[str, Any] = {"fabric": fabric, "start": start, "rows": min(dataset.shard_rows, total - start)}
             if isinstance(kind, str):
-                truth = dataset.truth_of(kind)
+                truth = (dataset.training_truth if kind == "train" else None) or dataset.truth
                 yield role, ShardTask(**part, split=kind, seed=dataset.seed, queries=dataset.queries, truth=truth)
             else:
                 yield role, ExtraShardTask(**part, extra=kind)

@@ -82,6 +82,8 @@ class Task(TaskPart):
     """The stage that does it."""
     shares_process: ClassVar[bool] = False
     """True if it may run beside others in one process: it uses no random numbers and threads of a library."""
+    timed: ClassVar[bool] = False
+    """True if it measures time."""
 
     @property
     def group(self) -> str:
@@ -105,7 +107,7 @@ class Task(TaskPart):
     @property
     def slots(self) -> Literal["one", "all"]:
         """Slots of a run that it takes: all if it measures time, so nothing runs beside it and its process is new."""
-        return "one"
+        return "all" if self.timed else "one"
 
     @property
     def cost(self) -> float:

@@ -36,6 +36,7 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
     """
     import numpy as np
 
+    from pipeline.models.domain import Domain
     from pipeline.models.fallback import Fallback
 
     queries_by_fabric = list(queries_by_fabric)
@@ -45,20 +46,14 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
         optics = [fabric.optics() for fabric in recipe.seen + recipe.unseen]
         known = [fabric for fabric in fabrics if fabric.optics() in optics]
     options = model.options
-    method: Any = _DomainOnly(None if options.answers_outside else _domain(model, recipe), options.turns)
+    domain = None
+    if model.learns and not options.answers_outside:
+        learnt_from = recipe.seen + (recipe.unseen if model.of_one_material else recipe.population)
+        domain = Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from)
+    method: Any = _DomainOnly(domain, options.turns)
     fallback = Fallback(method, options.kinds | options.without_training, recipe.bench.scenes.footprint)
     fallback_rows = [
         fallback.out_of_domain(fabric, queries) if fabric in known else np.ones(len(queries.u), np.bool_)
         for fabric, queries in queries_by_fabric
     ]
     return float(np.concatenate(fallback_rows).mean())
-
-
-def _domain(model: ModelRecipe, recipe: Recipe) -> Domain | None:
-    """Return the domain that a training of the model will have; None if it is not trained."""
-    from pipeline.models.domain import Domain
-
-    if not model.learns:
-        return None
-    learnt_from = recipe.seen + (recipe.unseen if model.of_one_material else recipe.population)
-    return Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from)

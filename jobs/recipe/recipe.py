@@ -80,10 +80,6 @@ class DatasetOptions(Frozen):
     """How training rows are answered; left out: as all others. A training averages over the noise of its rows, so many
     coarse rows give a better model than the few exact ones that take the same time."""
 
-    def truth_of(self, split: str) -> TruthOptions:
-        """Return how the rows of a split are answered."""
-        return self.training_truth or self.truth if split == "train" else self.truth
-
 
 class ModelRecipe(Frozen):
     """A model and how it is trained; in TOML the options stand beside the table ``training``.
@@ -195,9 +191,19 @@ class Recipe:
     metrics: tuple[AddedMetric, ...] = ()
 
     @property
+    def by_role(self) -> dict[Role, tuple[Fabric, ...]]:
+        """The fabrics by their roles."""
+        return {
+            "seen": self.seen,
+            "population": self.population,
+            "unseen": self.unseen,
+            "unseen_population": self.unseen_population,
+        }
+
+    @property
     def fabrics(self) -> tuple[Fabric, ...]:
         """All fabrics."""
-        return self.seen + self.population + self.unseen + self.unseen_population
+        return tuple(fabric for fabrics in self.by_role.values() for fabric in fabrics)
 
     @property
     def own_models(self) -> list[ModelRecipe]:
@@ -214,30 +220,21 @@ class Recipe:
         rows = self.dataset.rows
         named: dict[Split, int] = {"train": rows.train, "validation": rows.validation, "test": rows.test}
         population: dict[Split, int] = {"train": rows.population}
+        test: dict[Split, int] = {"test": rows.test}
         learners = [model for model in self.own_models if model.learns]  # those of other recipes read rows of their own
         if self.models and not learners:
-            named, population = {"test": rows.test}, {}
+            named, population = test, {}
         # Only a model of one material learns from an unseen fabric; without one, there is nobody to read those rows.
-        unseen: dict[Split, int] = named if any(model.of_one_material for model in learners) else {"test": rows.test}
-        parts: tuple[tuple[Role, tuple[Fabric, ...], dict[Split, int]], ...] = (
-            ("seen", self.seen, named),
-            ("population", self.population, population),
-            ("unseen", self.unseen, unseen),
-            ("unseen_population", self.unseen_population, {"test": rows.test}),
-        )
-        for role, fabrics, splits in parts:
+        unseen = named if any(model.of_one_material for model in learners) else test
+        splits = {"seen": named, "population": population, "unseen": unseen, "unseen_population": test}
+        for role, fabrics in self.by_role.items():
             for fabric in fabrics:
-                for split, total in splits.items():
+                for split, total in splits[role].items():
                     yield role, fabric, split, total
 
     def extra_rows(self) -> Iterator[tuple[Role, Fabric, ExtraRows, int]]:
         """Yield the extra rows of the fabrics that each model is trained on; equal sets of two models once."""
-        parts: tuple[tuple[Role, tuple[Fabric, ...]], ...] = (
-            ("seen", self.seen),
-            ("population", self.population),
-            ("unseen", self.unseen),
-        )
-        for role, fabrics in parts:
+        for role, fabrics in self.by_role.items():
             readers = [model for model in self.own_models if role in model.trained_roles]
             for extra in dict.fromkeys(extra for model in readers for extra in model.options.extra_rows):
                 for fabric in fabrics:

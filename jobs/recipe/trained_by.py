@@ -71,11 +71,19 @@ def check_trained_by(recipe: Recipe, where: str) -> None:
     BadInput
         If the physics or a fabric of the same name differs, or a general model's fabrics do not fit.
     """
+    named = {fabric.name: fabric for fabric in (*recipe.seen, *recipe.unseen)}
     for index, model in enumerate(recipe.models):
         if trainer := recipe.trained_by.get(model.options.name):
             key = f"models.{index}.recipe"
-            _refuse_physics(recipe, trainer, where)
-            _refuse_namesakes(recipe, trainer, key, where)
+            for name in PHYSICS:
+                own, other = (getattr(each.dataset.truth, name) for each in (recipe, trainer))
+                if own != other:
+                    allowed = f"must be that of the recipe {trainer.name}, {other!r}"
+                    raise BadInput(where, f"dataset.truth.{name}", own, allowed)
+            for fabric in (*trainer.seen, *trainer.unseen):
+                if (cloth := named.get(fabric.name)) and cloth.optics() != fabric.optics():
+                    allowed = f"another cloth is called {fabric.name} there: rename one of them"
+                    raise BadInput(where, key, trainer.name, allowed)
             if not model.of_one_material:
                 _refuse_fabrics(recipe, model, trainer, key, where)
 
@@ -100,24 +108,9 @@ def _taken_over(
         raise BadInput(where, f"{key}.{more}", entry[more], f"leave it out: the recipe {trainer.name} says it")
     if not model.learns:
         raise BadInput(where, f"{key}.recipe", entry["recipe"], f"{name} has nothing to train: leave it out")
-    found = options.model_dump() | {"training": model.training.model_dump(), "seeds": model.seeds}
-    found |= {"runtimes": entry["runtimes"]} if "runtimes" in entry else {}
-    return found, trainer.trained_by.get(name, trainer)
-
-
-def _refuse_physics(recipe: Recipe, trainer: Recipe, where: str) -> None:
-    for name in PHYSICS:
-        own, other = (getattr(one.dataset.truth, name) for one in (recipe, trainer))
-        if own != other:
-            allowed = f"must be that of the recipe {trainer.name}, {other!r}"
-            raise BadInput(where, f"dataset.truth.{name}", own, allowed)
-
-
-def _refuse_namesakes(recipe: Recipe, trainer: Recipe, key: str, where: str) -> None:
-    named = {fabric.name: fabric for fabric in (*recipe.seen, *recipe.unseen)}
-    for other in (*trainer.seen, *trainer.unseen):
-        if (own := named.get(other.name)) and own.optics() != other.optics():
-            raise BadInput(where, key, trainer.name, f"another cloth is called {own.name} there: rename one of them")
+    whole = options.model_dump() | {"training": model.training.model_dump(), "seeds": model.seeds}
+    whole |= {"runtimes": entry["runtimes"]} if "runtimes" in entry else {}
+    return whole, trainer.trained_by.get(name, trainer)
 
 
 def _refuse_fabrics(recipe: Recipe, model: ModelRecipe, trainer: Recipe, key: str, where: str) -> None:

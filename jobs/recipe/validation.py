@@ -39,8 +39,7 @@ def validate_recipe(recipe: Recipe, where: str) -> None:
     _check_names(recipe, where)
     _check_population(recipe, where)
     _check_models(recipe, where)
-    _check_physics(recipe, where)
-    _check_estimators(recipe, where)
+    _check_truths(recipe, where)
     _check_live(recipe, where)
 
 
@@ -117,23 +116,18 @@ def _check_live(recipe: Recipe, where: str) -> None:
             raise BadInput(where, "bench.live.fabrics", name, allowed)
 
 
-def _check_physics(recipe: Recipe, where: str) -> None:
-    """Refuse rows, samples and pictures of another physics than that of `dataset.truth`."""
-    truth = recipe.dataset.truth
-    for key, other, _, _ in _truths(recipe):
-        for name in PHYSICS:
-            if (value := getattr(other, name)) != getattr(truth, name):
-                allowed = f"must be that of dataset.truth, {getattr(truth, name)!r}"
-                raise BadInput(where, f"{key}.{name}", value, allowed)
-
-
-def _check_estimators(recipe: Recipe, where: str) -> None:
+def _check_truths(recipe: Recipe, where: str) -> None:
+    """Refuse rows, samples and pictures of another physics than that of `dataset.truth`, or that no table answers."""
+    plain = recipe.dataset.truth
     for key, truth, queries, fabrics in _truths(recipe):
-        if truth.estimator != "node_table":
-            continue
-        reason = table_refusal(truth, queries, fabrics) if queries else "footprints of pictures are not known before"
-        if reason:
-            raise BadInput(where, f"{key}.estimator", "node_table", f"{reason}; take 'auto'")
+        for name in PHYSICS:
+            if (value := getattr(truth, name)) != getattr(plain, name):
+                allowed = f"must be that of dataset.truth, {getattr(plain, name)!r}"
+                raise BadInput(where, f"{key}.{name}", value, allowed)
+        if truth.estimator == "node_table":
+            reason = "footprints of pictures are not known before"
+            if queries is None or (reason := table_refusal(truth, queries, fabrics)):
+                raise BadInput(where, f"{key}.estimator", "node_table", f"{reason}; take 'auto'")
 
 
 def _truths(recipe: Recipe) -> Iterator[tuple[str, TruthOptions, QueryOptions | None, Sequence[Fabric]]]:

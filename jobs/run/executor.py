@@ -12,7 +12,8 @@ ones behind a training. A task that measures time starts when nothing else runs,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -115,7 +116,8 @@ def execute(
         board.workers = len(crew.accepted)
         crew.compile(groups, lambda done, under_way: board.compiling(done, len(groups), under_way))
         board.start(len(crew.accepted), crew.dashboard)
-        driver = _Driver(tasks, Ready(todo, finished), crew, ledger, board, stages, summary, manifests)
+        planned = {task.id: task for task in tasks}
+        driver = _Driver(planned, Ready(todo, finished), crew, ledger, board, stages, summary, manifests)
         try:
             driver.run()
         finally:
@@ -124,84 +126,78 @@ def execute(
     return summary
 
 
+@dataclass
 class _Driver:
     """The loop of a run: start what is ready, take what has ended."""
 
-    def __init__(
-        self,
-        tasks: Sequence[Task],
-        ready: Ready,
-        crew: Crew,
-        ledger: Ledger,
-        board: Board,
-        stages: Sequence[Stage],
-        summary: RunSummary,
-        manifests: Sequence[ManifestFile],
-    ) -> None:
-        self._tasks = {task.id: task for task in tasks}
-        self._ready, self._crew, self._ledger, self._board = ready, crew, ledger, board
-        self._stages, self._summary, self._manifests = stages, summary, manifests
-        self._out = str(ledger.out.resolve())
-        self._lost: list[Task] = []  # damaged products of stages that do not run
-        self._failed_on: dict[str, list[str]] = {}  # workers, by the id of a task that is tried again
-        self._failed_once: set[str] = set()
+    tasks: Mapping[str, Task]
+    ready: Ready
+    crew: Crew
+    ledger: Ledger
+    board: Board
+    stages: Sequence[Stage]
+    summary: RunSummary
+    manifests: Sequence[ManifestFile]
+    lost: list[Task] = field(default_factory=list)  # damaged products of stages that do not run
+    failed_on: dict[str, list[str]] = field(default_factory=dict)  # workers, by the id of a task that is tried again
+    failed_once: set[str] = field(default_factory=set)
 
     def run(self) -> None:
         """Work until no task is left that can start."""
         while True:
-            self._crew.look()
-            self._board.workers = len(self._crew.accepted)
+            self.crew.look()
+            self.board.workers = len(self.crew.accepted)
             started = self._start()
-            if not self._ready.running:
+            if not self.ready.running:
                 if started:
                     continue  # damaged inputs are made first
                 return  # what is left waits for tasks that failed
-            ended = self._crew.ended(_SECONDS_BETWEEN_LOOKS)
+            ended = self.crew.ended(_SECONDS_BETWEEN_LOOKS)
             for task, _ in ended:
-                self._ready.free(task)
+                self.ready.free(task)
             self._start(alone=False)  # workers have something to do while receipts are written
             for task, outcome in ended:
-                self._take(task, _verified(task, outcome, self._ledger))
-            self._board.waiting_for(self._ready.running)
+                self._take(task, _verified(task, outcome, self.ledger))
+            self.board.waiting_for(self.ready.running)
 
     def settle(self) -> None:
         """Write what the manifests have put off."""
-        for manifest in self._manifests:
+        for manifest in self.manifests:
             manifest.save()
 
     def close(self) -> None:
         """List what waits for tasks that failed; WorkFailed if products of a stage that does not run were damaged."""
-        if self._lost:
-            first = self._lost[0]
+        if self.lost:
+            first = self.lost[0]
             allowed = f"run `twillight {first.stage}` first"
             raise WorkFailed(f"{first.title}: its products were damaged and are removed; {allowed}")
-        self._summary.waiting.extend(self._ready.waiting)
+        self.summary.waiting.extend(self.ready.waiting)
 
     def _start(self, alone: bool = True) -> list[Task]:
         """Start as many tasks as there are slots, and return them."""
-        started = self._ready.take(self._crew.slots, alone)
+        started = self.ready.take(self.crew.slots, alone)
         for task in started:
             needs = self._needs(task)
-            if damaged := self._ledger.damaged(needs):
+            if damaged := self.ledger.damaged(needs):
                 self._reopen(damaged)
-                self._ready.again(task)
+                self.ready.again(task)
                 continue
             if task.needs:
                 self.settle()
-            self._board.begin(task)
-            self._crew.start(task, self._out, self._hashes(task), self._failed_on.get(task.id, ()))
+            self.board.begin(task)
+            self.crew.start(task, str(self.ledger.out.resolve()), self._hashes(task), self.failed_on.get(task.id, ()))
         return started
 
     def _needs(self, task: Task) -> list[Task]:
-        return [self._tasks[need] for need in task.needs if need in self._tasks]
+        return [self.tasks[need] for need in task.needs if need in self.tasks]
 
     def _hashes(self, task: Task) -> dict[str, str]:
         """Return the hashes of the products that a task needs, by path, for workers that fetch them."""
-        if self._ledger.store.is_local:
+        if self.ledger.store.is_local:
             return {}
         hashes = dict[str, str]()
         for need in self._needs(task):
-            if receipt := self._ledger.receipt(need):
+            if receipt := self.ledger.receipt(need):
                 files = receipt.files
                 hashes |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}
         return hashes
@@ -212,50 +208,50 @@ class _Driver:
             patience.give_up()
             raise WorkFailed(outcome.reason)
         if outcome.refused:
-            self._crew.recheck(outcome.worker)
+            self.crew.recheck(outcome.worker)
         if not outcome.reason:
-            self._ledger.finish(task, outcome.files, outcome.seconds)
-            self._ready.finish(task)
-            for manifest in self._manifests:
+            self.ledger.finish(task, outcome.files, outcome.seconds)
+            self.ready.finish(task)
+            for manifest in self.manifests:
                 manifest.add(task, outcome.files)
-            self._summary.ran.append(task)
-            self._board.end(task, seconds=outcome.seconds)
+            self.summary.ran.append(task)
+            self.board.end(task, seconds=outcome.seconds)
         elif self._again(task, outcome):
-            self._ready.again(task)
-            self._board.end(task, outcome.reason, again=True)
+            self.ready.again(task)
+            self.board.end(task, outcome.reason, again=True)
         else:
-            times = len(self._failed_on.get(task.id, ()))
+            times = len(self.failed_on.get(task.id, ()))
             reason = f"{outcome.reason}; tried {times} times" if times > 1 else outcome.reason
-            self._ledger.fail(task, reason, outcome.traceback)
-            self._summary.failed.append(task)
-            self._board.end(task, reason)
+            self.ledger.fail(task, reason, outcome.traceback)
+            self.summary.failed.append(task)
+            self.board.end(task, reason)
 
     def _again(self, task: Task, outcome: Outcome) -> bool:
         """Return whether to try a failed task again: it may have read damaged inputs, or not fail elsewhere."""
-        first = task.id not in self._failed_once
+        first = task.id not in self.failed_once
         if not outcome.refused:
-            self._failed_once.add(task.id)
-            if first and (damaged := self._ledger.damaged(self._needs(task), anew=True)):
+            self.failed_once.add(task.id)
+            if first and (damaged := self.ledger.damaged(self._needs(task), anew=True)):
                 self._reopen(damaged)
                 return True
         if not outcome.traceback and not outcome.refused:
             return False
-        self._failed_on.setdefault(task.id, []).append(outcome.worker)
-        return len(self._failed_on[task.id]) < _TRIES
+        self.failed_on.setdefault(task.id, []).append(outcome.worker)
+        return len(self.failed_on[task.id]) < _TRIES
 
     def _reopen(self, tasks: Sequence[Task]) -> None:
         """Do tasks again whose products were damaged and are removed."""
         ids = {task.id for task in tasks}
-        for done in (self._summary.before, self._summary.ran):
+        for done in (self.summary.before, self.summary.ran):
             done[:] = [task for task in done if task.id not in ids]
         for task in tasks:
-            if task.stage in self._stages:
-                self._ready.reopen(task)
-                self._board.say(f"{task.stage} {task.title}: damaged, made again")
-                self._board.add(task)
+            if task.stage in self.stages:
+                self.ready.reopen(task)
+                self.board.say(f"{task.stage} {task.title}: damaged, made again")
+                self.board.add(task)
             else:
-                self._lost.append(task)
-                self._ready.lose(task)
+                self.lost.append(task)
+                self.ready.lose(task)
 
 
 def _refuse_gaps(todo: Sequence[Task], tasks: Sequence[Task], finished: set[str]) -> None:

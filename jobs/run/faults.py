@@ -67,8 +67,8 @@ def faults(
             found += of_task
             seen((index + 1) / len(tasks))
     found = _explained(found, tasks, ledger)
-    unknown = {fault.task.id: fault.task for fault in found if fault.task and ledger.state(fault.task) != "done"}
-    bad = {Path(path).name for task in unknown.values() for path in task.products}
+    unknown = [fault.task for fault in found if fault.task and not ledger.done(fault.task)]
+    bad = {Path(path).name for task in unknown for path in task.products}
     for one in recipe.together:
         found += _manifest_faults(ManifestFile(DataSet(one), ledger), ledger.out, bad)
     return _by_stage(found, tasks) + _foreign(recipe, tasks, ledger, {fault.path for fault in found})

@@ -55,15 +55,10 @@ class Ledger:
             return "done"
         return "failed" if self.store.size(_note(task)) is not None else "missing"
 
-    def done(self, task: Task) -> Receipt | None:
-        """Return the receipt of a task if it is done: every product is there and has the listed size."""
+    def done(self, task: Task, verify: bool = False) -> Receipt | None:
+        """Return the receipt of a task if it is done: its products have the listed size, and hash if `verify`."""
         receipt = self.receipt(task)
-        return receipt if receipt and all(self._is_whole(path, receipt) for path in task.products) else None
-
-    def is_sound(self, task: Task) -> bool:
-        """Return whether a task is done and its products have the bytes that are on its receipt; they are read."""
-        receipt = self.receipt(task)
-        return receipt is not None and all(self._is_whole(path, receipt, True) for path in task.products)
+        return receipt if receipt and all(self._is_whole(path, receipt, verify) for path in task.products) else None
 
     def receipt(self, task: Task) -> Receipt | None:
         """Return a task's receipt; None if there is none, or no valid one."""
@@ -83,11 +78,6 @@ class Ledger:
     def receipt_path(self, task: Task) -> str:
         """Return the path of a task's receipt, relative to the output folder."""
         return f"{LEDGER}/{task.id}.json"
-
-    def products(self, task: Task) -> dict[str, Product]:
-        """Return the products of a done task by file name, as its receipt lists them."""
-        receipt = self.receipt(task)
-        return receipt.files if receipt else {}
 
     def seconds(self, task: Task) -> float:
         """Return how long a done task took; 0 when it is not done."""

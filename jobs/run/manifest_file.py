@@ -26,12 +26,7 @@ class ManifestFile:
         self._heading = Manifest(
             name=recipe.name,
             fingerprint=dataset.fingerprint,
-            roles={
-                "seen": [fabric.name for fabric in recipe.seen],
-                "population": [fabric.name for fabric in recipe.population],
-                "unseen": [fabric.name for fabric in recipe.unseen],
-                "unseen_population": [fabric.name for fabric in recipe.unseen_population],
-            },
+            roles={role: [fabric.name for fabric in fabrics] for role, fabrics in recipe.by_role.items()},
             fabrics={fabric.name: fabric for fabric in recipe.fabrics},
             about=recipe.dataset.model_dump(mode="json"),
             shards=[],

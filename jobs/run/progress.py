@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from threading import Lock
-from types import TracebackType
 from typing import Any, Final, Literal, NamedTuple
 
 from jobs.plan.schedule import Estimate
-from jobs.plan.task import STAGES, Stage, Task
+from jobs.plan.task import Stage, Task
 from pipeline import patience
 
 _SILENCE: Final = 60.0  # seconds without a report until the first line says so
@@ -58,10 +57,9 @@ class Board:
         self.ended: Counter[Stage] = Counter()
         """Tasks by stage, done or failed."""
         self.failed: Counter[Stage] = Counter()
-        stages = {task.stage for task in tasks}
-        self.work = {stage: 0.0 for stage in STAGES if stage in stages}
+        self.work: defaultdict[Stage, float] = defaultdict(float)
         """Expected cost of what is done, by stage."""
-        self.all_work = dict(self.work)
+        self.all_work: defaultdict[Stage, float] = defaultdict(float)
         """Expected cost of everything, by stage."""
         self.workers = 0
         self.dashboard: str | None = None
@@ -80,9 +78,7 @@ class Board:
         patience.tell(self.say_once)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         patience.tell(None)
         self._emit("stop")
 
@@ -102,8 +98,8 @@ class Board:
     def add(self, task: Task) -> None:
         """Count a task to do, also one that was done before and is made again."""
         self.planned[task.stage] += 1
-        self.all_work[task.stage] = self.all_work.get(task.stage, 0.0) + task.cost
-        self.work.setdefault(task.stage, 0.0)
+        self.all_work[task.stage] += task.cost
+        self.work[task.stage] += 0.0
         self._left[task.id] = task
 
     def start(self, workers: int, dashboard: str | None) -> None:

@@ -150,7 +150,7 @@ def _costs(
     trainings = [task for task in tasks if isinstance(task, Training)]
     cards = [read_card(ledger.out / task.folder) for task in trainings]
     needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.fabrics)]
-    weights = sum(ledger.products(task)[Path(task.products[0]).name].bytes for task in needed)
+    weights = sum(ledger.store.size(task.products[0]) or 0 for task in needed)
     return {
         ("queries generated", "1"): Value(sum(task.rows for task in shards)),
         ("generation", "s"): Value(sum(ledger.seconds(task) for task in shards)),
@@ -192,9 +192,9 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
     name, setting, ledger = model.options.name, _setting(model), Ledger(out)
     tasks = [task for recipe in recipes for task in plan(recipe) if isinstance(task, SceneShot | OnScene)]
     tasks = [task for task in tasks if task.scene == scene]
-    shots = [task for task in tasks if isinstance(task, SceneShot) and ledger.is_sound(task)]
+    shots = [task for task in tasks if isinstance(task, SceneShot) and ledger.done(task, verify=True)]
     shown = [task for task in tasks if isinstance(task, OnScene) and task.model.options.name == name]
-    shown = [task for task in shown if setting in task.shown and ledger.is_sound(task)]
+    shown = [task for task in shown if setting in task.shown and ledger.done(task, verify=True)]
     if len(shown) != 2 or not shots:
         return []
     shot = read_shot(out / shots[-1].made.path)
@@ -214,7 +214,7 @@ def _elsewhere(scene: str, out: Path, models: Sequence[tuple[ModelRecipe, Recipe
 
     (same, general), _ = models
     for task in plan(general):
-        if not isinstance(task, SceneShot) or not Ledger(out).is_sound(task):
+        if not isinstance(task, SceneShot) or not Ledger(out).done(task, verify=True):
             continue
         shot = read_shot(out / task.made.path)
         if shot.name != scene:

@@ -1,6 +1,5 @@
 """The snippets of jobs/CLUSTER.md, with a local cluster or local processes in place of each service."""
 
-import io
 import os
 import re
 import stat
@@ -15,24 +14,21 @@ from rich.console import Console
 
 from jobs.cli import app
 from jobs.run.cluster import Scheduler
-from jobs.run.executor import execute
-from jobs.run.ledger import Ledger
+from tests.jobs import fake_stages as fake
+from tests.jobs.dask_processes import ENVIRONMENT
 
-pytestmark = pytest.mark.external  # clusters of dask
+pytestmark = [pytest.mark.external, pytest.mark.slow]  # clusters of dask
 
-TESTS = Path(__file__).parent
-ROOT = TESTS.parents[1]
-TEXT = (ROOT / "jobs" / "CLUSTER.md").read_text(encoding="utf-8")
-PATH = os.pathsep.join([str(TESTS), str(ROOT)])
+TEXT = (Path(__file__).parents[2] / "jobs" / "CLUSTER.md").read_text(encoding="utf-8")
 
 
-@pytest.fixture
-def fake(monkeypatch):
-    monkeypatch.syspath_prepend(TESTS)
-    monkeypatch.setenv("PYTHONPATH", PATH)
-    import fake_stages
-
-    return fake_stages
+def run(command, out):
+    """Check a command line, and run six tasks on its scheduler."""
+    assert Path(command[0]).name == "twillight"
+    app.parse_args(command[1:], exit_on_error=False, print_error=False)
+    tasks = [fake.task(f"shard {index}", seconds=0.1) for index in range(6)]
+    given = Scheduler(command[command.index("--scheduler") + 1])
+    return fake.run(tasks, out, Console(stderr=True), scheduler=given)
 
 
 class Service:
@@ -55,9 +51,8 @@ def cluster_spec(name, image, env, worker_command):
     return {"spec": {"worker": {"spec": {"containers": [{"image": image, "env": env, "args": worker_command}]}}}}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```$", TEXT, re.M | re.S), ids=["slurm", "k8s", "aws"])
-def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, fake, monkeypatch, code):
+def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, monkeypatch, code):
     for name in ("dask_jobqueue", "dask_kubernetes", "dask_kubernetes.operator", "dask_cloudprovider"):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
     monkeypatch.setitem(sys.modules, "dask_cloudprovider.aws", types.ModuleType("aws"))
@@ -65,16 +60,9 @@ def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, fake, monke
     monkeypatch.setattr(sys.modules["dask_kubernetes.operator"], "KubeCluster", Service, raising=False)
     monkeypatch.setattr(sys.modules["dask_kubernetes.operator"], "make_cluster_spec", cluster_spec, raising=False)
     monkeypatch.setattr(sys.modules["dask_cloudprovider.aws"], "FargateCluster", Service, raising=False)
-    tasks = [fake.task(f"shard {index}", seconds=0.1) for index in range(6)]
+    monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
     summaries = []
-
-    def run(command, check):
-        assert command[0] == "twillight" and check
-        app.parse_args(command[1:], exit_on_error=False, print_error=False)
-        given = Scheduler(command[command.index("--scheduler") + 1])
-        summaries.append(execute(tasks, Ledger(tmp_path), scheduler=given, console=Console(file=io.StringIO())))
-
-    started = types.SimpleNamespace(run=run)
+    started = types.SimpleNamespace(run=lambda command, check: summaries.append(run(command, tmp_path)))
     exec(code.replace("import subprocess\n", ""), {"subprocess": started})
     (summary,) = summaries
     assert len(summary.ran) == 6 and not summary.failed
@@ -89,14 +77,8 @@ wait
 TWILLIGHT = f"""#!{sys.executable}
 import sys
 from pathlib import Path
-from jobs.cli import app
-from jobs.run.cluster import Scheduler
-from jobs.run.executor import execute
-from jobs.run.ledger import Ledger
-import fake_stages
-app.parse_args(sys.argv[1:], exit_on_error=False, print_error=False)
-given = Scheduler(sys.argv[sys.argv.index("--scheduler") + 1])
-execute([fake_stages.task(f"shard {{index}}", seconds=0.1) for index in range(6)], Ledger(Path.cwd()), scheduler=given)
+from tests.jobs.test_cluster_document import run
+run(sys.argv, Path.cwd())
 """
 
 DASK = f"""#!{sys.executable}
@@ -106,15 +88,14 @@ if __name__ == "__main__":  # workers are started from it
 """
 
 
-@pytest.mark.slow
-def test_the_job_of_slurm_runs_tasks(tmp_path, fake):
+def test_the_job_of_slurm_runs_tasks(tmp_path):
     (script,) = re.findall(r"^```sh\n(#!/bin/bash\n.*?)^```$", TEXT, re.M | re.S)
     folder = tmp_path / "bin"
     folder.mkdir()
     for name, content in (("srun", SRUN), ("twillight", TWILLIGHT), ("dask", DASK), ("job", script)):
         (folder / name).write_text(content)
         (folder / name).chmod(stat.S_IRWXU)
-    environment = os.environ | {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}
+    environment = ENVIRONMENT | {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}
     command = ["setsid", "--wait", str(folder / "job")]
     options = {"capture_output": True, "text": True, "timeout": 120, "check": False}
     done = subprocess.run(command, cwd=tmp_path, env=environment, **options)

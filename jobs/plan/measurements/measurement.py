@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Final, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Made, Progress, Stage, Task, held
@@ -33,8 +32,6 @@ class Measurement(Task):
     """Its code among `pipeline.versions` and ``bench``, beside that of its models and of their ways to run."""
     seconds: ClassVar[float] = 1.0
     """Estimated seconds on one core."""
-    timed: ClassVar[bool] = False
-    """True if it measures time, so that nothing may run beside it."""
     endings: ClassVar[tuple[str, ...]] = ()
     """Of the files of a kind that makes files for others, not Records: pictures of the truth, for example."""
 
@@ -94,11 +91,6 @@ class Measurement(Task):
         return Made(task=self.id, path=self.products[0])
 
     @property
-    def slots(self) -> Literal["one", "all"]:
-        """All if it measures time."""
-        return "all" if self.timed else "one"
-
-    @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
         return self.seconds
@@ -148,7 +140,7 @@ class Measurement(Task):
         """
         added = [one for one in held(self, Trained) if isinstance(one.options, AddedMethod)]
         if not added and not list(held(self, AddedMetric)):
-            self.write(out, progress)
+            self.write(out, {}, progress)
             return
         from pipeline.models.added.apart import run_apart
         from pipeline.models.added.guarded import MethodFailed
@@ -156,23 +148,23 @@ class Measurement(Task):
         left_out: dict[str, str] = {}
         while True:
             try:
-                return run_apart(_write, self, out, left_out, progress=progress)
+                return run_apart(self.write, out, left_out, progress=progress)
             except MethodFailed as failure:
                 if failure.name in left_out or self.without([failure.name]) is None:
                     raise
                 left_out[failure.name] = failure.reason
 
-    def write(self, out: Path, progress: Progress, left_out: Mapping[str, str] = MappingProxyType({})) -> None:
+    def write(self, out: Path, left_out: Mapping[str, str], progress: Progress) -> None:
         """Measure, and write the Records.
 
         Parameters
         ----------
         out : Path
             Output folder.
-        progress : callable
-            Receives the finished share.
         left_out : mapping
             Methods from outside that failed in this measurement, each with the reason.
+        progress : callable
+            Receives the finished share.
         """
         from reports.record import Record, this_machine, write_records
 
@@ -203,8 +195,3 @@ def _label(subject: object) -> str:
     if isinstance(subject, Trained):
         return subject.title
     return subject.name if isinstance(subject, Fabric | AddedMetric) else str(subject)
-
-
-def _write(task: Measurement, out: Path, left_out: Mapping[str, str], progress: Progress) -> None:
-    """Measure, and write the Records, in another process."""
-    task.write(out, progress, left_out)

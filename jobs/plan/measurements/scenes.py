@@ -131,7 +131,8 @@ class OnScene(Measurement):
         bench = subjects.recipe.bench
         for shot in SceneShot.all(bench.scenes):
             for model, trained in subjects.answering(shot.fabrics):
-                for one in trained.settings:
+                for options in trained.options.single():
+                    one = trained.model_copy(update={"options": options})
                     yield cls(
                         scene=shot.scene,
                         shot=shot.made,

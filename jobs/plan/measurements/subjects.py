@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import TYPE_CHECKING, Annotated
 
 from jobs.plan.dataset import DataSet
 from jobs.plan.task import PLACE, Made, Place, TaskPart
@@ -67,11 +67,6 @@ class Trained(TaskPart):
     def title(self) -> str:
         """Name of the model, with the seed of its training where that is not 0."""
         return f"{self.options.name}, seed {self.seed}" if self.seed else self.options.name
-
-    @property
-    def settings(self) -> list[Self]:
-        """The model with one setting each."""
-        return [self.model_copy(update={"options": options}) for options in self.options.single()]
 
     def shown(self, counts: Sequence[int]) -> tuple[str, ...]:
         """Return the settings that pictures are made of: those with a number of points in `counts`, or the only one."""

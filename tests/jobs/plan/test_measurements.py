@@ -34,20 +34,13 @@ def tasks():
     return [task for recipe in recipes for task in plan(recipe) if task.stage == "bench"]
 
 
-def test_every_kind_is_planned(tasks):
+def test_every_kind_is_planned_and_read_back_from_its_own_dump(tasks):
+    """Its identity has what it needs and no path; so no result outlives what it was made from."""
     assert {type(task) for task in tasks} == set(KINDS)
-
-
-def test_a_measurement_is_read_back_from_its_own_dump(tasks):
     for task in tasks:
         again = ANY.validate_json(task.model_dump_json())
         assert type(again) is type(task) and again.id == task.id
         assert again.products == task.products and again.needs == task.needs
-
-
-def test_an_identity_has_what_a_measurement_needs_and_no_path(tasks):
-    """Of the rows their ids; so no result outlives what it was made from."""
-    for task in tasks:
         text = str(task.identity())
         assert not any(folder in text for folder in ("models/", "records/", "datasets/")), task.title
         assert all(need in text for need in task.needs), task.title

@@ -25,15 +25,19 @@ def test_equal_tasks_take_the_rounded_number_of_turns(workers, makespan, tail):
     assert found.efficiency == pytest.approx(12 / (workers * makespan))
 
 
+def shards_and_net(count, length):
+    """Return so many shards of a second, what needs them, and their seconds."""
+    shards = [Step(name=index) for index in range(count)]
+    tasks = [*shards, Step(name=99, after=tuple(shard.id for shard in shards))]
+    return tasks, of(tasks, [1.0] * count + [length])
+
+
 def test_a_long_task_at_the_end_is_the_tail():
-    shards = [Step(name=index) for index in range(8)]
-    net = Step(name=9, after=tuple(shard.id for shard in shards))
-    tasks = [*shards, net]
-    seconds = of(tasks, [1.0] * 8 + [10.0])
+    tasks, seconds = shards_and_net(8, 10.0)
     found = Schedule.of(tasks, seconds, 4)
     assert (found.makespan, found.tail) == (12.0, 10.0)
     assert max(chains(tasks, seconds).values()) == 11.0
-    assert Schedule.of([net], seconds, 4).makespan == 10.0  # what it needs is done
+    assert Schedule.of(tasks[-1:], seconds, 4).makespan == 10.0  # what it needs is done
 
 
 def test_tasks_that_measure_time_run_one_by_one():
@@ -42,18 +46,11 @@ def test_tasks_that_measure_time_run_one_by_one():
 
 
 def test_doubling_ends_where_it_saves_little():
-    shards = [Step(name=index) for index in range(64)]
-    net = Step(name=99, after=tuple(shard.id for shard in shards))
-    tasks = [*shards, net]
-    found = doublings(tasks, of(tasks, [1.0] * 64 + [100.0]))
-    # 164, 132, 116, 108, 104: the last saves 3.7 %.
+    """The last saves 3.7 %."""
+    found = doublings(*shards_and_net(64, 100.0))
     assert [one.makespan for one in found] == [164.0, 132.0, 116.0, 108.0, 104.0]
-
-
-def test_nothing_to_do_takes_no_time():
-    found = Schedule.of([], {}, 4)
-    assert found.makespan == found.tail == 0.0 and found.efficiency == 1.0
-    assert len(doublings([], {})) == 1
+    (nothing,) = doublings([], {})
+    assert nothing.makespan == nothing.tail == 0.0 and nothing.efficiency == 1.0
 
 
 class Costly(FakeTraining):

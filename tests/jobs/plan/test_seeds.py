@@ -7,6 +7,7 @@ from jobs.plan.measurements.models import AtExtremes, Latents
 from jobs.plan.measurements.scenes import FrameTime, OnScene
 from jobs.plan.measurements.timing import TimeOfMethods
 from jobs.plan.training import Training
+from tests.jobs.identities import assert_changed
 
 SEEDS = ('model = "woven"\nhidden = 32', 'model = "woven"\nhidden = 32\nseeds = 3')
 
@@ -36,20 +37,14 @@ def of(tasks, kind, name="woven"):
     return found
 
 
-def test_more_seeds_add_trainings_and_change_none(one, three):
+def test_more_seeds_add_trainings_and_change_none(one, three, files):
     before, after = of(one, Training), of(three, Training)
     assert list(before) == [0] and list(after) == [0, 1, 2]
-    assert [task.id for task in after[0]] == [task.id for task in before[0]]
     assert len({task.id for (task,) in after.values()}) == 3
     assert {task.training.model_copy(update={"seed": 0}) for (task,) in after.values()} == {before[0][0].training}
     assert after[2][0].title == "woven on 5 fabrics, seed 2"
-    kept = {task.id for task in one if task.stage != "report"}
-    assert kept < {task.id for task in three}
-
-
-def test_seeds_follow_that_of_the_training(one, files):
-    files.exchange(*SEEDS).exchange("steps = 10", "steps = 10\nseed = 5")
-    assert list(of(files.plan(), Training)) == [5, 6, 7]
+    assert_changed(one, three, "^report")
+    assert list(of(files.exchange("steps = 10", "steps = 10\nseed = 5").plan(), Training)) == [5, 6, 7]
 
 
 def test_each_training_of_one_material_has_every_seed(one, files):
@@ -72,11 +67,9 @@ def test_errors_are_measured_of_every_training(one, three, kind):
     assert len({task.title for same in after.values() for task in same}) == 3 * len(before[0])
 
 
-def test_errors_by_size_of_further_trainings_have_tasks_of_their_own(one, three):
-    assert not of(one, ErrorsBySize) and list(of(three, ErrorsBySize)) == [1, 2]
-
-
 def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, three):
+    """And errors by size, which are measured with its times."""
+    assert not of(one, ErrorsBySize) and list(of(three, ErrorsBySize)) == [1, 2]
     for kind in (TimeOfMethods, FrameTime, Latents):
         assert [task.id for task in one if isinstance(task, kind)] == [t.id for t in three if isinstance(t, kind)]
     assert one[-1].pictures == three[-1].pictures
@@ -86,19 +79,18 @@ def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, thre
     assert {seed: same[0].ways.runtimes for seed, same in of(three, OnFabric).items()} == {0: ("onnx",), 1: (), 2: ()}
 
 
-def test_the_bound_is_measured_of_every_training(one, files):
-    tasks = files.exchange(*SEEDS).exchange("frames = 4", "frames = 4\nbounds = true").plan()
-    assert {task.ways.bounds for same in of(tasks, OnFabric).values() for task in same} == {True}
+def test_the_bound_is_measured_of_every_training(three, files):
+    tasks = files.exchange("frames = 4", "frames = 4\nbounds = true").plan()
+    assert {seed: {task.ways.bounds for task in same} for seed, same in of(tasks, OnFabric).items()} == {
+        seed: {True} for seed in (0, 1, 2)
+    }
 
 
-def test_the_note_on_a_model_names_its_seeds(one, three):
+def test_the_note_on_a_model_and_its_records_name_the_seeds(one, three):
     (note,) = [note for note in three[-1].models if note.name == "woven"]
     assert "3 trainings with the seeds 0 to 2" in note.about
-    assert note.fingerprint == of(one, Training)[0][0].id
+    trained = {seed: task.id for seed, (task,) in of(three, Training).items()}
+    assert note.fingerprint == trained[0]
     assert not any("trainings with" in note.about for note in one[-1].models)
-
-
-def test_records_name_the_seed(three):
     for seed, same in of(three, OnFabric).items():
-        provenance = same[0].provenance
-        assert (provenance.seed, provenance.model) == (seed, of(three, Training)[seed][0].id)
+        assert (same[0].provenance.seed, same[0].provenance.model) == (seed, trained[seed])

@@ -12,6 +12,7 @@ from jobs.recipe import added
 from jobs.recipe.load import load_recipe
 from pipeline.models.added import describe as describe_module
 from pipeline.models.added.added_code import GROUP
+from tests.jobs.identities import assert_changed, ids
 from weaves.errors import BadInput
 
 METHOD = """
@@ -55,59 +56,58 @@ def theirs(tmp_path):
     return f"{tmp_path / 'theirs.py'}:Theirs"
 
 
-def ids(recipe):
-    return {f"{task.stage} {task.title}": task.id for task in plan(recipe)}
+@pytest.fixture
+def planned(files):
+    """Return the plan of the recipe as it is now, with methods from outside."""
+    return lambda *add: plan(load_recipe(files.write(), add))
 
 
-def test_a_given_method_is_one_more_model(files, theirs):
-    path = files.write()
-    before, after = ids(load_recipe(path)), ids(load_recipe(path, [theirs]))
-    new = after.keys() - before.keys()
-    assert new == {f"bench errors of theirs, {name}" for name in ("denim", "own", "twill_4_4")} | {
-        "bench extremes of theirs",
-    }
-    changed = {title for title in before if after[title] != before[title]}
-    assert changed == {"bench timing of all methods", "report page of tiny"}
+def added_to(before, after):
+    return ids(after).keys() - ids(before).keys()
 
 
-def test_a_changed_file_is_measured_again_and_nothing_else(files, theirs, tmp_path):
-    path = files.write()
-    before = ids(load_recipe(path, [theirs]))
+THEIRS_ALONE = "timing|^report"
+"""What a method from outside changes of the rest."""
+
+
+def test_a_given_method_is_one_more_model(planned, theirs):
+    before, after = planned(), planned(theirs)
+    errors = {f"bench errors of theirs, {name}" for name in ("denim", "own", "twill_4_4")}
+    assert added_to(before, after) == errors | {"bench extremes of theirs"}
+    assert_changed(before, after, THEIRS_ALONE)
+
+
+@pytest.mark.parametrize("code", [METHOD, NETWORK])
+def test_a_changed_file_is_measured_or_trained_again_and_nothing_else(planned, theirs, tmp_path, code):
     (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere" / "theirs.py").write_text(METHOD)
-    assert ids(load_recipe(path, [theirs.replace("theirs.py", "elsewhere/theirs.py")])) == before
-    (tmp_path / "theirs.py").write_text(METHOD + "\n")
-    after = ids(load_recipe(path, [theirs]))
-    changed = {title for title in before if after[title] != before[title]}
-    assert changed == {title for title in before if "theirs" in title or "timing" in title or "page" in title}
+    for path in (tmp_path / "theirs.py", tmp_path / "elsewhere" / "theirs.py"):
+        path.write_text(code)
+    before = planned(theirs)
+    assert_changed(before, planned(theirs.replace("theirs.py", "elsewhere/theirs.py")), "^$")
+    (tmp_path / "theirs.py").write_text(code + "\n")
+    assert_changed(before, planned(theirs), f"theirs|{THEIRS_ALONE}")
+    assert bool(ids(before, "^train theirs")) == (code == NETWORK)
 
 
 @pytest.mark.parametrize("one_material", [False, True])
-def test_a_network_is_trained_and_measured_of_each_seed(files, theirs, tmp_path, one_material):
+def test_a_network_is_trained_and_measured_of_each_seed(files, planned, theirs, tmp_path, one_material):
     (tmp_path / "theirs.py").write_text(NETWORK + f"    of_one_material = {one_material}\n")
-    training = "[models.training]\nsteps = 20\nseed = 4\n"
-    before = ids(load_recipe(files.write()))
-    files.text += HERE + "rows = 9\nseeds = 2\n" + training
-    path = files.write()
-    (model,) = [one for one in load_recipe(path, [theirs]).models if one.options.model == "added"]
-    assert (model.seeds, model.training.steps, model.of_one_material) == (2, 20, one_material)
-    assert model.options.own == {"rows": 9}
-
-    recipe = load_recipe(path, [theirs])
-    tasks = plan(recipe)
+    before = planned()
+    files.text += HERE + "rows = 9\nseeds = 2\n[models.training]\nsteps = 20\nseed = 4\n"
+    tasks = planned(theirs)
     trained = [task for task in tasks if isinstance(task, Training) and task.options.model == "added"]
     groups = [("denim",), ("own",), ("twill_4_4",)]
-    general = [tuple(fabric.name for fabric in (*recipe.seen, *recipe.population))]
+    general = [("denim", "own", "random_000", "random_001", "random_002")]
     assert [task.fabrics for task in trained] == 2 * (groups if one_material else general)
     assert [task.training.seed for task in trained] == sorted([4, 5] * (3 if one_material else 1))
+    assert {(task.training.steps, task.options.own["rows"]) for task in trained} == {(20, 9)}
     measured = [task for task in tasks if task.stage == "bench" and "theirs" in task.title]
     assert measured and all({task.id for task in trained} & set(task.needs) for task in measured)
     (note,) = [note for note in tasks[-1].models if note.name == "theirs"]
     assert note.learns and note.about.startswith("from outside this package: theirs.py, version 3, SHA-256 ")
     what = "each fabric by itself" if one_material else "5 fabrics at once"
     assert f"; {what}, 20 steps of 1,024 queries, 2 trainings with the seeds 4 to 5" in note.about
-    changed = {title for title, one in ids(recipe).items() if before.get(title, one) != one}
-    assert changed == {"bench timing of all methods", "report page of tiny"}
+    assert_changed(before, tasks, THEIRS_ALONE)
 
 
 @pytest.mark.parametrize("named", ['model = "theirs"', 'name = "theirs"'])
@@ -120,8 +120,8 @@ def test_another_recipe_can_train_a_network(files, theirs, tmp_path, named):
     recipe = load_recipe(files.write(), [theirs])
     (model,) = [one for one in recipe.models if one.options.model == "added"]
     assert (model.options.own, model.seeds, recipe.trained_by["theirs"].name) == ({"rows": 9}, 2, "trains")
-    trained = {title for title in ids(load_recipe(trainer, [theirs])) if title.startswith("train theirs")}
-    assert len(trained) == 2 and trained <= ids(recipe).keys()
+    trained = ids(plan(load_recipe(trainer, [theirs])), "^train theirs")
+    assert len(trained) == 2 and ids(plan(recipe), "^train theirs") == trained
     with pytest.raises(BadInput, match=r"code of your own is given with --add FILE.py:CLASS"):
         load_recipe(files.write())
     files.text = own + f'\n[[models]]\nmodel = "added"\nsource = "{theirs}"\nrecipe = "trains.toml"\n'
@@ -129,27 +129,16 @@ def test_another_recipe_can_train_a_network(files, theirs, tmp_path, named):
         load_recipe(files.write(), [theirs])
 
 
-def test_a_changed_network_is_trained_again(files, theirs, tmp_path):
-    (tmp_path / "theirs.py").write_text(NETWORK)
-    path = files.write()
-    before = ids(load_recipe(path, [theirs]))
-    (tmp_path / "theirs.py").write_text(NETWORK + "\n")
-    after = ids(load_recipe(path, [theirs]))
-    changed = {title for title in before if after[title] != before[title]}
-    assert changed == {title for title in before if "theirs" in title or "timing" in title or "page" in title}
-    assert any(title.startswith("train theirs") for title in changed)
-
-
-def test_a_recipe_has_its_options_and_its_name(files, theirs):
+def test_a_recipe_has_its_options_and_its_name(files, planned, theirs):
     files.text += HERE + 'name = "other"\nrows = 9\nlimit = 5\nversion = "3"\n'
-    path = files.write()
-    (found,) = [model.options for model in load_recipe(path, [theirs]).models if model.options.model == "added"]
-    assert (found.name, found.own, found.limit, found.stated) == ("other", {"rows": 9}, 5.0, "3")
-    first = ids(load_recipe(path, [theirs]))
-    files.exchange("limit = 5", "limit = 50").write()
-    assert ids(load_recipe(path, [theirs])) == first
-    files.exchange("rows = 9", "rows = 10").write()
-    assert ids(load_recipe(path, [theirs]))["bench errors of other, denim"] != first["bench errors of other, denim"]
+    first = planned(theirs)
+    (task,) = (task for task in first if task.title == "errors of other, denim")
+    options = task.model.options
+    assert (options.name, options.own, options.limit, options.stated) == ("other", {"rows": 9}, 5.0, "3")
+    files.exchange("limit = 5", "limit = 50")
+    assert_changed(first, planned(theirs), "^$")
+    files.exchange("rows = 9", "rows = 10")
+    assert_changed(first, planned(theirs), f"of other|{THEIRS_ALONE}")
 
 
 @pytest.mark.parametrize("model", ["theirs", "added", "theirs:Theirs"])
@@ -161,13 +150,14 @@ def test_a_recipe_alone_runs_no_code(files, model, theirs, monkeypatch, tmp_path
         load_recipe(files.write())
 
 
-def test_an_installed_method_enters_if_the_recipe_names_it(files, theirs, monkeypatch):
+def test_an_installed_method_enters_if_the_recipe_names_it(files, planned, theirs, monkeypatch):
+    with pytest.raises(BadInput, match=r"--add: theirs: no method of this name; none is installed"):
+        planned("theirs")
     point = EntryPoint("theirs", theirs, GROUP)
     monkeypatch.setattr(added, "entry_points", lambda group: [point] if group == GROUP else [])
-    assert not any("theirs" in title for title in ids(load_recipe(files.write())))
-    assert any("theirs" in title for title in ids(load_recipe(files.write(), ["theirs"])))
+    assert not ids(planned(), "theirs") and ids(planned("theirs"), "theirs")
     files.text += HERE
-    assert any("theirs" in title for title in ids(load_recipe(files.write())))
+    assert ids(planned(), "theirs")
 
 
 @pytest.mark.parametrize(
@@ -193,31 +183,22 @@ def test_what_cannot_be_entered_is_refused(files, theirs, tmp_path, name, add, m
     assert sentence in str(refusal.value), refusal.value
 
 
-def test_a_name_that_is_not_installed_is_refused(files):
-    with pytest.raises(BadInput, match=r"--add: theirs: no method of this name; none is installed"):
-        load_recipe(files.write(), ["theirs"])
-
-
-def test_a_metric_is_measured_of_every_model_on_every_fabric(files, tmp_path):
+def test_a_metric_is_measured_of_every_model_on_every_fabric(planned, tmp_path):
     (tmp_path / "metrics.py").write_text(METRIC)
-    path = files.write()
-    before, after = ids(load_recipe(path)), ids(load_recipe(path, [f"{tmp_path / 'metrics.py'}:largest"]))
+    metric = f"{tmp_path / 'metrics.py'}:largest"
+    before, after = planned(), planned(metric)
     models, fabrics = ("woven", "neumip", "point_sampled"), ("denim", "own", "twill_4_4")
-    assert after.keys() - before.keys() == {f"bench added metric of largest, {m}, {f}" for m in models for f in fabrics}
-    assert {title for title in before if after[title] != before[title]} == {"report page of tiny"}
-
-
-@pytest.mark.parametrize(("key", "value"), [("better", "upper"), ("format", "roman")])
-def test_a_metric_with_an_unknown_word_is_refused(files, tmp_path, key, value):
-    (tmp_path / "metrics.py").write_text(METRIC + f"largest.{key} = {value!r}\n")
-    with pytest.raises(BadInput, match=f"{key} = '{value}'"):
-        load_recipe(files.write(), [f"{tmp_path / 'metrics.py'}:largest"])
+    assert added_to(before, after) == {f"bench added metric of largest, {m}, {f}" for m in models for f in fabrics}
+    assert_changed(before, after, "^report")
     with pytest.raises(BadInput, match="a metric 'largest' is given twice"):
-        (tmp_path / "metrics.py").write_text(METRIC)
-        load_recipe(files.write(), [f"{tmp_path / 'metrics.py'}:largest"] * 2)
+        planned(metric, metric)
+    for key, value in (("better", "upper"), ("format", "roman")):
+        (tmp_path / "metrics.py").write_text(METRIC + f"largest.{key} = {value!r}\n")
+        with pytest.raises(BadInput, match=f"{key} = '{value}'"):
+            planned(metric)
 
 
-def test_an_installed_package_has_its_version(files, tmp_path, monkeypatch):
+def test_an_installed_package_has_its_version(files, planned, tmp_path, monkeypatch):
     site = tmp_path / "site"
     about = site / "their_distribution-1.2.dist-info"
     (site / "their_package").mkdir(parents=True)
@@ -228,9 +209,8 @@ def test_an_installed_package_has_its_version(files, tmp_path, monkeypatch):
     (about / "entry_points.txt").write_text(f"[{GROUP}]\ntheirs = their_package:Theirs\n")
     monkeypatch.syspath_prepend(site)
     files.text += HERE
-    path = files.write()
-    (found,) = [model.options for model in load_recipe(path).models if model.options.model == "added"]
+    (found,) = [model.options for model in load_recipe(files.write()).models if model.options.model == "added"]
     assert (found.source, found.distribution, found.folder) == ("their_package:Theirs", "their-distribution 1.2", "")
-    before = ids(load_recipe(path))
+    before = planned()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: their-distribution\nVersion: 1.3\n")
-    assert ids(load_recipe(path))["bench errors of theirs, denim"] != before["bench errors of theirs, denim"]
+    assert_changed(before, planned(), f"theirs|{THEIRS_ALONE}")

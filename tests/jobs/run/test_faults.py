@@ -41,9 +41,12 @@ def kinds(found):
 
 
 def test_two_data_sets_of_one_recipe_are_sound(trade):
+    recipe, tasks, ledger = trade
     shares = []
     assert faults(*trade, shares.append) == []
     assert shares == sorted(shares) and shares[-1] == 1.0
+    left = {path for path in made_up.contents(ledger.out) if not path.startswith("ledger/")}
+    assert left <= set(own_files(recipe, tasks, ledger.out))
 
 
 def test_each_copy_of_a_shared_shard_is_read(trade):
@@ -61,25 +64,23 @@ def test_each_copy_of_a_shared_shard_is_read(trade):
 
 
 def test_a_manifest_of_either_data_set_is_compared(trade):
+    """One that a killed run left behind its receipts is outdated."""
     recipe, tasks, ledger = trade
     first, second = sorted(ledger.out.glob("datasets/*/manifest.json"))
+    manifest = Manifest.load(second.parent)
+    manifest.without({shard.file for shard in manifest.shards[:2]}).save(second.parent)
+    (fault,) = faults(recipe, tasks, ledger)
+    assert fault.kind == "outdated" and f"of {len(manifest.shards)} finished shards" in fault.why
+    # A shard whose receipt is gone is a fault of its own, not one of the manifest that lists it.
+    manifest.save(second.parent)
+    receipt = ledger.out / ledger.receipt_path(tasks[0])
+    receipt.rename(ledger.out / "kept")
+    assert kinds(faults(recipe, tasks, ledger)) == [("missing", ledger.receipt_path(tasks[0]))]
+    (ledger.out / "kept").rename(receipt)
     first.write_text(first.read_text().replace('"start": 64', '"start": 65'))
     second.unlink()
     places = [str(path.relative_to(ledger.out)) for path in (first, second)]
     assert kinds(faults(recipe, tasks, ledger)) == [("damaged", places[0]), ("missing", places[1])]
-
-
-def test_a_manifest_that_a_killed_run_left_behind_its_receipts_is_outdated(trade):
-    recipe, tasks, ledger = trade
-    path = next(path for path in ledger.out.glob("datasets/trade-*/manifest.json"))
-    manifest = Manifest.load(path.parent)
-    manifest.without({shard.file for shard in manifest.shards[:2]}).save(path.parent)
-    (fault,) = faults(recipe, tasks, ledger)
-    assert fault.kind == "outdated" and f"of {len(manifest.shards)} finished shards" in fault.why
-    # A shard whose receipt is gone is a fault of its own, not one of the manifest that lists it.
-    manifest.save(path.parent)
-    (ledger.out / ledger.receipt_path(tasks[0])).unlink()
-    assert kinds(faults(recipe, tasks, ledger)) == [("missing", ledger.receipt_path(tasks[0]))]
 
 
 def test_a_folder_or_a_larger_file_in_a_products_place_is_damaged(trade):
@@ -113,9 +114,3 @@ def test_products_of_an_earlier_version_are_outdated(tmp_path, monkeypatch):
 def test_what_a_stopped_task_leaves_is_known_by_name():
     assert all(map(is_leftover, (CHECKPOINT, f"0123-{ROWS}", ".tmp-card.json")))
     assert not any(map(is_leftover, ("model.safetensors", "part-0.parquet", "notes.txt")))
-
-
-def test_own_files_are_those_that_a_run_leaves(trade):
-    recipe, tasks, ledger = trade
-    left = {path for path in made_up.contents(ledger.out) if not path.startswith("ledger/")}
-    assert left <= set(own_files(recipe, tasks, ledger.out))

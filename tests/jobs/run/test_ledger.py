@@ -1,62 +1,33 @@
 import json
 import tempfile
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import Field
 
-from jobs.plan.task import Place, Task
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import Product, Receipt
 from jobs.run.store import Store
+from tests.jobs import fake_stages as fake
 from weaves.errors import BadInput, WorkFailed
 
-
-class Shard(Task):
-    stage: ClassVar = "generate"
-    folder: Place
-    about: dict[str, Any] = Field(default={})
-
-    @property
-    def title(self):
-        return "a shard"
-
-    @property
-    def products(self):
-        return (f"{self.folder}/part-x.parquet",)
-
-    def versions(self):
-        return {"shard": 5}
-
-
-TASK = Shard(folder="datasets/a-1")
+TASK = fake.task("x", folder="datasets/a-1")
+PRODUCT = TASK.products[0]
 NOTE = f"ledger/{TASK.id}.json"
 
 
 @pytest.fixture
 def done(tmp_path):
     """A ledger in which TASK is done."""
-    product = tmp_path / TASK.products[0]
-    product.parent.mkdir(parents=True)
-    product.write_bytes(b"twelve bytes")
-    ledger = Ledger(tmp_path)
-    ledger.finish(TASK, {product.name: Product.of(product)}, 1.5)
-    return ledger
+    fake.done(tmp_path, TASK)
+    return Ledger(tmp_path)
 
 
-def test_receipt_and_product_are_done(done):
-    assert done.state(TASK) == "done"
-    assert done.seconds(TASK) == 1.5
-    receipt = json.loads((done.out / NOTE).read_text())
-    assert receipt["title"] == "a shard"
-    assert receipt["files"]["part-x.parquet"]["bytes"] == 12
-
-
-@pytest.mark.parametrize(("path", "length"), [(TASK.products[0], 6), (NOTE, 40), (NOTE, 0), (TASK.products[0], None)])
+@pytest.mark.parametrize(("path", "length"), [(PRODUCT, 6), (NOTE, 40), (NOTE, 0), (PRODUCT, None)])
 def test_a_product_or_receipt_that_is_cut_or_gone_is_missing(done, path, length):
+    assert done.state(TASK) == "done"
     file = done.out / path
     content = file.read_bytes()
     file.unlink()
@@ -75,24 +46,21 @@ def rewrite(ledger, change):
 
 ODD = {
     "no files": {"files": {}},
-    "a list of files": {"files": []},
-    "no size": {"files": {"part-x.parquet": {"sha256": "0" * 64}}},
-    "a negative size": {"files": {"part-x.parquet": {"sha256": "0" * 64, "bytes": -12}}},
-    "a size in words": {"files": {"part-x.parquet": {"sha256": "0" * 64, "bytes": "12"}}},
-    "no hash": {"files": {"part-x.parquet": {"sha256": "", "bytes": 12}}},
-    "time in words": {"seconds": "long"},
+    "a negative size": {"files": {"x.txt": {"sha256": "0" * 64, "bytes": -200}}},
+    "a size in words": {"files": {"x.txt": {"sha256": "0" * 64, "bytes": "200"}}},
+    "no hash": {"files": {"x.txt": {"sha256": "", "bytes": 200}}},
     "no number": {"seconds": float("nan")},
     "another task": {"task": "0" * 16},
     "a key too many": {"more": 1},
     **{f"an identity of {value}": {"identity": {"key": value}} for value in ([1], {"a": {}}, float("inf"))},
-    "a path in place of a name": {"files": {"../part-x.parquet": {"sha256": "0" * 64, "bytes": 12}}},
+    "a path in place of a name": {"files": {"../x.txt": {"sha256": "0" * 64, "bytes": 200}}},
 }
 
 
 @pytest.mark.parametrize("change", ODD.values(), ids=ODD)
 def test_an_odd_receipt_counts_as_missing(done, change):
     rewrite(done, change)
-    assert done.state(TASK) == "missing" and done.products(TASK) == {}
+    assert done.state(TASK) == "missing" and not getattr(done.receipt(TASK), "files", {})
 
 
 def test_a_receipt_of_before_checksums_is_read(done):
@@ -109,24 +77,23 @@ def test_a_file_that_is_no_receipt_counts_as_missing(done, content):
     assert done.reason(TASK) == ""
 
 
-def test_a_receipt_says_what_its_task_depended_on(done):
-    assert done.receipt(TASK).identity == {"versions.shard": 5, "about": "#44136fa3"}
-    (done.out / "ledger" / f"{'0' * 16}.json").write_text("{}")
-    done.fail(TASK, "for the test")
-    assert [receipt.task for receipt in done.receipts([])] == [TASK.id]
-    assert not list(done.receipts([TASK.id]))
+class About(fake.Fake):
+    about: dict[str, Any]
 
 
-def test_an_identity_on_a_receipt_is_short():
+def test_a_receipt_says_in_short_what_its_task_depended_on(done):
     about = {"warp": {"bend": 1.5}, "thick": 2.0, "long": "x" * 25, "none": {}, "short": "y" * 24}
-    first, other = (
-        Receipt.of(Shard(folder="a", about=about | {"long": letter * 25}), {}, 0.0).identity for letter in "xz"
-    )
-    assert first.keys() == {"versions.shard", *(f"about.{key}" for key in about)}
-    assert (first["versions.shard"], first["about.thick"], first["about.short"]) == (5, 2.0, "y" * 24)
+    tasks = [About(name="about", about=about | {"long": letter * 25}) for letter in "xz"]
+    fake.done(done.out, *tasks)
+    first, other = (done.receipt(task).identity for task in tasks)
+    assert first.keys() >= {"versions.fake", "fails", *(f"about.{key}" for key in about)}
+    assert (first["versions.fake"], first["about.thick"], first["about.short"]) == (1, 2.0, "y" * 24)
     hashed = [first[f"about.{key}"] for key in ("warp", "long", "none")]
     assert all(value.startswith("#") and len(value) == 9 for value in hashed)
     assert {key for key in first if first[key] != other[key]} == {"about.long"}
+    (done.out / "ledger" / f"{'0' * 16}.json").write_text("{}")
+    done.fail(TASK, "for the test")
+    assert [receipt.task for receipt in done.receipts([task.id for task in tasks])] == [TASK.id]
 
 
 @settings(deadline=None)
@@ -146,37 +113,31 @@ def test_every_flipped_byte_of_a_receipt_is_found(data):
         assert Receipt.read(path, "a" * 16) is None
 
 
-def test_a_failure_keeps_its_reason_until_success(tmp_path, done):
-    (tmp_path / TASK.products[0]).unlink()
+def test_a_failure_keeps_its_reason_until_success(done):
+    (done.out / PRODUCT).unlink()
     done.fail(TASK, "the disk was full", "Traceback …")
     assert (done.state(TASK), done.reason(TASK)) == ("failed", "the disk was full")
-    product = tmp_path / TASK.products[0]
-    product.write_bytes(b"whole")
-    done.finish(TASK, {product.name: Product.of(product)}, 1.0)
-    assert (done.state(TASK), done.reason(TASK)) == ("done", "")
+    fake.done(done.out, TASK)
+    assert (done.state(TASK), done.reason(TASK), done.seconds(TASK)) == ("done", "", 1.0)
 
 
 @pytest.mark.parametrize("sound", [True, False])
 def test_another_data_set_adopts_a_shard_it_shares_if_it_is_sound(done, sound):
-    if not sound:
-        (done.out / TASK.products[0]).write_bytes(b"other  bytes")  # as long as the right ones
-    twin = Shard(folder="datasets/b-2")
+    content = (done.out / PRODUCT).read_bytes()
+    (done.out / PRODUCT).write_bytes(content if sound else content[::-1])
+    twin = fake.task("x", folder="datasets/b-2")
     assert twin.id == TASK.id and done.state(twin) == "missing"
     assert bool(done.adopt(twin)) == sound == (done.out / twin.products[0]).exists()
     if sound:
-        assert (done.out / twin.products[0]).read_bytes() == b"twelve bytes"
+        assert (done.out / twin.products[0]).read_bytes() == content
         assert done.state(TASK) == done.state(twin) == "done"
 
 
-def test_one_run_at_a_time(tmp_path):
+def test_one_run_at_a_time_in_a_folder_that_can_be_written(tmp_path):
     first, second = Store.of(tmp_path), Store.of(tmp_path)
     with first.held(), pytest.raises(WorkFailed, match="another run is at work"), second.held():
         pass
     with second.held():
-        pass
-
-
-def test_a_folder_that_cannot_be_written_is_bad_input(tmp_path):
-    (tmp_path / "file").touch()
+        (tmp_path / "file").touch()
     with pytest.raises(BadInput, match="--out must name a folder"), Store.of(tmp_path / "file" / "out").held():
         pass

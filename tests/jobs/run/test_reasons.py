@@ -11,33 +11,29 @@ def ledger(tmp_path):
     return Ledger(tmp_path)
 
 
-def test_done_tasks_have_no_reason_and_others_were_never_made(ledger):
-    done, new = fake.task("done"), fake.task("new")
-    fake.done(ledger.out, done)
-    assert reasons([done, new], ledger) == {new.id: NEVER}
-
-
-def test_a_changed_key_is_named_with_its_values(ledger):
-    before = fake.task("shard", seconds=0.01)
-    fake.done(ledger.out, before)
-    now = fake.task("shard", seconds=0.02, forgets=True)
-    assert reasons([now], ledger) == {now.id: "changed: forgets False → True, seconds 0.01 → 0.02"}
-
-
-def test_a_version_comes_first_and_long_values_and_ids_are_not_shown(ledger, monkeypatch):
-    need = fake.task("need")
-    before = fake.task("shard")
-    fake.done(ledger.out, before)
-    monkeypatch.setattr(fake.Fake, "versions", lambda self: {"fake": 2})
-    now = fake.Fake(name="shard", after=(need.id,), fails="")
-    assert reasons([now], ledger) == {now.id: "changed: versions.fake 1 → 2, after"}
-
-
-def test_the_most_similar_of_several_predecessors_counts(ledger):
-    for seconds, breaks in ((0.01, False), (0.02, True)):
-        fake.done(ledger.out, fake.task("shard", seconds=seconds, breaks=breaks))
-    now = fake.task("shard", seconds=0.03, breaks=True)
-    assert reasons([now], ledger) == {now.id: "changed: seconds 0.02 → 0.03"}
+@pytest.mark.parametrize(
+    ("before", "now", "why"),
+    [
+        ([], {}, NEVER),
+        ([{}], {}, None),
+        (
+            [{"seconds": 0.01}],
+            {"seconds": 0.02, "forgets": True},
+            "changed: forgets False → True, seconds 0.01 → 0.02",
+        ),
+        # The most similar one counts.
+        ([{"seconds": 0.01}, {"seconds": 0.02, "breaks": True}], {"breaks": True}, "changed: seconds 0.02 → 0.0"),
+        # A version comes first; long values and ids are not shown.
+        ([{"version": 2}], {"after": ("0" * 16,)}, "changed: versions.fake 2 → 1, after"),
+    ],
+)
+def test_what_has_changed_since_a_task_was_made_is_named(ledger, monkeypatch, before, now, why):
+    for fields in before:
+        with monkeypatch.context() as patch:
+            patch.setattr(fake.Fake, "versions", lambda self: {"fake": fields.get("version", 1)})  # noqa: B023
+            fake.done(ledger.out, fake.Fake(name="shard", **{key: fields[key] for key in fields.keys() - {"version"}}))
+    task = fake.Fake(name="shard", **now)
+    assert reasons([task], ledger) == ({task.id: why} if why else {})
 
 
 def test_failures_and_damage_are_told_apart(ledger):
