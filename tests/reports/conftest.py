@@ -1,16 +1,16 @@
-"""A small benchmark made of stand-ins: two fabrics, the truth as a method, and point sampling."""
+"""A small benchmark: two fabrics, the truth as a method, and point sampling."""
 
 import pytest
 
-from pipeline.analytic.exact_points import sample_points
+from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.cloth import cloth_side
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.measure.held_out import HeldOutFabric
 from reports.options import BenchOptions
 from reports.record import Record
+from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import load_fabric
 
 COARSE = TruthOptions(relative_error=0.2, min_count=256, max_count=256)
@@ -28,36 +28,10 @@ OPTIONS = BenchOptions(
 )
 
 
-class Points:
-    """The baseline, without the package that will hold it."""
-
-    name = "point_sampled"
-
-    def __init__(self, count):
-        self.count, self.setting = count, f"k = {count}"
-        self.cloths = {}
-
-    def covers(self, fabric):
-        return True
-
-    def prepare(self, fabric):
-        self.cloths[fabric.name] = cloth_side(fabric, TruthOptions())
-
-    def predict(self, fabric, queries, seed=0):
-        return sample_points(self.cloths[fabric.name], queries, self.count, seed)
-
-    def bytes_stored(self, fabric):
-        return 1000 * self.count
-
-
-class Oracle(Points):
+class Oracle(FakeMethod):
     """The truth itself, with other random numbers; knows denim alone."""
 
     name = "oracle"
-
-    def __init__(self):
-        super().__init__(0)
-        self.setting = ""
 
     def covers(self, fabric):
         return fabric.name == "denim"
@@ -74,7 +48,7 @@ def options():
 
 @pytest.fixture(scope="session")
 def points():
-    return [Points(count) for count in (1, 2, 16)]
+    return PointSampledOptions(counts=[1, 2, 16]).methods()
 
 
 @pytest.fixture(scope="session")
