@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from pipeline.compiled.arrays import Float64
 
 HALF_NYQUIST: Final = 0.25
 """Half the Nyquist frequency, in cycles a pixel."""
@@ -31,9 +31,9 @@ HALF_NYQUIST: Final = 0.25
 class TemporalSpectrum(NamedTuple):
     """Radially averaged power of pictures."""
 
-    frequency: Floats
+    frequency: Float64
     """Middle of each ring, in cycles a pixel, rising to .5."""
-    power: Floats
+    power: Float64
     """Mean P(k) in each ring."""
     high: float
     """Sum of P(k) beyond half the Nyquist frequency, corners of the square included."""
@@ -59,7 +59,7 @@ def temporal_variance(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> floa
     return float(variance - np.square(np.asarray(noise, np.float64)).mean())
 
 
-def temporal_variances(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Floats:
+def temporal_variances(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Float64:
     """Return the variance over frames of each pixel, less the variance that noise adds."""
     values = np.asarray(frames, np.float64)
     squared = np.broadcast_to(np.square(np.asarray(noise, np.float64)), values.shape)

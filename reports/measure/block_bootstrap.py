@@ -15,14 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from pipeline.compiled.arrays import Float64, Mask
 from reports.options import ImageOptions
-
-Floats = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 
 def block_interval(
-    rows: Floats, mask: Mask, side: int = 16, resamples: int = 500, seed: int = 0
+    rows: Float64, mask: Mask, side: int = 16, resamples: int = 500, seed: int = 0
 ) -> tuple[float, float, float]:
     """Return the standard error of a mean over pixels and the ends of its 95 % interval.
 
@@ -68,7 +66,7 @@ def mse_difference(
     a: npt.ArrayLike,
     b: npt.ArrayLike,
     truth: npt.ArrayLike,
-    mask: npt.NDArray[np.bool_],
+    mask: Mask,
     options: ImageOptions,
 ) -> tuple[float, float, float]:
     """Return the MSE of b less that of a, and its 95 % interval over blocks of pixels; pictures are linear RGB."""

@@ -22,6 +22,7 @@ import numpy as np
 
 from pipeline.cores import cores
 from pipeline.truth.query import Queries
+from reports.record import Metric, Record
 from weaves.fabric import Fabric
 
 Predict = Callable[[Fabric, Queries], object]
@@ -141,6 +142,12 @@ def quartiles(samples: Sequence[float]) -> tuple[float, float, float]:
     """Return first quartile, median and third quartile."""
     low, median, high = (float(q) for q in np.percentile(samples, [25, 50, 75]))
     return low, median, high
+
+
+def timed(subject: Record, metric: Metric, samples: Sequence[float]) -> Record:
+    """Return repeated readings as a Record: their median, their quartiles as its ends, and themselves."""
+    low, median, high = quartiles(samples)
+    return subject.of(metric, median, len(samples), low=low, high=high, samples=tuple(samples))
 
 
 def milliseconds(action: Callable[[], object], clock: Callable[[], int] = time.perf_counter_ns) -> float:

@@ -11,7 +11,6 @@ from reports.error import (
     component_errors,
     most_error,
     ratio,
-    relative_squared_error,
     squared_error,
 )
 
@@ -96,12 +95,3 @@ def test_ratio_has_the_delta_methods_interval():
     draws = random.normal(4, 0.04, 200_000) / random.normal(2, 0.02, 200_000)
     assert value == 2
     assert (low, high) == pytest.approx(tuple(np.percentile(draws, [2.5, 97.5])), abs=0.003)
-
-
-def test_relative_mse_of_known_numbers():
-    """t = 1 and 3, both 10 % off, noise .05 and .1, eps = .25: weights 1 / (t^2 + .25 · 4) = 1/2 and 1/10."""
-    truth, noise = np.array([[1.0], [3.0]]), np.array([[0.05], [0.1]])
-    error = relative_squared_error(1.1 * truth, truth, noise, epsilon=0.25)
-    assert error.measured == pytest.approx((0.01 / 2 + 0.09 / 10) / 2)
-    assert error.noise == pytest.approx((0.0025 / 2 + 0.01 / 10) / 2)
-    assert error.value == pytest.approx(error.measured - error.noise)

@@ -20,12 +20,14 @@ import math
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
+from pipeline.models.method import Method
 from reports.error import COLOUR_WEIGHTS, relative_weight, squared_error
 from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
@@ -39,15 +41,10 @@ from reports.measure.scene.image_error import (
     noise_floor,
 )
 from reports.measure.scene.shot import Shot
-from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
+from reports.measure.timing import Contender, affordable, time_side_by_side, timed
 from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
 from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
-
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
-
-Floats = npt.NDArray[np.float64]
 
 LONGEST: Final = 0.01
 """Seconds of a timed call."""
@@ -109,7 +106,7 @@ def measure_scene(
 
 
 def _over_time(
-    subject: Record, own: Floats, truth: Floats, noise: Floats, still: npt.NDArray[np.bool_], image: ImageOptions
+    subject: Record, own: Float64, truth: Float64, noise: Float64, still: Mask, image: ImageOptions
 ) -> list[Record]:
     """Return the aliasing of a method's luminance, and FovVideoVDP's score where that is installed.
 
@@ -146,19 +143,14 @@ def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, 
             rare = np.flatnonzero(method.out_of_domain(fabric, queries))[:1]
             method.predict(fabric, queries.take(rare))
             contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), LONGEST, FEWEST))
-    records = []
     timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
     readings = np.array([timing.samples for timing in timings]).reshape(len(able), len(subjects), -1)
     counts = np.array([len(queries.u) for _, queries in subjects])
-    for method, frames in zip(able, 1e-6 * np.einsum("mct,c->mt", readings, counts), strict=True):
-        samples = tuple(frames.tolist())
-        low, median, high = quartiles(samples)
-        frame_time = _subject(method, shot).of("frame_time", median, len(samples), low=low, high=high, samples=samples)
-        records.append(frame_time)
-    return records
+    frames = (1e-6 * np.einsum("mct,c->mt", readings, counts)).tolist()
+    return [timed(_subject(method, shot), "frame_time", own) for method, own in zip(able, frames, strict=True)]
 
 
-def _colour(subject: Record, shot: Shot, answers: Sequence[npt.NDArray[np.float32]], image: ImageOptions) -> Record:
+def _colour(subject: Record, shot: Shot, answers: Sequence[Float32], image: ImageOptions) -> Record:
     """Return the relative RMSE of the colour measure over the queries of all frames."""
     values, truth, noise = (
         np.concatenate(parts).astype(np.float64)
@@ -193,8 +185,8 @@ def difference_maps(
 
 
 def relative_differences(
-    picture: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.NDArray[np.bool_], epsilon: float = 0.01
-) -> dict[str, Floats]:
+    picture: npt.ArrayLike, truth: npt.ArrayLike, mask: Mask, epsilon: float = 0.01
+) -> dict[str, Float64]:
     """Return (m - t) / sqrt(t^2 + epsilon <t>^2), (H, W), of each channel and of luminance; 0 where nothing counts.
 
     The mean of the channels' squares is the relative MSE as measured (`reports.error`).
@@ -208,7 +200,7 @@ def relative_differences(
     return maps
 
 
-def fovvideovdp(subject: Record, film: Floats, truth: Floats) -> list[Record]:
+def fovvideovdp(subject: Record, film: Float64, truth: Float64) -> list[Record]:
     """Return the quality of a film in JOD as a Record; nothing where pyfvvdp is not installed.
 
     Parameters

@@ -62,6 +62,13 @@ def test_flip_of_green_and_blue_and_delta_e_of_black_and_white():
     assert values(flat(1.0, 1.0, 1.0), flat(1e-9, 1e-9, 1e-9))["delta_e"] == pytest.approx(100, abs=1e-3)
 
 
+def test_relative_mse_of_a_factor():
+    """m = 1.1 t, t = 1 and 3 in halves: ((.1 t)^2 / (t^2 + eps 4)) averaged."""
+    truth = np.where(X[..., None] < 32, 1.0, 3.0) * np.ones(3)
+    expected = 0.01 * (1 / (1 + 0.01 * 4) + 9 / (9 + 0.01 * 4)) / 2
+    assert values(1.1 * truth, truth)["mse_relative"] == pytest.approx(expected)
+
+
 def test_measures_that_do_not_know_the_unit_of_light():
     bright = values(4 * (CLOTH + 0.01), 4 * CLOTH)
     found = values(CLOTH + 0.01)
