@@ -166,10 +166,7 @@ def _material(gltf: Any, file: _File, name: str, level: Textures, material: Cons
         "KHR_materials_anisotropy": {"anisotropyStrength": 1.0, "anisotropyTexture": {"index": turned}},
         "KHR_materials_specular": {"specularFactor": 1.0, "specularColorTexture": {"index": specular}},
         "KHR_materials_ior": {"ior": material.ior},
-        "KHR_materials_sheen": {
-            "sheenColorFactor": material.sheen.tolist(),
-            "sheenRoughnessFactor": SHEEN_ROUGHNESS,
-        },
+        "KHR_materials_sheen": {"sheenColorFactor": material.sheen.tolist(), "sheenRoughnessFactor": SHEEN_ROUGHNESS},
     }
     file.document.extensionsUsed = sorted(extensions)
     return gltf.Material(

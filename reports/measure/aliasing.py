@@ -39,18 +39,13 @@ class TemporalSpectrum(NamedTuple):
     """Sum of P(k) beyond half the Nyquist frequency, corners of the square included."""
 
 
-def flicker(
-    frames: npt.ArrayLike,
-    truth: npt.ArrayLike,
-    noise: npt.ArrayLike = 0.0,
-    truth_noise: npt.ArrayLike = 0.0,
-) -> float:
+def flicker(frames: npt.ArrayLike, truth: npt.ArrayLike, truth_noise: npt.ArrayLike = 0.0) -> float:
     """Return the temporal variance beyond the truth's own, relative to the truth's squared mean.
 
-    Luminance of the same pixels, (F, ...), and the standard error of each value; 0 where values are exact.
+    Luminance of the same pixels, (F, ...), and the standard error of the truth's; 0 where it is exact.
     """
     scale = float(np.asarray(truth, np.float64).mean()) ** 2
-    return (temporal_variance(frames, noise) - temporal_variance(truth, truth_noise)) / scale
+    return (temporal_variance(frames) - temporal_variance(truth, truth_noise)) / scale
 
 
 def temporal_variance(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> float:
@@ -66,18 +61,13 @@ def temporal_variances(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Flo
     return np.asarray(np.var(values, axis=0, ddof=1) - squared.mean(axis=0))
 
 
-def excess_energy(
-    frames: npt.ArrayLike,
-    truth: npt.ArrayLike,
-    noise: npt.ArrayLike = 0.0,
-    truth_noise: npt.ArrayLike = 0.0,
-) -> float:
+def excess_energy(frames: npt.ArrayLike, truth: npt.ArrayLike, truth_noise: npt.ArrayLike = 0.0) -> float:
     """Return the energy beyond half the Nyquist frequency above the truth's, relative to the truth's squared mean.
 
-    Luminance of the same rectangle of pixels, (F, H, W), and the standard error of each value.
+    Luminance of the same rectangle of pixels, (F, H, W), and the standard error of the truth's.
     """
     scale = float(np.asarray(truth, np.float64).mean()) ** 2
-    return (spectrum(frames, noise).high - spectrum(truth, truth_noise).high) / scale
+    return (spectrum(frames).high - spectrum(truth, truth_noise).high) / scale
 
 
 def spectrum(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> TemporalSpectrum:

@@ -91,9 +91,7 @@ def extremes(repeat: tuple[int, int]) -> ExtremeInputs:
 
 
 def measure_extremes(
-    families: Sequence[Sequence[Method]],
-    fabrics: Sequence[tuple[Fabric, Role]],
-    truth: TruthOptions = EXTREME_TRUTH,
+    families: Sequence[Sequence[Method]], fabrics: Sequence[tuple[Fabric, Role]], truth: TruthOptions = EXTREME_TRUTH
 ) -> list[Record]:
     """Measure methods, each followed by its lower precisions, at their extremes on the cloths that they cover.
 

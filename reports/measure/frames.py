@@ -78,8 +78,8 @@ def measure_aliasing(method: Method, fabric: Fabric, options: FrameOptions, fram
     shown = np.array(planes)
     lit, rows = reference.lit, reference.lit.all(axis=1)  # the spectrum is of rows that are lit from end to end
     subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, scene="plane")
-    motion = flicker(shown[:, lit], reference.truth[:, lit], 0.0, reference.noise[:, lit])
-    energy = excess_energy(shown[:, rows], reference.truth[:, rows], 0.0, reference.noise[:, rows])
+    motion = flicker(shown[:, lit], reference.truth[:, lit], reference.noise[:, lit])
+    energy = excess_energy(shown[:, rows], reference.truth[:, rows], reference.noise[:, rows])
     return [
         subject.of("flicker", motion, options.frames),
         subject.of("excess_energy", energy, options.frames),

@@ -128,13 +128,7 @@ def measure_silhouette(method: Method, fabric: Fabric, options: EdgeOptions, tru
     ]
 
 
-def _edge(
-    fabric: Fabric,
-    queries: Queries,
-    coverage: Float32,
-    components: Float32,
-    options: EdgeOptions,
-) -> Edge:
+def _edge(fabric: Fabric, queries: Queries, coverage: Float32, components: Float32, options: EdgeOptions) -> Edge:
     colour = shade(fabric, components, queries)
     cover = coverage.astype(np.float64).reshape(options.rows, -1)
     return Edge(cover, math.pi * cover[..., None] * colour.reshape(*cover.shape, 3))

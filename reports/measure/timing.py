@@ -61,8 +61,6 @@ class CallTiming(NamedTuple):
 
     samples: tuple[float, ...]
     """Times of all repeats, in their order."""
-    rows: int
-    """Queries in each of them."""
     waited: float = math.nan
     """Share of the time on one thread in which that thread did not run, because others did; NaN on several threads."""
 
@@ -101,9 +99,7 @@ def time_side_by_side(
                 ran[index] += time.thread_time_ns() - ran_before
             progress((warm_up + turn + 1) / (warm_up + repeats))
     return [
-        CallTiming(
-            tuple(reading / contender.rows for reading in readings), contender.rows, _waited(contender, readings, own)
-        )
+        CallTiming(tuple(reading / contender.rows for reading in readings), _waited(contender, readings, own))
         for contender, readings, own in zip(contenders, elapsed, ran, strict=True)
     ]
 

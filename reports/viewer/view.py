@@ -37,16 +37,7 @@ from pipeline.truth.options import TruthOptions
 from reports.images.texture import png_bytes
 from reports.options import LEAST_TILE, MOST_TILE
 from reports.viewer.generate import network, shipped
-from reports.viewer.shapes import (
-    HALF_ARC,
-    HALF_HEIGHT,
-    VIEW_SPREAD,
-    Seen,
-    Viewpoint,
-    arcs,
-    seen,
-    sphere_radius,
-)
+from reports.viewer.shapes import HALF_ARC, HALF_HEIGHT, VIEW_SPREAD, Seen, Viewpoint, arcs, seen, sphere_radius
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.yarn import Yarn

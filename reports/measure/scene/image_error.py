@@ -144,7 +144,7 @@ def _light_errors(m: Float64, t: Float64, s: Float64, lit: Mask, options: ImageO
     w = relative_weight(t, RELATIVE_EPSILON)
     squares = ((m - t) ** 2 - s**2).mean(axis=1), (((m - t) ** 2 - s**2) * w**2).mean(axis=1)
     errors = squared_error(m, t, s, 0), squared_error(m * w, t * w, s * w, 0)
-    spreads = [block_interval(rows, lit, options.block, options.resamples, options.seed) for rows in squares]
+    spreads = [block_interval(rows, lit, options) for rows in squares]
     mse, relative = (
         replace(error, standard_error=spread, low=low, high=high)
         for error, (spread, low, high) in zip(errors, spreads, strict=True)
@@ -152,9 +152,9 @@ def _light_errors(m: Float64, t: Float64, s: Float64, lit: Mask, options: ImageO
     return mse, relative
 
 
-def _measure(metric: Metric, maps: dict[str, Float64], floor: float, lit: Mask, o: ImageOptions) -> Measure:
+def _measure(metric: Metric, maps: dict[str, Float64], floor: float, lit: Mask, options: ImageOptions) -> Measure:
     rows = _rows(metric, maps, lit)
-    _, *ends = block_interval(rows, lit, o.block, o.resamples, o.seed)
+    _, *ends = block_interval(rows, lit, options)
     low, high = sorted(_unit(metric, end) for end in ends)
     return Measure(_unit(metric, float(rows.mean())), low, high, floor, len(rows))
 

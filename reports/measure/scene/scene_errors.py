@@ -33,13 +33,7 @@ from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
-from reports.measure.scene.image_error import (
-    DISPLAY_EXPOSURE,
-    RELATIVE_EPSILON,
-    ImageErrors,
-    image_errors,
-    noise_floor,
-)
+from reports.measure.scene.image_error import DISPLAY_EXPOSURE, RELATIVE_EPSILON, ImageErrors, image_errors, noise_floor
 from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, time_side_by_side, timed
 from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
@@ -93,7 +87,7 @@ def measure_scene(
         errors = image_errors(shown[0], truths[0], noises[0], lit[0], image, floor)
         if method.setting in pictures:
             about = {"scene": shot.name, "method": method.name, "setting": method.setting}
-            layers = frame_layers(shown) | difference_maps(shown[0], truths[0], errors, RELATIVE_EPSILON)
+            layers = frame_layers(shown) | difference_maps(shown[0], truths[0], errors)
             write_picture(pictures[method.setting], shown[0], np.ones_like(lit[0]), about, layers=layers)
         subject = _subject(method, shot)
         records += errors.records(subject)
@@ -114,12 +108,12 @@ def _over_time(
     """
     records = []
     if still.any():
-        value = flicker(own[:, still], truth[:, still], 0.0, noise[:, still])
+        value = flicker(own[:, still], truth[:, still], noise[:, still])
         scale = truth[:, still].mean() ** 2
         rows = (temporal_variances(own[:, still]) - temporal_variances(truth[:, still], noise[:, still])) / scale
-        _, low, high = block_interval(rows, still, image.block, image.resamples, image.seed)
+        _, low, high = block_interval(rows, still, image)
         records.append(subject.of("flicker", value, len(own), low=low, high=high))
-    records.append(subject.of("excess_energy", excess_energy(own, truth, 0.0, noise), len(own)))
+    records.append(subject.of("excess_energy", excess_energy(own, truth, noise), len(own)))
     return records + fovvideovdp(subject, own, truth)
 
 
@@ -165,7 +159,7 @@ def _colour(subject: Record, shot: Shot, answers: Sequence[Float32], image: Imag
     count, sums = (np.bincount(pixel, weights, minlength=size[0] * size[1]) for weights in (None, squares))
     lit = (count > 0).reshape(size)
     rows = sums[lit.ravel()] * lit.sum() / len(pixel)
-    _, *ends = block_interval(rows, lit, image.block, image.resamples, image.seed)
+    _, *ends = block_interval(rows, lit, image)
     low, high = (math.sqrt(max(end, 0.0)) / error.mean for end in ends)
     return subject.of("colour_rrmse", error.relative_rmse, error.count, low=low, high=high)
 
@@ -174,18 +168,16 @@ def _subject(method: Method, shot: Shot) -> Record:
     return Record(method=method.name, setting=method.setting, scene=shot.name, threads=1)
 
 
-def difference_maps(
-    picture: npt.ArrayLike, truth: npt.ArrayLike, errors: ImageErrors, epsilon: float = 0.01
-) -> dict[str, npt.NDArray[Any]]:
+def difference_maps(picture: npt.ArrayLike, truth: npt.ArrayLike, errors: ImageErrors) -> dict[str, npt.NDArray[Any]]:
     """Return the layers of a picture's errors, (H, W) by channel.
 
     They are `lit` (1 where a pixel counts), those of `relative_differences`, and the maps of `ImageErrors`.
     """
-    return {"lit": errors.mask, **relative_differences(picture, truth, errors.mask, epsilon), **errors.maps}
+    return {"lit": errors.mask, **relative_differences(picture, truth, errors.mask), **errors.maps}
 
 
 def relative_differences(
-    picture: npt.ArrayLike, truth: npt.ArrayLike, mask: Mask, epsilon: float = 0.01
+    picture: npt.ArrayLike, truth: npt.ArrayLike, mask: Mask, epsilon: float = RELATIVE_EPSILON
 ) -> dict[str, Float64]:
     """Return (m - t) / sqrt(t^2 + epsilon <t>^2), (H, W), of each channel and of luminance; 0 where nothing counts.
 

@@ -20,7 +20,7 @@ def test_intervals_cover_under_correlated_noise():
     for _ in range(200):
         field = ndimage.gaussian_filter(random.standard_normal(DISC.shape), 2, mode="wrap")
         rows = (field[DISC] * 4 * np.sqrt(np.pi)) ** 2  # smoothing leaves the variance 1 / (4 pi 2^2)
-        _, low, high = block_interval(rows, DISC)
+        _, low, high = block_interval(rows, DISC, ImageOptions())
         by_blocks += low <= 1 <= high
         by_pixels += abs(rows.mean() - 1) < 1.96 * rows.std() / np.sqrt(rows.size)
     assert by_blocks >= 170
@@ -30,7 +30,7 @@ def test_intervals_cover_under_correlated_noise():
 def test_independent_pixels_have_the_usual_standard_error():
     """Its own relative error is 1 / sqrt(2 · 90 blocks) = 7 % and that of 500 draws 3 %: 25 % allowed."""
     rows = np.random.default_rng(1).standard_normal(DISC.sum())
-    spread, low, high = block_interval(rows, DISC)
+    spread, low, high = block_interval(rows, DISC, ImageOptions())
     assert spread == pytest.approx(1 / np.sqrt(rows.size), rel=0.25)
     assert high - low == pytest.approx(2 * 1.96 * spread, rel=0.2)
 
@@ -40,7 +40,7 @@ def test_blocks_part_the_mask_and_equal_values_have_an_interval_of_no_width():
     mask[:, :16] = False
     assert np.bincount(blocks(mask, 16)).tolist() == [256] * (4 * 5)
     assert np.bincount(blocks(mask[:20, 16:], 16)).tolist() == [25] * (4 * 16)  # a quarter of 20 is 5
-    assert block_interval(np.full(DISC.sum(), 0.5), DISC) == (0, 0.5, 0.5)
+    assert block_interval(np.full(DISC.sum(), 0.5), DISC, ImageOptions()) == (0, 0.5, 0.5)
 
 
 RANDOM = np.random.default_rng(5)

@@ -151,7 +151,7 @@ def test_a_frames_time_weighs_every_cloth_by_its_queries(frames, monkeypatch):
     def readings(contenders, repeats, warm_up):
         assert [len(contender.queries) for contender in contenders] == [1] * 2 * len(counts)
         return [
-            CallTiming(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)), 1)
+            CallTiming(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)))
             for index, _ in enumerate(contenders)
         ]
 
