@@ -44,24 +44,15 @@ def test_the_truth_makes_no_light():
 
 
 @pytest.mark.parametrize("name", ["polyester_lining", "voile", slow("silk_charmeuse"), slow("twill_4_4")])
-def test_the_brightest_method_returns_at_most_what_arrives(name):
-    """A network gone wrong answers a thousand times too much; the sum over 256 directions is good to 1 %."""
-    bright = FakeMethod(lambda queries: np.full((len(queries.u), 4), 1e3, np.float32))
-    found = {r.metric: r.value for r in measure_furnace(Bounded(bright), load_fabric(name))}
-    assert found["furnace_diffuse"] <= 1.01
-    assert found["furnace_specular"] < 0.6
+def test_the_brightest_method_returns_at_most_what_arrives_and_soft_nodes_no_more(name):
+    """A network gone wrong answers a thousand times too much: what is left are the soft nodes without shadows.
 
-
-@pytest.mark.slow
-def test_without_shadows_soft_nodes_make_no_light():
-    """The furnace of the bounds, 256 lights a patch: at most 1 but for the error of the sequence; no component above.
-
-    Diffuse: exactly bounded. Specular, scattered once: far below.
+    At most 1 but for the error of 256 directions. Diffuse: exactly bounded. Specular, scattered once: far below.
     """
-    for name in ("polyester_lining", "silk_charmeuse", "voile"):
-        fabric = load_fabric(name)
-        reading = read_queries(tabulate(fabric), furnace_queries(fabric.weave.repeat))
-        energy = 2.0 * math.pi * reading.bounds.reshape(-1, DIRECTIONS, 4).mean(axis=1)
-        assert energy[:, 2:].sum(axis=1).max() < 1.005
-        assert energy[:, :2].sum(axis=1).max() < 0.7
-        assert (reading.components <= reading.bounds * 1.0001 + 1e-7).all()
+    fabric = load_fabric(name)
+    bright = FakeMethod(lambda queries: np.full((len(queries.u), 4), 1e3, np.float32))
+    found = {r.metric: r.value for r in measure_furnace(Bounded(bright), fabric)}
+    assert found["furnace_diffuse"] <= 1.005
+    assert found["furnace_specular"] < 0.6
+    reading = read_queries(tabulate(fabric), furnace_queries(fabric.weave.repeat))
+    assert (reading.components <= reading.bounds * 1.0001 + 1e-7).all()

@@ -2,13 +2,13 @@
 
 import math
 
-import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from reports.measure.extremes import LUSTROUS, error_name, lustrous
+from reports.over_seeds import mean
 from reports.record import Provenance, Record
 from reports.tables.summary import (
     aliasing_table,
@@ -27,6 +27,7 @@ from reports.tables.summary import (
     timing_table,
     unranged,
 )
+from tests.reports.conftest import retrained
 from weaves.fabric import load_fabric
 
 
@@ -172,34 +173,17 @@ def test_energy_is_the_worst_and_silhouettes_are_the_mean_over_fabrics():
     assert (edge.silhouette_coverage, edge.fabrics) == (pytest.approx(-0.7), 3) and math.isnan(edge.silhouette_light)
 
 
-def seeded(records, method, seeds):
-    """Records in which a method was trained several times: the first as it is, the others 2 and 3 times as large."""
-    result = []
-    for record in records:
-        trained = record.method == method and record.metric not in ("time", "bytes_stored")
-        picture = record.scene == "sphere" or (record.scene, record.metric) == ("plane", "mse")
-        for factor, seed in enumerate(seeds[: 1 if picture or not trained else None], start=1):
-            about = {"provenance": Provenance(model=f"net{seed}", seed=seed)} if trained else {}
-            result.append(record.model_copy(update={"value": factor * record.value, **about}))
-    return result
-
-
 def test_trained_numbers_are_means_and_have_ranges():
-    """MSE of 2, 4 and 6 on the seen fabrics; 2 points have 8 there, 3 times 2, 4 and 6 on the unseen one."""
-    records = seeded(RECORDS, "woven", (4, 5, 6))
-    table = error_table(records)
-    woven = row(table, method="woven", role="seen")
+    """MSE of 2, 4 and 6 on the seen fabrics; 2 points have 8 there."""
+    records = retrained(RECORDS, {"woven": (4, 5, 6)})
+    woven = row(error_table(records), method="woven", role="seen")
     assert (woven.seeds, woven.mse, woven.mse_least, woven.mse_most) == pytest.approx((3, 4.0, 2.0, 6.0))
     assert (woven.ratio, woven.ratio_least, woven.ratio_most) == pytest.approx((2.0, 8 / 6, 8 / 2))
-    points = row(table, method="point_sampled", setting="k = 2", role="seen")
-    assert (points.seeds, points.mse) == (0, 8.0) and math.isnan(points.ratio_least)
-    assert table["method"].tolist() == error_table(RECORDS)["method"].tolist()
     alias = row(aliasing_table(records), method="woven")
     assert (alias.flicker, alias.flicker_least, alias.flicker_most) == pytest.approx((0.4, 0.2, 0.6))
-    assert fabric_table(records)["woven"].tolist() == pytest.approx([2.0, 6.0, 4.0])
-    least, most = (fabric_table(records, end) for end in (min, max))
-    assert least["woven"].tolist() == [1.0, 3.0, 2.0] and most["woven"].tolist() == [3.0, 9.0, 6.0]
-    assert summary_table(records).loc[("woven", ""), "× lower, seen"] == pytest.approx(2.0)
+    for statistic, factor in ((mean, 2.0), (min, 1.0), (max, 3.0)):
+        assert fabric_table(records, statistic)["woven"].tolist() == [factor, 3.0 * factor, 2.0 * factor]
+    assert picture_table(records).equals(picture_table(RECORDS)), "pictures are of the first training"
 
 
 def test_means_over_fabrics_and_albedos_lie_within_the_range_of_the_trainings():
@@ -221,18 +205,11 @@ def test_means_over_fabrics_and_albedos_lie_within_the_range_of_the_trainings():
     assert [getattr(albedo, f"furnace_diffuse{end}") for end in ("", "_least", "_most")] == [32.0] * 3
 
 
-def test_one_training_changes_no_number_of_the_tables_and_pictures_are_of_the_first():
-    once, before = error_table(seeded(RECORDS, "woven", (3,))), error_table(RECORDS)
-    assert once.drop(columns="seeds").equals(before.drop(columns="seeds"))
-    assert row(once, method="woven", role="seen").seeds == 1
-    assert picture_table(seeded(RECORDS, "woven", (0, 1))).equals(picture_table(RECORDS))
-
-
 def test_a_network_trained_once_has_no_range_on_a_single_unseen_fabric():
-    once = seeded(RECORDS, "woven", (3,))
+    once = retrained(RECORDS, {"woven": (3,)})
     assert unranged(error_table(once)) == {("unseen", "woven", "")}
     assert math.isnan(summary_table(once).loc[("woven", ""), "× lower, unseen"])
-    assert unranged(error_table(RECORDS)) == unranged(error_table(seeded(RECORDS, "woven", (4, 5)))) == set()
+    assert unranged(error_table(RECORDS)) == unranged(error_table(retrained(RECORDS, {"woven": (4, 5)}))) == set()
 
 
 def test_intervals_over_fabrics():
@@ -244,13 +221,6 @@ def test_intervals_over_fabrics():
     assert over_fabrics([0.3]) == pytest.approx((0.3, math.nan, math.nan), nan_ok=True)
     for lost in ([], [0.1, 0.0], [0.1, -0.2], [0.1, math.nan], [0.1, math.inf]):
         assert all(map(math.isnan, over_fabrics(lost))), "errors lost in the noise have no mean"
-
-
-def test_intervals_hold_the_true_mean_in_95_of_100_draws():
-    """4000 draws of 9 fabrics: a share of .95 has a standard error of .0034; four of them are allowed."""
-    draws = np.random.default_rng(0).lognormal(-3.0, 0.8, (4000, 9))
-    held = [low <= math.exp(-3.0) <= high for _, low, high in map(over_fabrics, draws)]
-    assert abs(np.mean(held) - 0.95) < 0.014
 
 
 def test_ratios_are_those_of_the_same_fabric():
