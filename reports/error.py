@@ -29,9 +29,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from pipeline.compiled.arrays import Float64
 from pipeline.truth.query import Answers
-
-Floats = npt.NDArray[np.float64]
 
 COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])
 """Colours of the colour measure: one channel, (4, 1)."""
@@ -91,36 +90,13 @@ def squared_error(
     return Error(value, spread, low, high, measured, noise, float(t.mean()), len(rows))
 
 
-def relative_squared_error(
-    values: npt.ArrayLike,
-    truth: npt.ArrayLike,
-    standard_error: npt.ArrayLike,
-    epsilon: float = 0.01,
-    resamples: int = 500,
-) -> Error:
-    """Return the mean squared error relative to the truth's own square, noise of the truth subtracted.
-
-    Parameters
-    ----------
-    values, truth, standard_error : array_like (N, ...)
-        One row a query or pixel; further axes are channels.
-    epsilon : float
-        Share of the truth's squared mean that is added to the truth's square; positive.
-    resamples : int
-        As in `squared_error`.
-    """
-    weight = relative_weight(truth, epsilon)
-    m, t, s = (np.asarray(array, np.float64) * weight for array in (values, truth, standard_error))
-    return squared_error(m, t, s, resamples)
-
-
-def relative_weight(truth: npt.ArrayLike, epsilon: float = 0.01) -> Floats:
+def relative_weight(truth: npt.ArrayLike, epsilon: float = 0.01) -> Float64:
     """Return 1 / sqrt(t^2 + epsilon <t>^2), in the truth's shape; the truth may not be zero everywhere."""
     t = np.asarray(truth, np.float64)
     return np.asarray(1.0 / np.sqrt(t**2 + epsilon * t.mean() ** 2))
 
 
-def colour_error(values: npt.ArrayLike, answers: Answers, colours: Floats, resamples: int = 500) -> Error:
+def colour_error(values: npt.ArrayLike, answers: Answers, colours: Float64, resamples: int = 500) -> Error:
     """Return the mean squared error in colour.
 
     Parameters
@@ -157,12 +133,12 @@ def component_errors(values: npt.ArrayLike, answers: Answers) -> list[Error]:
     ]
 
 
-def colour_noise(answers: Answers, colours: Floats) -> Floats:
+def colour_noise(answers: Answers, colours: Float64) -> Float64:
     """Return the standard error of the truth in colour, (N, channels), components taken to be uncorrelated."""
     return np.asarray(np.sqrt(_coloured(answers.standard_error.astype(np.float64) ** 2, colours**2)))
 
 
-def _coloured(components: Floats, colours: Floats) -> Floats:
+def _coloured(components: Float64, colours: Float64) -> Float64:
     """Return components (N, 4) in colours (4, channels) or (N, 4, channels)."""
     return np.asarray(np.einsum("nj,jc->nc" if colours.ndim == 2 else "nj,njc->nc", components, colours))
 
@@ -185,7 +161,7 @@ def ratio(numerator: tuple[float, float], denominator: tuple[float, float]) -> t
     return a / b, a / b * math.exp(-spread), a / b * math.exp(spread)
 
 
-def _interval(rows: Floats, value: float, spread: float, resamples: int) -> tuple[float, float]:
+def _interval(rows: Float64, value: float, spread: float, resamples: int) -> tuple[float, float]:
     if resamples < 2 or len(rows) < 2 or spread == 0.0:
         return value - 1.96 * spread, value + 1.96 * spread
     result = stats.bootstrap(

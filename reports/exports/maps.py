@@ -15,14 +15,7 @@ import numpy.typing as npt
 from pipeline.folders import own_files
 from pipeline.materials.lobes import SHEEN_ROUGHNESS, reflectance
 from pipeline.materials.planes import Layout, layout, planes, yarn_ids
-from pipeline.materials.textures import (
-    Constants,
-    Textures,
-    across_direction,
-    constants,
-    openpbr_roughness,
-    textures,
-)
+from pipeline.materials.textures import Constants, Textures, across_direction, constants, openpbr_roughness, textures
 from reports.exports.materials import (
     DOCUMENT,
     LARGEST_TEXTURE,

@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.materials.lobes import SHEEN_ROUGHNESS
 from pipeline.materials.planes import Layout
 from pipeline.materials.textures import Constants, Textures, across_direction, gltf_strength
@@ -38,8 +39,6 @@ LINEAR: Final = "lin_rec709"
 
 LARGEST_TEXTURE: Final = 1024
 """Longest side of the textures in the file."""
-
-Floats = npt.NDArray[np.float64]
 
 
 def yarns_per_cm(fabric: Fabric) -> tuple[float, float]:
@@ -134,29 +133,14 @@ def _library() -> Any:
     return library
 
 
-class _Mesh(NamedTuple):
-    """Vertices in metres, y up, with unit normals and tangents, texture coordinates, and triangles."""
-
-    points: Floats
-    normals: Floats
-    tangents: Floats
-    uv: Floats
-    faces: npt.NDArray[np.uint32]
-
-
 def write_sample(path: Path, fabric: Fabric, shown: Layout, level: Textures, material: Constants) -> None:
     """Write the sample as GLB, with the maps of one level embedded."""
     import pygltflib as gltf
 
     file = _File(gltf)
-    mesh = _draped(fabric, shown)
-    attributes = gltf.Attributes(
-        POSITION=file.vertices(mesh.points, gltf.VEC3),
-        NORMAL=file.vertices(mesh.normals, gltf.VEC3),
-        TANGENT=file.vertices(mesh.tangents, gltf.VEC4),
-        TEXCOORD_0=file.vertices(mesh.uv, gltf.VEC2),
-    )
-    corners = file.array(mesh.faces.reshape(-1, 1), gltf.SCALAR, gltf.UNSIGNED_INT, gltf.ELEMENT_ARRAY_BUFFER)
+    vertices, faces = _draped(fabric, shown)
+    attributes = gltf.Attributes(**{name: file.vertices(values) for name, values in vertices.items()})
+    corners = file.array(faces.reshape(-1, 1), gltf.SCALAR, gltf.UNSIGNED_INT, gltf.ELEMENT_ARRAY_BUFFER)
     primitive = gltf.Primitive(attributes=attributes, indices=corners, material=0)
     document = file.document
     document.meshes.append(gltf.Mesh(name=fabric.name, primitives=[primitive]))
@@ -182,10 +166,7 @@ def _material(gltf: Any, file: _File, name: str, level: Textures, material: Cons
         "KHR_materials_anisotropy": {"anisotropyStrength": 1.0, "anisotropyTexture": {"index": turned}},
         "KHR_materials_specular": {"specularFactor": 1.0, "specularColorTexture": {"index": specular}},
         "KHR_materials_ior": {"ior": material.ior},
-        "KHR_materials_sheen": {
-            "sheenColorFactor": material.sheen.tolist(),
-            "sheenRoughnessFactor": SHEEN_ROUGHNESS,
-        },
+        "KHR_materials_sheen": {"sheenColorFactor": material.sheen.tolist(), "sheenRoughnessFactor": SHEEN_ROUGHNESS},
     }
     file.document.extensionsUsed = sorted(extensions)
     return gltf.Material(
@@ -216,8 +197,9 @@ class _File:
         self.document.samplers.append(gltf.Sampler(magFilter=gltf.LINEAR, minFilter=linear, wrapS=repeat, wrapT=repeat))
         self._bytes = b""
 
-    def vertices(self, values: Floats, kind: str) -> int:
+    def vertices(self, values: Float64) -> int:
         """Add an attribute of the vertices, and return its index."""
+        kind = f"VEC{values.shape[1]}"
         return self.array(values.astype(np.float32), kind, self.gltf.FLOAT, self.gltf.ARRAY_BUFFER)
 
     def array(self, values: npt.NDArray[Any], kind: str, component: int, target: int) -> int:
@@ -250,8 +232,11 @@ class _File:
         return len(self.document.bufferViews) - 1
 
 
-def _draped(fabric: Fabric, shown: Layout) -> _Mesh:
-    """Return the mesh of the scene `drape`, in the size in which the cloth's yarns have their spacing."""
+def _draped(fabric: Fabric, shown: Layout) -> tuple[dict[str, Float64], npt.NDArray[np.uint32]]:
+    """Return the mesh of the scene `drape`, in the size in which the cloth's yarns have their spacing.
+
+    Attributes of its vertices by name, in metres, y up, with unit normals and tangents; and its triangles.
+    """
     points, normals, lengths = drape_surface()
     metres = DRAPE_YARNS * spacing_cm(fabric) / 100.0
     per_cm = np.array(yarns_per_cm(fabric))
@@ -262,16 +247,16 @@ def _draped(fabric: Fabric, shown: Layout) -> _Mesh:
     corner = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
     faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
-    return _Mesh(
-        _upright(points.reshape(-1, 3)) * metres,
-        _upright(normals.reshape(-1, 3)),
-        np.concatenate([_upright(tangents[..., :3].reshape(-1, 3)), tangents[..., 3:].reshape(-1, 1)], axis=-1),
-        (uv * (1.0, -1.0) + (0.0, 1.0)).reshape(-1, 2),
-        faces,
-    )
+    tangents = np.concatenate([_upright(tangents[..., :3].reshape(-1, 3)), tangents[..., 3:].reshape(-1, 1)], axis=-1)
+    return {
+        "POSITION": _upright(points.reshape(-1, 3)) * metres,
+        "NORMAL": _upright(normals.reshape(-1, 3)),
+        "TANGENT": tangents,
+        "TEXCOORD_0": (uv * (1.0, -1.0) + (0.0, 1.0)).reshape(-1, 2),
+    }, faces
 
 
-def _tangents(points: Floats, normals: Floats, uv: Floats) -> Floats:
+def _tangents(points: Float64, normals: Float64, uv: Float64) -> Float64:
     """Return the unit direction of growing u at every vertex, and 1 where growing v is at its left, else -1."""
     p_row, p_column, t_row, t_column = (np.asarray(np.gradient(v, axis=a)) for v in (points, uv) for a in (0, 1))
     determinant = t_column[..., 0] * t_row[..., 1] - t_row[..., 0] * t_column[..., 1]
@@ -283,6 +268,6 @@ def _tangents(points: Floats, normals: Floats, uv: Floats) -> Floats:
     return np.concatenate([along_u, np.where(left < 0.0, -1.0, 1.0)], axis=-1)
 
 
-def _upright(vectors: Floats) -> Floats:
+def _upright(vectors: Float64) -> Float64:
     """Turn vectors from z up to y up."""
     return np.stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]], axis=-1)

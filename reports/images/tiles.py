@@ -12,7 +12,7 @@ Tone curves of renderings of one's own, `EXPOSURE` 2^exposure times brighter, be
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, Final, Literal
 
@@ -173,16 +173,6 @@ STOPS: Final = 20.0
 """Largest exposure in either direction, in stops."""
 
 
-def _reinhard(rgb: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    return np.asarray(rgb / (1.0 + (rgb @ np.array(LUMINANCE))[..., None]))
-
-
-_CURVES: Final[dict[Tone, Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]]]] = {
-    "srgb": lambda rgb: rgb,
-    "reinhard": _reinhard,
-}
-
-
 def displayed(linear: npt.NDArray[np.floating], tone: Tone = "srgb", exposure: float = 0.0) -> Bytes8:
     """Return linear RGB (…, 3) as sRGB codes.
 
@@ -195,4 +185,5 @@ def displayed(linear: npt.NDArray[np.floating], tone: Tone = "srgb", exposure: f
     exposure : float
         Stops above the exposure of the page.
     """
-    return encoded(_CURVES[tone](EXPOSURE * 2.0**exposure * np.asarray(linear, np.float64)))
+    rgb = EXPOSURE * 2.0**exposure * np.asarray(linear, np.float64)
+    return encoded(rgb if tone == "srgb" else rgb / (1.0 + (rgb @ np.array(LUMINANCE))[..., None]))

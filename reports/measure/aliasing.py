@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from pipeline.compiled.arrays import Float64
 
 HALF_NYQUIST: Final = 0.25
 """Half the Nyquist frequency, in cycles a pixel."""
@@ -31,26 +31,21 @@ HALF_NYQUIST: Final = 0.25
 class TemporalSpectrum(NamedTuple):
     """Radially averaged power of pictures."""
 
-    frequency: Floats
+    frequency: Float64
     """Middle of each ring, in cycles a pixel, rising to .5."""
-    power: Floats
+    power: Float64
     """Mean P(k) in each ring."""
     high: float
     """Sum of P(k) beyond half the Nyquist frequency, corners of the square included."""
 
 
-def flicker(
-    frames: npt.ArrayLike,
-    truth: npt.ArrayLike,
-    noise: npt.ArrayLike = 0.0,
-    truth_noise: npt.ArrayLike = 0.0,
-) -> float:
+def flicker(frames: npt.ArrayLike, truth: npt.ArrayLike, truth_noise: npt.ArrayLike = 0.0) -> float:
     """Return the temporal variance beyond the truth's own, relative to the truth's squared mean.
 
-    Luminance of the same pixels, (F, ...), and the standard error of each value; 0 where values are exact.
+    Luminance of the same pixels, (F, ...), and the standard error of the truth's; 0 where it is exact.
     """
     scale = float(np.asarray(truth, np.float64).mean()) ** 2
-    return (temporal_variance(frames, noise) - temporal_variance(truth, truth_noise)) / scale
+    return (temporal_variance(frames) - temporal_variance(truth, truth_noise)) / scale
 
 
 def temporal_variance(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> float:
@@ -59,25 +54,20 @@ def temporal_variance(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> floa
     return float(variance - np.square(np.asarray(noise, np.float64)).mean())
 
 
-def temporal_variances(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Floats:
+def temporal_variances(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> Float64:
     """Return the variance over frames of each pixel, less the variance that noise adds."""
     values = np.asarray(frames, np.float64)
     squared = np.broadcast_to(np.square(np.asarray(noise, np.float64)), values.shape)
     return np.asarray(np.var(values, axis=0, ddof=1) - squared.mean(axis=0))
 
 
-def excess_energy(
-    frames: npt.ArrayLike,
-    truth: npt.ArrayLike,
-    noise: npt.ArrayLike = 0.0,
-    truth_noise: npt.ArrayLike = 0.0,
-) -> float:
+def excess_energy(frames: npt.ArrayLike, truth: npt.ArrayLike, truth_noise: npt.ArrayLike = 0.0) -> float:
     """Return the energy beyond half the Nyquist frequency above the truth's, relative to the truth's squared mean.
 
-    Luminance of the same rectangle of pixels, (F, H, W), and the standard error of each value.
+    Luminance of the same rectangle of pixels, (F, H, W), and the standard error of the truth's.
     """
     scale = float(np.asarray(truth, np.float64).mean()) ** 2
-    return (spectrum(frames, noise).high - spectrum(truth, truth_noise).high) / scale
+    return (spectrum(frames).high - spectrum(truth, truth_noise).high) / scale
 
 
 def spectrum(frames: npt.ArrayLike, noise: npt.ArrayLike = 0.0) -> TemporalSpectrum:

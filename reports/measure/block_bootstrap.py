@@ -15,15 +15,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from pipeline.compiled.arrays import Float64, Mask
 from reports.options import ImageOptions
 
-Floats = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
-
-def block_interval(
-    rows: Floats, mask: Mask, side: int = 16, resamples: int = 500, seed: int = 0
-) -> tuple[float, float, float]:
+def block_interval(rows: Float64, mask: Mask, options: ImageOptions) -> tuple[float, float, float]:
     """Return the standard error of a mean over pixels and the ends of its 95 % interval.
 
     Parameters
@@ -32,29 +28,29 @@ def block_interval(
         Values of the pixels of the mask, row by row.
     mask : bool (H, W)
         With N pixels, in two blocks at least.
-    side, resamples, seed : int
-        As in `blocks`; draws of the percentile bootstrap [Efron1993Bootstrap], and their seed.
+    options : ImageOptions
+        Side of a block as in `blocks`; draws of the percentile bootstrap [Efron1993Bootstrap], and their seed.
 
     Notes
     -----
     The mean of a draw is the sum of its values over the number of its pixels: blocks may be lit in part.
     """
-    block = blocks(mask, side)
+    block = blocks(mask, options.block)
     sums, counts = np.bincount(block, rows), np.bincount(block).astype(np.float64)
     found = stats.bootstrap(
         (sums, counts),
         lambda a, b, axis: a.sum(axis=axis) / b.sum(axis=axis),
         paired=True,
         vectorized=True,
-        n_resamples=resamples,
+        n_resamples=options.resamples,
         batch=max(1, 2_000_000 // len(sums)),
         method="percentile",
-        rng=np.random.default_rng(seed),
+        rng=np.random.default_rng(options.seed),
     )
     return float(found.standard_error), float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
-def blocks(mask: Mask, side: int = 16) -> npt.NDArray[np.intp]:
+def blocks(mask: Mask, side: int) -> npt.NDArray[np.intp]:
     """Return the number of the block of every pixel of the mask, (N,), without gaps.
 
     `side` is that of a block in pixels; at most a quarter of the picture's shorter side is used.
@@ -65,14 +61,10 @@ def blocks(mask: Mask, side: int = 16) -> npt.NDArray[np.intp]:
 
 
 def mse_difference(
-    a: npt.ArrayLike,
-    b: npt.ArrayLike,
-    truth: npt.ArrayLike,
-    mask: npt.NDArray[np.bool_],
-    options: ImageOptions,
+    a: npt.ArrayLike, b: npt.ArrayLike, truth: npt.ArrayLike, mask: Mask, options: ImageOptions
 ) -> tuple[float, float, float]:
     """Return the MSE of b less that of a, and its 95 % interval over blocks of pixels; pictures are linear RGB."""
     first, second, t = (np.asarray(picture, np.float64)[mask] for picture in (a, b, truth))
     rows = ((second - first) * (second + first - 2.0 * t)).mean(axis=1)
-    _, low, high = block_interval(rows, mask, options.block, options.resamples, options.seed)
+    _, low, high = block_interval(rows, mask, options)
     return float(rows.mean()), low, high

@@ -13,20 +13,18 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.fingerprint import fingerprint
+from pipeline.models.method import Method
 from reports.error import COLOUR_WEIGHTS, colour_error
 from reports.measure.held_out import HeldOutFabric
 from reports.measure.timing import Contender, affordable, time_side_by_side
 from reports.options import TimingOptions
 from reports.record import Metric, Record
-
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
 
 EDGES: Final = (0.0, 0.1, 0.3, 1.0, 3.0, math.inf)
 """Standard deviations between which footprints are of one class, in yarn spacings."""
@@ -37,7 +35,7 @@ WHOLE: Final = "all"
 SIZES: Final = ("below .1", ".1 to .3", ".3 to 1", "1 to 3", "above 3")
 """Names of the classes."""
 
-MEASURES: Final[dict[str, tuple[Metric, npt.NDArray[np.float64]]]] = {
+MEASURES: Final[dict[str, tuple[Metric, Float64]]] = {
     "colour": ("size_colour", COLOUR_WEIGHTS),
     "specular": ("size_specular", np.array([[1.0], [1.0], [0.0], [0.0]])),
     "diffuse": ("size_diffuse", np.array([[0.0], [0.0], [1.0], [1.0]])),
@@ -87,17 +85,16 @@ def measure_by_size(
             times[index].append((low, timing.quartiles[1]))
     records = []
     for index, method in enumerate(methods):
-        subject, errors = _errors(method, classes, shares, options.seed)
+        errors = _errors(method, classes, shares, options.seed)
         mean = sum(shares[low] * ns for low, ns in times[index])
-        records.append(subject.of("size_time", mean, errors[0].count, curve=tuple(times[index])))
-        records += errors
+        records += [errors[0].of("size_time", mean, errors[0].count, curve=tuple(times[index])), *errors]
     return records
 
 
 def measure_errors_by_size(methods: Sequence[Method], fabrics: Iterable[HeldOutFabric], seed: int) -> list[Record]:
     """Measure errors as `measure_by_size` does, without times; `seed` is that of random methods."""
     classes, shares = _classes(fabrics)
-    return [record for method in methods for record in _errors(method, classes, shares, seed)[1]]
+    return [record for method in methods for record in _errors(method, classes, shares, seed)]
 
 
 def _classes(fabrics: Iterable[HeldOutFabric]) -> tuple[dict[float, list[HeldOutFabric]], dict[float, float]]:
@@ -117,8 +114,8 @@ def _classes(fabrics: Iterable[HeldOutFabric]) -> tuple[dict[float, list[HeldOut
 
 def _errors(
     method: Method, classes: Mapping[float, Sequence[HeldOutFabric]], shares: Mapping[float, float], seed: int
-) -> tuple[Record, list[Record]]:
-    """Return the subject, and each error, the mean over fabrics; 0 where it is lost in the noise of the truth."""
+) -> list[Record]:
+    """Return each error, the mean over fabrics; 0 where it is lost in the noise of the truth."""
     curves: dict[str, list[tuple[float, float]]] = {name: [] for name in MEASURES}
     count = 0
     for low, members in classes.items():
@@ -136,6 +133,6 @@ def _errors(
     # Squared errors add up: over all classes they weigh as their queries occur.
     wholes = {name: math.sqrt(sum(shares[low] * error**2 for low, error in curve)) for name, curve in curves.items()}
     subject = Record(method=method.name, setting=method.setting)
-    return subject, [
+    return [
         subject.of(metric, wholes[name], count, curve=tuple(curves[name])) for name, (metric, _) in MEASURES.items()
     ]

@@ -17,11 +17,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64, Mask
+from pipeline.models.method import Method
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
@@ -29,9 +30,6 @@ from reports.error import COLOUR_WEIGHTS
 from reports.options import EXTREME_TRUTH, Role
 from reports.record import Metric, Record
 from weaves.fabric import Fabric
-
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
 
 FOOTPRINTS: Final = (1e-4, 1e-2, 1.0, 1e2, 1e4)
 """Standard deviations, in repeats: the square root of their area."""
@@ -48,7 +46,6 @@ LUSTROUS: Final = 0.01
 FAR: Final = 1e6
 """Distance of the far queries, in yarn spacings; single precision still holds sixteenths of a yarn there."""
 
-Array = npt.NDArray[np.float64]
 
 SHINY: Final = f", alpha = {LUSTROUS:g}"
 """Ending of the names of lustrous fabrics."""
@@ -71,9 +68,9 @@ class ExtremeInputs(NamedTuple):
     """Queries of all footprints, angles and places."""
     far: Queries
     """The same footprints a million yarns away."""
-    size: npt.NDArray[np.float64]
+    size: Float64
     """Footprint of each, in repeats."""
-    grazing: npt.NDArray[np.bool_]
+    grazing: Mask
     """True if light or viewer graze."""
 
 
@@ -94,9 +91,7 @@ def extremes(repeat: tuple[int, int]) -> ExtremeInputs:
 
 
 def measure_extremes(
-    families: Sequence[Sequence[Method]],
-    fabrics: Sequence[tuple[Fabric, Role]],
-    truth: TruthOptions = EXTREME_TRUTH,
+    families: Sequence[Sequence[Method]], fabrics: Sequence[tuple[Fabric, Role]], truth: TruthOptions = EXTREME_TRUTH
 ) -> list[Record]:
     """Measure methods, each followed by its lower precisions, at their extremes on the cloths that they cover.
 
@@ -115,7 +110,7 @@ def measure_extremes(
             continue
         true = estimate(fabric, inputs.queries, truth, 0).mean.astype(np.float64)
         for family in covering:
-            own: Array | None = None
+            own: Float64 | None = None
             for method in family:
                 subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, role=role)
                 method.prepare(fabric)
@@ -128,8 +123,8 @@ def measure_extremes(
 
 
 def _measured(
-    subject: Record, method: Method, fabric: Fabric, inputs: ExtremeInputs, truth: Array
-) -> tuple[Array, list[Record]]:
+    subject: Record, method: Method, fabric: Fabric, inputs: ExtremeInputs, truth: Float64
+) -> tuple[Float64, list[Record]]:
     """Return a method's answers and the measurements of them alone."""
     near, far = (_evaluated(method, fabric, queries) for queries in (inputs.queries, inputs.far))
     wide, wider = (_evaluated(method, fabric, inputs.queries.take(inputs.size == size)) for size in FOOTPRINTS[-2:])
@@ -151,7 +146,7 @@ def _measured(
     return near, records
 
 
-def _evaluated(method: Method, fabric: Fabric, queries: Queries) -> Array:
+def _evaluated(method: Method, fabric: Fabric, queries: Queries) -> Float64:
     with np.errstate(all="ignore"):  # what is not finite is counted
         return method.predict(fabric, queries, 0).astype(np.float64)
 
@@ -160,7 +155,7 @@ def _of(subject: Record, metric: Metric, value: float, count: int) -> list[Recor
     return [subject.of(metric, value, count)] if math.isfinite(value) else []
 
 
-def _relative(answers: Array, truth: Array) -> float:
+def _relative(answers: Float64, truth: Float64) -> float:
     """Return the relative RMSE of the colour measure over rows that are finite; NaN if there is none."""
     finite = np.isfinite(answers).all(axis=1) & np.isfinite(truth).all(axis=1)
     value, reference = (x[finite] @ COLOUR_WEIGHTS for x in (answers, truth))
@@ -168,7 +163,7 @@ def _relative(answers: Array, truth: Array) -> float:
     return float(np.linalg.norm(value - reference)) / size if size else math.nan
 
 
-def _largest(answers: Array, others: Array) -> float:
+def _largest(answers: Float64, others: Float64) -> float:
     """Return the largest difference over the largest of the others; NaN if no row is finite in both."""
     finite = np.isfinite(answers).all(axis=1) & np.isfinite(others).all(axis=1)
     largest = float(np.abs(others[finite]).max(initial=0.0))
@@ -180,6 +175,6 @@ def error_name(size: float) -> str:
     return "error_" + f"{size:g}".replace("-", "m").replace(".", "p")
 
 
-def _direction(theta: npt.NDArray[np.float64], phi: float) -> npt.NDArray[np.float32]:
+def _direction(theta: Float64, phi: float) -> Float32:
     sine, cosine = np.sin(np.radians(theta)), np.cos(np.radians(theta))
     return np.stack([sine * math.cos(phi), sine * math.sin(phi), cosine], axis=-1).astype(np.float32)

@@ -6,12 +6,14 @@ The truth's frames are one OpenEXR: luminance Y and its standard error, one fram
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.fingerprint import fingerprint
+from pipeline.models.method import Method
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.shade import coloured, shade
 from pipeline.scenes.views import view
@@ -25,28 +27,18 @@ from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric
 
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
-
-Floats = npt.NDArray[np.float64]
-
 _LUMINANCE = np.array(LUMINANCE)[:, None]
 
 
 class _Frames(NamedTuple):
     """The truth's frames under unit irradiance."""
 
-    truth: Floats
+    truth: Float64
     """Luminance, (F, H, W); 0 where no cloth is lit."""
-    noise: Floats
+    noise: Float64
     """Its standard error."""
-    lit: npt.NDArray[np.bool_]
+    lit: Mask
     """Pixels that show lit cloth, (H, W); the same in every frame."""
-
-    @property
-    def rows(self) -> npt.NDArray[np.bool_]:
-        """Rows that are lit from end to end, (H,): the rectangle whose spectrum is taken."""
-        return np.asarray(self.lit.all(axis=1))
 
 
 def render_frames(fabric: Fabric, options: FrameOptions, path: Path) -> None:
@@ -84,10 +76,10 @@ def measure_aliasing(method: Method, fabric: Fabric, options: FrameOptions, fram
         values = method.predict(fabric, queries, seed)
         planes.append(_spread(gbuffer, shade(fabric, values, queries) @ _LUMINANCE))
     shown = np.array(planes)
-    lit, rows = reference.lit, reference.rows
+    lit, rows = reference.lit, reference.lit.all(axis=1)  # the spectrum is of rows that are lit from end to end
     subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, scene="plane")
-    motion = flicker(shown[:, lit], reference.truth[:, lit], 0.0, reference.noise[:, lit])
-    energy = excess_energy(shown[:, rows], reference.truth[:, rows], 0.0, reference.noise[:, rows])
+    motion = flicker(shown[:, lit], reference.truth[:, lit], reference.noise[:, lit])
+    energy = excess_energy(shown[:, rows], reference.truth[:, rows], reference.noise[:, rows])
     return [
         subject.of("flicker", motion, options.frames),
         subject.of("excess_energy", energy, options.frames),
@@ -98,7 +90,7 @@ def measure_aliasing(method: Method, fabric: Fabric, options: FrameOptions, fram
 def measure_truth_frames(fabric: Fabric, options: FrameOptions, frames: Path) -> list[Record]:
     """Measure the truth's own frames: the variance that the motion brings, and their spectrum."""
     reference = _read(frames, options)
-    lit, rows = reference.lit, reference.rows
+    lit, rows = reference.lit, reference.lit.all(axis=1)  # the spectrum is of rows that are lit from end to end
     subject = Record(method=TRUTH, fabric=fabric.name, scene="plane")
     own = temporal_variance(reference.truth[:, lit], reference.noise[:, lit])
     mean = float(reference.truth[:, lit].mean())
@@ -119,14 +111,14 @@ def _read(path: Path, options: FrameOptions) -> _Frames:
     return _Frames(truth, noise, _view(options, 0).lit)
 
 
-def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Floats:
+def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Float64:
     """Spread the values of lit pixels, (N, 1), over the picture, (H, W); 0 elsewhere."""
     plane = np.zeros(gbuffer.lit.shape)
     plane[gbuffer.lit] = values[:, 0]
     return plane
 
 
-def _spectrum(subject: Record, frames: Floats, noise: Floats, mean: float) -> Record:
+def _spectrum(subject: Record, frames: Float64, noise: Float64, mean: float) -> Record:
     """Return the radially averaged spectrum, relative to the squared mean of the truth."""
     found = spectrum(frames, noise)
     curve = tuple((float(k), float(p) / mean**2) for k, p in zip(found.frequency, found.power, strict=True))

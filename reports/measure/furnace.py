@@ -11,17 +11,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from pipeline.models.method import Method
 from pipeline.scenes.shade import colours
 from pipeline.truth.query import Queries
 from reports.record import Metric, Record
 from weaves.fabric import Fabric
-
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
 
 ANGLES: Final = (0.0, 30.0, 60.0, 80.0, 88.0)
 """Angles of the viewer to the normal, degrees."""

@@ -13,39 +13,41 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import count, cycle, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32
 from pipeline.cores import cores
 from pipeline.fingerprint import fingerprint
 from pipeline.models.added.guarded import Guarded, load_function
+from pipeline.models.method import Method
 from pipeline.scenes.shade import colours_of
 from pipeline.shards.manifest import Manifest
+from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.catalogue import AddedMetric, enter
 from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors, most_error
 from reports.measure.memory import peak_memory
-from reports.measure.timing import Contender, affordable, milliseconds, quartiles, thread_counts, time_side_by_side
+from reports.measure.timing import (
+    Contender,
+    affordable,
+    milliseconds,
+    quartiles,
+    thread_counts,
+    time_side_by_side,
+    timed,
+)
 from reports.options import TimingOptions
 from reports.record import TRUTH, Metric, Record
 from weaves.fabric import Fabric
 
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
-
 EDITS: Final = 5
 """Fabrics never seen before that a method is timed to prepare."""
 
-_COMPONENT_METRICS: Final[tuple[Metric, ...]] = (
-    "rrmse_specular_warp",
-    "rrmse_specular_weft",
-    "rrmse_diffuse_warp",
-    "rrmse_diffuse_weft",
-)
+_COMPONENT_METRICS: Final[tuple[Metric, ...]] = tuple(f"rrmse_{name}" for name in COMPONENTS)
 
 
 class HeldOutFabric(NamedTuple):
@@ -55,7 +57,7 @@ class HeldOutFabric(NamedTuple):
     queries: Queries
     truth: Answers
 
-    def answered(self, method: Method, seed: int) -> tuple[npt.NDArray[np.float32], Record]:
+    def answered(self, method: Method, seed: int) -> tuple[Float32, Record]:
         """Return the answers of a method that covers the fabric, and the subject of its Records."""
         method.prepare(self.fabric)
         own = int(fingerprint(["errors", self.fabric.name, seed]), 16)
@@ -164,12 +166,10 @@ def _times(
     )
     records = []
     for (subject, contender), timing in zip(runs, timings, strict=True):
-        low, median, high = timing.quartiles
         about = subject.model_copy(update={"note": f"{len(contender.queries[0][1].u)} queries a fabric"})
-        repeats, samples = len(timing.samples), timing.samples
-        records.append(about.of("time", median, repeats, low=low, high=high, samples=samples))
+        records.append(timed(about, "time", timing.samples))
         if math.isfinite(timing.waited):
-            records.append(subject.of("waited", timing.waited, repeats))
+            records.append(subject.of("waited", timing.waited, len(timing.samples)))
     return records
 
 
@@ -198,5 +198,4 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
         if not method.covers(new):
             return []
         times.append(milliseconds(partial(method.prepare, new)))
-    low, median, high = quartiles(times)
-    return [subject.of("prepare_time", median, len(times), low=low, high=high, samples=tuple(times))]
+    return [timed(subject, "prepare_time", times)]

@@ -15,24 +15,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Final, Literal, Protocol, runtime_checkable
+from typing import Final, Literal, Protocol, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32
+from pipeline.models.method import Method
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.error import COLOUR_WEIGHTS, colour_error
-from reports.measure.timing import milliseconds, quartiles
+from reports.measure.timing import milliseconds, timed
 from reports.options import LATENT_PAIRS
 from reports.record import Metric, Record
 from weaves.fabric import Fabric, load_fabric
 from weaves.yarn import Yarn
-
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
 
 SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Positions between the first fabric (0) and the second (1) at which errors are measured."""
@@ -66,7 +64,7 @@ class Pair:
 class Blends(Protocol):
     """A method that answers for a blend of two fabrics."""
 
-    def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> npt.NDArray[np.float32]:
+    def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> Float32:
         """Answer N queries from latents blended by `share`, float32 (N, 4)."""
 
 
@@ -130,14 +128,12 @@ def measure_edits(method: Method, fabric: Fabric, repeats: int = EDITS) -> list[
     for about, edits in (("a yarn", yarns), ("a colour", colours)):
         edited = [fabric.model_copy(update={"warp": fabric.warp.model_copy(update=edit)}) for edit in edits]
         # The first call warms up.
-        times = tuple(milliseconds(partial(method.prepare, one)) for one in edited)[1:]
-        low, median, high = quartiles(times)
-        found = subject.model_copy(update={"note": about})
-        records.append(found.of("encode_time", median, repeats, low=low, high=high, samples=times))
+        times = [milliseconds(partial(method.prepare, one)) for one in edited][1:]
+        records.append(timed(subject.model_copy(update={"note": about}), "encode_time", times))
     return records
 
 
-def _along(method: Method, pair: Pair, queries: Queries) -> Iterator[tuple[Metric, list[npt.NDArray[np.float32]]]]:
+def _along(method: Method, pair: Pair, queries: Queries) -> Iterator[tuple[Metric, list[Float32]]]:
     """Yield both ways from the first fabric to the second, each with the method's answers at every share."""
     assert isinstance(method, Blends)
     yield "path_error", [method.predict_between(pair.first, pair.second, share, queries) for share in SHARES]

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Mask
 from pipeline.fingerprint import fingerprint
+from pipeline.models.method import Method
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import View
 from pipeline.scenes.shade import coloured, compose, shade
@@ -26,9 +28,6 @@ from reports.images.exr import RGB, read_exr, write_exr
 from reports.options import PictureOptions
 from reports.record import TRUTH, Record
 from weaves.fabric import Fabric
-
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
 
 ERROR: Final = ("error.R", "error.G", "error.B")
 """Channels of its standard error."""
@@ -76,7 +75,7 @@ def render_method(
 def write_picture(
     path: Path,
     picture: npt.NDArray[np.floating],
-    mask: npt.NDArray[np.bool_],
+    mask: Mask,
     about: Mapping[str, str | float],
     noise: npt.NDArray[np.floating] | None = None,
     layers: Mapping[str, npt.ArrayLike] = MappingProxyType({}),

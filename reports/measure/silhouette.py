@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.models.method import Method
 from pipeline.scenes.shade import shade
 from pipeline.truth.estimator import estimate
@@ -30,23 +30,21 @@ from reports.options import EdgeOptions
 from reports.record import TRUTH, Record
 from weaves.fabric import Fabric
 
-Floats = npt.NDArray[np.float64]
-
 
 @runtime_checkable
 class SeesThrough(Protocol):
     """A method that knows which share of camera rays misses a curved cloth."""
 
-    def missed(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.float32]:
+    def missed(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,)."""
 
 
 class Edge(NamedTuple):
     """Pictures of the strip, the outline at the right."""
 
-    coverage: Floats
+    coverage: Float64
     """Share of a pixel that the cloth hides, (H, W)."""
-    light: Floats
+    light: Float64
     """Linear RGB, (H, W, 3)."""
 
 
@@ -130,13 +128,7 @@ def measure_silhouette(method: Method, fabric: Fabric, options: EdgeOptions, tru
     ]
 
 
-def _edge(
-    fabric: Fabric,
-    queries: Queries,
-    coverage: npt.NDArray[np.float32],
-    components: npt.NDArray[np.float32],
-    options: EdgeOptions,
-) -> Edge:
+def _edge(fabric: Fabric, queries: Queries, coverage: Float32, components: Float32, options: EdgeOptions) -> Edge:
     colour = shade(fabric, components, queries)
     cover = coverage.astype(np.float64).reshape(options.rows, -1)
     return Edge(cover, math.pi * cover[..., None] * colour.reshape(*cover.shape, 3))

@@ -22,6 +22,7 @@ import numpy as np
 
 from pipeline.cores import cores
 from pipeline.truth.query import Queries
+from reports.record import Metric, Record
 from weaves.fabric import Fabric
 
 Predict = Callable[[Fabric, Queries], object]
@@ -60,8 +61,6 @@ class CallTiming(NamedTuple):
 
     samples: tuple[float, ...]
     """Times of all repeats, in their order."""
-    rows: int
-    """Queries in each of them."""
     waited: float = math.nan
     """Share of the time on one thread in which that thread did not run, because others did; NaN on several threads."""
 
@@ -100,9 +99,7 @@ def time_side_by_side(
                 ran[index] += time.thread_time_ns() - ran_before
             progress((warm_up + turn + 1) / (warm_up + repeats))
     return [
-        CallTiming(
-            tuple(reading / contender.rows for reading in readings), contender.rows, _waited(contender, readings, own)
-        )
+        CallTiming(tuple(reading / contender.rows for reading in readings), _waited(contender, readings, own))
         for contender, readings, own in zip(contenders, elapsed, ran, strict=True)
     ]
 
@@ -141,6 +138,12 @@ def quartiles(samples: Sequence[float]) -> tuple[float, float, float]:
     """Return first quartile, median and third quartile."""
     low, median, high = (float(q) for q in np.percentile(samples, [25, 50, 75]))
     return low, median, high
+
+
+def timed(subject: Record, metric: Metric, samples: Sequence[float]) -> Record:
+    """Return repeated readings as a Record: their median, their quartiles as its ends, and themselves."""
+    low, median, high = quartiles(samples)
+    return subject.of(metric, median, len(samples), low=low, high=high, samples=tuple(samples))
 
 
 def milliseconds(action: Callable[[], object], clock: Callable[[], int] = time.perf_counter_ns) -> float:

@@ -26,7 +26,11 @@ def write_files(folder: Path, names: Iterable[str]) -> None:
     One that was changed since it was listed stays.
     """
     hashes = {name: file_sha256(folder / name) for name in sorted(names)}
-    for name, sha256 in _found(folder).items():
+    try:
+        earlier = read_files(folder)
+    except BadInput:
+        earlier = {}
+    for name, sha256 in earlier.items():
         if name not in hashes and (folder / name).is_file() and file_sha256(folder / name) == sha256:
             (folder / name).unlink()
     atomic_write(folder / FILES, json.dumps(hashes, indent=1).encode() + b"\n")
@@ -44,11 +48,3 @@ def read_files(folder: Path) -> dict[str, str]:
     if any(Path(name).is_absolute() or ".." in Path(name).parts for name in hashes):
         raise BadInput(str(path), "", "names files outside of its folder", "write the page again")
     return hashes
-
-
-def _found(folder: Path) -> dict[str, str]:
-    """Return the list of an earlier page; empty if there is none."""
-    try:
-        return read_files(folder)
-    except BadInput:
-        return {}

@@ -6,12 +6,11 @@ import re
 from collections.abc import Collection, Mapping
 from typing import Any, Final
 
-import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from pipeline.compiled.arrays import Float64
 from reports.catalogue import METRICS
 from reports.images import tiles
 from reports.images.tiles import EXPOSURE, hex_colour
@@ -180,6 +179,6 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
     }
 
 
-def _chips(threads: npt.NDArray[np.float64]) -> list[str]:
+def _chips(threads: Float64) -> list[str]:
     """Return the different colours of some threads (n, 3) as they are shown, in their order."""
     return list(dict.fromkeys(hex_colour((EXPOSURE * rgb).tolist()) for rgb in threads))[:_MOST_CHIPS]

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
 
+from pipeline.compiled.arrays import Float64
 from reports.page.colours import Scheme
 
 DISTANCES: Final = (7.0, 13.0, 20.0, 28.0, 38.0, 50.0, 64.0, 80.0, 100.0)
@@ -33,8 +33,6 @@ CLEARANCE: Final = 1.5
 """Least distance of a label from others, in points."""
 MARK: Final = 5.0
 """Half a mark, edge included, in points."""
-
-Points = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: 
     figure.draw_without_rendering()  # the layout moves the axes
     make: Any = RendererAgg  # has no types
     renderer, pixels = make(*figure.bbox.size, figure.dpi), figure.dpi / 72.0
-    used: dict[Axes, list[Points]] = {}
+    used: dict[Axes, list[Float64]] = {}
     written = []
     for label in labels:
         axes = label.axes
@@ -92,8 +90,8 @@ def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: 
 
 
 def _free_place(
-    mark: Points, half: Points, taken: Points, panel: Points, curves: Points, pixels: float
-) -> tuple[Points, float]:
+    mark: Float64, half: Float64, taken: Float64, panel: Float64, curves: Float64, pixels: float
+) -> tuple[Float64, float]:
     """Return the place of least cost at the nearest distance that has a free one: its offset, and the distance.
 
     Parameters
@@ -105,7 +103,7 @@ def _free_place(
     panel : float64 (4,)
         Box that the label may not leave.
     curves : float64 (M, 2)
-        Points along curves.
+        Float64 along curves.
     """
     # Turns alternate left and right of the first direction.
     turns = np.array([(-1) ** turn * -(-turn // 2) for turn in range(_DIRECTIONS)])
@@ -127,21 +125,21 @@ def _free_place(
     return offset, distance
 
 
-def _overlaps(boxes: Points, others: Points) -> Points:
+def _overlaps(boxes: Float64, others: Float64) -> Float64:
     """Return the area that each box (N, 4) shares with other boxes (M, 4), summed over these: (N,)."""
     lower = np.maximum(boxes[:, None, :2], others[:, :2])
     upper = np.minimum(boxes[:, None, 2:], others[:, 2:])
     return np.asarray(np.maximum(upper - lower, 0.0).prod(axis=-1).sum(axis=-1))
 
 
-def _marks(axes: Axes, half: float) -> list[Points]:
+def _marks(axes: Axes, half: float) -> list[Float64]:
     """Return the boxes of all marks of curves and of scattered points."""
     curves = [np.asarray(line.get_xydata(), np.float64) for line in axes.lines if line.get_marker() != "None"]
     points = np.concatenate([np.empty((0, 2)), *curves, *(np.asarray(c.get_offsets()) for c in axes.collections)])
     return [np.concatenate([place - half, place + half]) for place in axes.transData.transform(points)]
 
 
-def _curves(axes: Axes) -> Points:
+def _curves(axes: Axes) -> Float64:
     """Return points a pixel apart along all curves, (N, 2)."""
     points = [np.empty((0, 2))]
     for line in axes.lines:

@@ -50,10 +50,7 @@ class Strip:
 
 
 def strips(
-    pictures: Sequence[PictureFile],
-    order: Mapping[str, str],
-    scenes: Sequence[str],
-    errors: Sequence[pd.DataFrame],
+    pictures: Sequence[PictureFile], order: Mapping[str, str], scenes: Sequence[str], errors: Sequence[pd.DataFrame]
 ) -> list[Strip]:
     """Return the views of the fabrics, then the scenes.
 
@@ -94,13 +91,9 @@ def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
         own = sorted((f for f in pictures if not f.fabric and f.scene == scene), key=lambda f: f.method != TRUTH)
         once = list({file.method: file for file in reversed(own)}.values())[::-1]
         once.sort(key=own.index)
-        rank = {file: index for index, file in enumerate(sorted(once, key=_least_wanted))}
-        result[scene] = [file for file in once if rank[file] < MOST_FILMS]
+        wanted = sorted(once, key=lambda file: file.method != TRUTH and (file.method, file.setting) != BASELINE)
+        result[scene] = [file for file in once if file in wanted[:MOST_FILMS]]
     return result
-
-
-def _least_wanted(file: PictureFile) -> bool:
-    return file.method != TRUTH and (file.method, file.setting) != BASELINE
 
 
 class Crop(NamedTuple):

@@ -189,7 +189,8 @@ def holm(p_values: Sequence[float]) -> list[float]:
 def _comparable(records: Iterable[Record]) -> dict[_Key, Record]:
     """Return times and errors by what they are of."""
     chosen = (r for r in records if r.metric in TIMES or (r.metric == "mse" and r.scene == "queries"))
-    return {_key(record): record for record in chosen}
+    edits = ((r, r.note if r.metric == "encode_time" else "") for r in chosen)
+    return {(r.metric, r.method, r.setting, r.fabric, r.threads, edit): r for r, edit in edits}
 
 
 def _extents(*benchmarks: Sequence[Record]) -> dict[_Key, float]:
@@ -202,11 +203,6 @@ def _extents(*benchmarks: Sequence[Record]) -> dict[_Key, float]:
             if counts[record.method, record.setting] > 1:
                 extents[key] = max(extents.get(key, 0.0), record.value - least[key].value)
     return extents
-
-
-def _key(record: Record) -> _Key:
-    edit = record.note if record.metric == "encode_time" else ""
-    return record.metric, record.method, record.setting, record.fabric, record.threads, edit
 
 
 def _test(a: Record, b: Record) -> tuple[float, float]:

@@ -17,16 +17,7 @@ from reports.record import Machine, Record
 from reports.tables.number_format import NONE, fixed_to, listed, scientific, times
 from reports.tables.page_tables import page_frames, sections
 from reports.tables.sentences import BOUNDED
-from reports.tables.summary import (
-    BASELINE,
-    PAPER,
-    error_table,
-    of_baseline,
-    over_unseen,
-    rows,
-    summary_table,
-    unranged,
-)
+from reports.tables.summary import BASELINE, PAPER, error_table, of_baseline, over_unseen, rows, summary_table, unranged
 from reports.tables.table import markdown_table, number
 from weaves.errors import BadInput
 

@@ -39,16 +39,7 @@ from reports.tables.table import (
     text,
 )
 from reports.tables.tradeoff import tradeoff_table
-from reports.truth import (
-    accuracy,
-    bias,
-    calibration,
-    effort,
-    finding,
-    footprint_colours,
-    path_traced,
-    sampling,
-)
+from reports.truth import accuracy, bias, calibration, effort, finding, footprint_colours, path_traced, sampling
 from reports.truth.row_records import RowRecords
 
 Frames = Mapping[str, pd.DataFrame]
@@ -65,11 +56,7 @@ _FRAMES: Final = {
     "scenes": summary.scene_table,
     "by_size": size_table,
 }
-_WHERE_MEASURED: Final = {
-    "between": summary.path_table,
-    OTHER: summary.other_table,
-    "extremes": summary.extremes_table,
-}
+_WHERE_MEASURED: Final = {"between": summary.path_table, OTHER: summary.other_table, "extremes": summary.extremes_table}
 
 
 @dataclass(frozen=True)

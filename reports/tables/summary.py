@@ -23,6 +23,7 @@ import pandas as pd
 from scipy import stats
 from scipy.special import stdtrit
 
+from pipeline.compiled.arrays import Mask
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.error import ratio
@@ -417,7 +418,7 @@ def columns_over_fabrics(errors: pd.DataFrame, base: pd.DataFrame) -> dict[str, 
     }
 
 
-def front(table: pd.DataFrame, cost: str, fault: str) -> npt.NDArray[np.bool_]:
+def front(table: pd.DataFrame, cost: str, fault: str) -> Mask:
     """Return which rows are on the front of two columns: those that nothing beats on both.
 
     A row is beaten by another that is nowhere worse and somewhere better. Equal rows do not beat each other. Rows with

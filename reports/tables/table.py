@@ -92,12 +92,7 @@ class ResultTable:
 
 
 def number(
-    name: str,
-    title: str = "",
-    format: str = "",
-    metric: str = "",
-    ends: Sequence[str] = (),
-    above_noise: bool = False,
+    name: str, title: str = "", format: str = "", metric: str = "", ends: Sequence[str] = (), above_noise: bool = False
 ) -> Column:
     """Return the column of a number of a frame, with its interval and its range over trainings where it has them.
 

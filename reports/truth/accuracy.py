@@ -9,11 +9,10 @@ true error e. "Points saved" is that number over the points used.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
@@ -37,8 +36,6 @@ _ROWS = 150
 _REPEATS = 3
 _SEED = 21
 _DARK = 1e-3  # 1/sr: patches below return too little for a relative error
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -98,10 +95,12 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
     for fabric, queries in default_queries(fabrics, rows, _SEED):
         truth = estimate(fabric, queries, fixed("owen", reference), _SEED + 1)
         found = [_compare(fabric, queries, truth, setting, options) for setting, options in SETTINGS.items()]
-        spread = _spread([row for row in found if row.setting.startswith("mc,")])
+        # c of the law e = c N^-1/2: the geometric mean of plain Monte Carlo's median errors times sqrt(N).
+        random = [row for row in found if row.setting.startswith("mc,")]
+        spread = float(np.exp(np.mean([np.log(row.true_error * np.sqrt(row.points)) for row in random])))
         for row in found:
             needed = (spread / max(row.true_error, 1e-12)) ** 2
-            yield Accuracy(**{**vars(row), "saved": needed / row.points})
+            yield replace(row, saved=needed / row.points)
 
 
 def _compare(fabric: Fabric, queries: Queries, truth: Answers, setting: str, options: TruthOptions) -> Accuracy:
@@ -124,11 +123,6 @@ def _compare(fabric: Fabric, queries: Queries, truth: Answers, setting: str, opt
         reference=float(np.median(np.linalg.norm(truth.standard_error[lit], axis=1) / size)),
         count=len(lit),
     )
-
-
-def _spread(random: Sequence[Accuracy]) -> float:
-    """Return c of the law e = c N^-1/2 from plain Monte Carlo's median errors: their geometric mean times sqrt(N)."""
-    return float(np.exp(np.mean([np.log(row.true_error * np.sqrt(row.points)) for row in random])))
 
 
 RECORDS: Final = RowRecords(Accuracy, setting=("setting",))

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -30,8 +30,6 @@ SIDES: Final = ("light in front", "light behind")
 _ROWS = 4000
 _REFERENCE = 1 << 13
 _SEED = 22
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
                 yield Bias(fabric.name, side, component, value, error, rows)
 
 
-def bias_of(found: Floats, truth: Floats) -> tuple[float, float]:
+def bias_of(found: Float64, truth: Float64) -> tuple[float, float]:
     """Return <found - truth> / <truth> and its standard error; 0 where the truth is 0.
 
     The error is that of a ratio of means r, to first order: sd(found - truth - r truth) / (sqrt(N) <truth>).

@@ -20,10 +20,9 @@ from dataclasses import dataclass
 from typing import Annotated, Final
 
 import numpy as np
-import numpy.typing as npt
 from scipy import stats
 
-from pipeline.compiled.arrays import Mask
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.calibration import calibrate
 from pipeline.truth.cloth import Raw, cloth_side, columns_of
@@ -70,8 +69,6 @@ SEED: Final = 4_000
 _FABRICS, _ROWS, _REFERENCE = 4, 40, 1 << 15
 _PRECISE = 0.03
 _LEAST = 1e-4  # smallest squared ratio
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -170,21 +167,21 @@ def _joined(parts: Sequence[Raw]) -> Raw:
     return Raw(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-def compared(wrong: Floats, error: Floats, bound: Floats, doubt: Floats) -> tuple[float, float]:
+def compared(wrong: Float64, error: Float64, bound: Float64, doubt: Float64) -> tuple[float, float]:
     """Return the ratio and the share beyond bounds of errors, all of one shape; `doubt` is that of the reference."""
     square = max(float(np.mean(wrong**2 - doubt**2)), 0.0)
     ratio = math.sqrt(square / float(np.mean(error**2)))
     return ratio, float(np.mean(np.abs(wrong) > bound + 3.0 * doubt))
 
 
-def interval(wrong: Floats, error: Floats, doubt: Floats) -> tuple[float, float]:
+def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, float]:
     """Return the interval of the ratio of the components' errors at `LEVEL`; rows are queries.
 
     Of the logarithm of the squared ratio, with the standard error by the bootstrap over queries.
     """
     squares = (wrong[:, :4] ** 2 - doubt[:, :4] ** 2).sum(axis=1), (error[:, :4] ** 2).sum(axis=1)
 
-    def logarithm(true: Floats, stated: Floats, axis: int) -> Floats:
+    def logarithm(true: Float64, stated: Float64, axis: int) -> Float64:
         whole = stated.mean(axis=axis)
         # The reference's own variance may exceed errors that are far smaller than stated.
         return np.asarray(np.log(np.maximum(true.mean(axis=axis), _LEAST * whole) / whole))

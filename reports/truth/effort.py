@@ -48,14 +48,9 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Eff
         kinds = np.array([_CLASS_OF[stage] for stage in answers.stage.tolist()])
         for number, kind in enumerate(CLASSES):
             chosen = np.flatnonzero(kinds == number)
-            yield Effort(
-                kind=kind,
-                fabric=fabric.name,
-                share=chosen.size / rows,
-                points=float(answers.count[chosen].mean()) if chosen.size else 0.0,
-                seconds=seconds_a_query(fabric, queries.take(chosen), options) if chosen.size else 0.0,
-                count=rows,
-            )
+            points = float(answers.count[chosen].mean()) if chosen.size else 0.0
+            seconds = seconds_a_query(fabric, queries.take(chosen), options) if chosen.size else 0.0
+            yield Effort(kind, fabric.name, chosen.size / rows, points, seconds, rows)
 
 
 RECORDS: Final = RowRecords(Effort, setting=("kind",))

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Mask
 from reports.truth.row_records import RowRecords
 
 SLACK: Final = 2.0
@@ -47,11 +48,6 @@ class Finding:
     naive_not_finite: Annotated[int, "naive_not_finite"] = 0  # how often that one is NaN or infinite
 
     @property
-    def limit(self) -> float:
-        """Limit of the worst error."""
-        return SLACK * self.listed
-
-    @property
     def holds(self) -> bool:
         """True if there is no fault."""
         return not self.fault
@@ -63,7 +59,8 @@ class Finding:
             return f"{self.not_finite} of {self.count} values are NaN or infinite"
         if self.negative:
             return f"{self.negative} of {self.count} values are negative"
-        return f"worst error {self.worst:.1e}, beyond the limit {self.limit:.1e}" if self.worst > self.limit else ""
+        limit = SLACK * self.listed
+        return f"worst error {self.worst:.1e}, beyond the limit {limit:.1e}" if self.worst > limit else ""
 
 
 def judge(
@@ -117,9 +114,7 @@ def judge(
     )
 
 
-def _errors(
-    value: npt.ArrayLike, reference: npt.ArrayLike, floor: float, absolute: bool
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+def _errors(value: npt.ArrayLike, reference: npt.ArrayLike, floor: float, absolute: bool) -> tuple[Float64, Mask]:
     """Return relative errors (N,), 0 of values that are not finite, and which are finite.
 
     Differences are taken in the better of the two arithmetics.
@@ -150,12 +145,7 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
     return [finding for finding in findings if not finding.holds]
 
 
-RECORDS: Final = RowRecords(
-    Finding,
-    setting=("expression", "corner"),
-    method_field="arithmetic",
-    once={"note": "at"},
-)
+RECORDS: Final = RowRecords(Finding, setting=("expression", "corner"), method_field="arithmetic", once={"note": "at"})
 """Findings as Records."""
 
 

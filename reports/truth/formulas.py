@@ -26,13 +26,9 @@ def dot(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
 def sigma(w: Array, t: Array, alpha: Array) -> Array:
     """Return the projected area of the flakes, by the cross product: as `slab.sigma`."""
-    across, along = _cross(w, t), dot(w, t)
+    across, along = np.cross(w, t, axis=0), dot(w, t)
     return np.asarray(np.sqrt(dot(across, across) + alpha * alpha * (along * along)))
 
 
@@ -44,7 +40,7 @@ def textbook_sigma(w: Array, t: Array, alpha: Array) -> Array:
 
 def density(v: Array, t: Array, alpha: Array) -> Array:
     """Return D at the half vector of v, by the cross product: as `pipeline.truth.scattering.slab.density`."""
-    across, along = _cross(v, t), dot(v, t)
+    across, along = np.cross(v, t, axis=0), dot(v, t)
     q = (alpha * alpha * dot(across, across) + along * along) / dot(v, v)
     return np.asarray(alpha * alpha * alpha / (_pi(alpha) * q * q))
 

@@ -13,16 +13,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.mitsuba.register import dress, register
 from pipeline.scenes.catalogue import load_scene
-from pipeline.scenes.loading import Loaded, load
+from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from reports.truth.row_records import RowRecords
 
@@ -43,8 +43,6 @@ SAMPLES: Final[dict[str, tuple[int, ...]]] = {OURS: (1, 4, 16), OTHER: (1, 2, 4,
 
 _SIZE, _REFERENCE_SAMPLES, _FRAMES = 64, 16, 4
 _DEPTH = 4
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -89,14 +87,14 @@ def measure(
         The method of the reference frames, and its samples.
     """
     for name in scenes:
-        truths = [_Scene(name, reference[0], size).frame(reference[1], 1000 + k)[0] for k in range(2)]
+        truths = [_frames(name, reference[0], size)(reference[1], 1000 + k)[0] for k in range(2)]
         scale = float(np.mean(truths)) ** 2
         found: list[Traced] = []
         for method, counts in reversed(list(samples.items())):
-            scene = _Scene(name, method, size)
-            scene.frame(1, 0)  # loads and tabulates
+            frame_of = _frames(name, method, size)
+            frame_of(1, 0)  # loads and tabulates
             for count in counts:
-                made = [scene.frame(count, seed) for seed in range(1, frames + 1)]
+                made = [frame_of(count, seed) for seed in range(1, frames + 1)]
                 errors = [float(np.mean((frame - truths[0]) * (frame - truths[1]))) / scale for frame, _ in made]
                 error, seconds = float(np.mean(errors)), float(np.median([seconds for _, seconds in made]))
                 others = [one for one in found if one.method == OTHER]
@@ -105,32 +103,25 @@ def measure(
         yield from found
 
 
-class _Scene:
-    """A shipped scene whose cloth one method evaluates."""
+def _frames(name: str, method: str, size: int) -> Callable[[int, int], tuple[Float64, float]]:
+    """Return what renders a shipped scene whose cloth one method evaluates.
 
-    def __init__(self, name: str, method: str, size: int) -> None:
-        self._loaded: Loaded = load(load_scene(name), SceneOptions())
-        self._world, self._mi = dress(self._loaded, method), register()
-        camera, mi = self._loaded.camera, self._mi
-        film = {"type": "hdrfilm", "width": size, "height": size, "component_format": "float32"}
-        self._sensor = mi.load_dict(
-            {
-                "type": "perspective",
-                **camera.settings,
-                "to_world": mi.ScalarTransform4f(camera.to_world),
-                "film": {**film, "rfilter": {"type": "box"}},
-            }
-        )
-        self._integrator = mi.load_dict({"type": "twillight_path", "max_depth": _DEPTH})
+    A function of samples a pixel and a seed; it returns a frame, (size, size, 3), and the processor's seconds.
+    """
+    loaded = load(load_scene(name), SceneOptions())
+    world, mi = dress(loaded, method), register()
+    film = {"type": "hdrfilm", "width": size, "height": size, "component_format": "float32", "rfilter": {"type": "box"}}
+    view = mi.ScalarTransform4f(loaded.camera.to_world)
+    sensor = mi.load_dict({"type": "perspective", **loaded.camera.settings, "to_world": view, "film": film})
+    integrator = mi.load_dict({"type": "twillight_path", "max_depth": _DEPTH})
 
-    def frame(self, samples: int, seed: int) -> tuple[Floats, float]:
-        """Return a frame, (size, size, 3), and the processor's seconds."""
+    def frame(samples: int, seed: int) -> tuple[Float64, float]:
         begun = time.process_time()
-        picture: Any = self._mi.render(
-            self._world, sensor=self._sensor, integrator=self._integrator, spp=samples, seed=seed
-        )
+        picture: Any = mi.render(world, sensor=sensor, integrator=integrator, spp=samples, seed=seed)
         pixels = np.asarray(picture, np.float64)[..., :3]
         return pixels, time.process_time() - begun
+
+    return frame
 
 
 def _error_in(seconds: float, found: Sequence[Traced]) -> float:

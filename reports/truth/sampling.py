@@ -31,6 +31,7 @@ import numpy.typing as npt
 
 from pipeline.analytic.importance.lobes import FAR, HEIGHT, SHARE, STRAIGHT, Lobes
 from pipeline.analytic.importance.mixture import LEAST_COSINE
+from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
@@ -55,8 +56,6 @@ _LOOKS, _DIRECTIONS = 400, 64
 _REPEATS = 2
 _TO_FAR = 0.1  # share of the flakes' light that reaches the far side, roughly
 _POINT = np.float32(1e-3)  # deviation of a point
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ def scene_subjects(name: str, looks: int) -> list[Subject]:
 class _Estimate(NamedTuple):
     """Values of the directions of a sampler, (looks, directions); seconds of them all, without and with values."""
 
-    values: Floats
+    values: Float64
     draw_seconds: float
     seconds: float
 
@@ -179,12 +178,12 @@ def _estimates(subject: Subject) -> dict[str, _Estimate]:
 class _Directions(NamedTuple):
     """Unit wi, their densities, and which are straight through: these have its probability."""
 
-    wi: npt.NDArray[np.float32]
+    wi: Float32
     pdf: npt.NDArray[np.floating[Any]]
-    straight: npt.NDArray[np.bool_]
+    straight: Mask
 
 
-def _weights(bsdf: PatchBSDF, looks: Queries, drawn: _Directions) -> Floats:
+def _weights(bsdf: PatchBSDF, looks: Queries, drawn: _Directions) -> Float64:
     """Return the luminance of f_P over the density, and of transparency over its probability."""
     queries, straight = looks._replace(wi=drawn.wi), drawn.straight
     found = np.empty(len(straight))
@@ -194,7 +193,7 @@ def _weights(bsdf: PatchBSDF, looks: Queries, drawn: _Directions) -> Floats:
     return np.asarray(found / drawn.pdf)
 
 
-def _cosine(looks: Queries, random: Floats, far: Floats, straight: Floats) -> _Directions:
+def _cosine(looks: Queries, random: Float64, far: Float64, straight: Float64) -> _Directions:
     """Draw directions by the cosine, of which `far` are on the far side, or straight through."""
     through = random[:, 3] < straight
     behind = random[:, 0] < far
@@ -207,7 +206,7 @@ def _cosine(looks: Queries, random: Floats, far: Floats, straight: Floats) -> _D
     return _Directions(wi, np.where(through, straight, pdf), through)
 
 
-def _one_point(bsdf: PatchBSDF, places: Queries, random: Floats, straight: Floats) -> _Directions:
+def _one_point(bsdf: PatchBSDF, places: Queries, random: Float64, straight: Float64) -> _Directions:
     """Draw directions by the lobe of one point each, or straight through with the footprint's probability."""
     through = random[:, 3] < straight
     found = bsdf.lobes(places)
@@ -221,13 +220,13 @@ def _one_point(bsdf: PatchBSDF, places: Queries, random: Floats, straight: Float
     return _Directions(wi, np.where(through, straight, (1.0 - straight) * pdf), through)
 
 
-def _far_share(lobes: Lobes) -> Floats:
+def _far_share(lobes: Lobes) -> Float64:
     """Return the share of the scattered light that the lobes expect on the far side, roughly."""
     flakes, scattered = lobes.flakes[:, SHARE].sum(axis=1), 1.0 - lobes.rest[:, STRAIGHT]
     return np.asarray((lobes.rest[:, FAR] + _TO_FAR * flakes) / np.maximum(scattered, 1e-6), np.float64)
 
 
-def _points_of(looks: Queries, normal: Floats) -> Queries:
+def _points_of(looks: Queries, normal: Float64) -> Queries:
     """Return a random point of each footprint, from two standard normal numbers each."""
     along, across = looks.sigma * normal[:, 0], looks.sigma_minor * normal[:, 1]
     cosine, sine = np.cos(looks.angle), np.sin(looks.angle)

@@ -17,9 +17,9 @@ from functools import partial
 from typing import Annotated, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.groups import DETAILS
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.method import CHUNK_ROWS, Method
@@ -87,11 +87,7 @@ def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate
     yield _memory(fabric, rows)
 
 
-RECORDS: Final = RowRecords(
-    Rate,
-    setting=("what",),
-    once={"low": "low", "high": "high", "unit": "unit", "note": "note"},
-)
+RECORDS: Final = RowRecords(Rate, setting=("what",), once={name: name for name in ("low", "high", "unit", "note")})
 """Rates as Records."""
 
 
@@ -279,7 +275,7 @@ def _numpy_points(fabric: Fabric, table: ExactNodes, queries: Queries, points: i
     return done
 
 
-def _clears(table: ExactNodes, nodes: npt.NDArray[np.int64], w: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+def _clears(table: ExactNodes, nodes: Index, w: Float64) -> Mask:
     """Return which nodes see a direction, by linear interpolation between two azimuths."""
     place = np.arctan2(w[1], w[0]) / (2 * np.pi) * len(table.slope)
     row = int(np.floor(place))

@@ -10,11 +10,10 @@ import math
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.truth.query import Queries
 
-Floats = npt.NDArray[np.float64]
 Shape = Literal["plane", "sphere", "drape"]
 
 VIEW_SPREAD: Final = 0.27
@@ -54,23 +53,23 @@ class Viewpoint(NamedTuple):
 class Seen(NamedTuple):
     """Pixels that show the cloth, (H, W), row 0 the lowest; those of them that are lit; the queries of these."""
 
-    cloth: npt.NDArray[np.bool_]
-    lit: npt.NDArray[np.bool_]
+    cloth: Mask
+    lit: Mask
     queries: Queries
 
 
 class _Places(NamedTuple):
     """Where rays meet the cloth: reach (N,), negative if nowhere; uv and its scale (N, 2); x, y and normal (N, 3)."""
 
-    reach: Floats
-    uv: Floats
-    scale: Floats
-    x: Floats
-    y: Floats
-    n: Floats
+    reach: Float64
+    uv: Float64
+    scale: Float64
+    x: Float64
+    y: Float64
+    n: Float64
 
 
-def direction(turn: float, tilt: float) -> Floats:
+def direction(turn: float, tilt: float) -> Float64:
     """Return the unit vector of a turn and a tilt, in degrees."""
     a, b = math.radians(turn), math.radians(tilt)
     return np.array([math.sin(a) * math.cos(b), -math.cos(a) * math.cos(b), math.sin(b)])
@@ -81,7 +80,7 @@ def sphere_radius(ends: int) -> float:
     return max(1, round(2.0 * math.pi * SPHERE_RADIUS / ends)) * ends / (2.0 * math.pi)
 
 
-def arcs() -> Floats:
+def arcs() -> Float64:
     """Return the arcs of the drape, (arcs, 4): middle in x, radius, 1 above or -1 beneath, middle along the cloth."""
     radii = np.array(RADII)
     ends, lengths = np.cumsum(2.0 * radii * math.sin(HALF_ARC)), np.cumsum(2.0 * radii * HALF_ARC)
@@ -126,7 +125,7 @@ def seen(camera: Viewpoint, size: int, ends: int) -> Seen:
     return Seen(cloth.reshape(size, size), lit.reshape(size, size), queries)
 
 
-def _middle(camera: Viewpoint, toward: Floats, radius: float) -> Floats:
+def _middle(camera: Viewpoint, toward: Float64, radius: float) -> Float64:
     """Return the point in the middle of the picture."""
     if camera.shape == "plane":
         return np.array([*camera.target, 0.0])
@@ -135,26 +134,26 @@ def _middle(camera: Viewpoint, toward: Floats, radius: float) -> Floats:
     return np.array([0.0, -RADII[len(RADII) // 2] * (1.0 - math.cos(HALF_ARC)), 0.0])
 
 
-def _moves(step: Floats, places: _Places, ray: Floats, reach: Floats, facing: Floats) -> Floats:
+def _moves(step: Float64, places: _Places, ray: Float64, reach: Float64, facing: Float64) -> Float64:
     """Return by how much uv moves if the ray moves by `step`, on the tangent plane, (N, 2)."""
     moved = reach[:, None] * (step + ray * ((places.n @ step) / facing)[:, None])
     return places.scale * np.stack([_dot(moved, places.x), _dot(moved, places.y)], axis=-1)
 
 
-def _meet(shape: Shape, eye: Floats, ray: Floats, radius: float) -> _Places:
+def _meet(shape: Shape, eye: Float64, ray: Float64, radius: float) -> _Places:
     if shape == "plane":
         return _on_plane(eye, ray)
     return _on_sphere(eye, ray, radius) if shape == "sphere" else _on_drape(eye, ray)
 
 
-def _on_plane(eye: Floats, ray: Floats) -> _Places:
+def _on_plane(eye: Float64, ray: Float64) -> _Places:
     down = ray[:, 2] < 0.0
     reach = np.where(down, -eye[:, 2] / np.where(down, ray[:, 2], 1.0), -1.0)
     axes = (np.broadcast_to(axis, ray.shape) for axis in np.eye(3))
     return _Places(reach, eye[:, :2] + reach[:, None] * ray[:, :2], np.ones((len(ray), 2)), *axes)
 
 
-def _on_sphere(eye: Floats, ray: Floats, radius: float) -> _Places:
+def _on_sphere(eye: Float64, ray: Float64, radius: float) -> _Places:
     b = _dot(eye, ray)
     inside = b * b - (_dot(eye, eye) - radius * radius)
     hit = (inside > 0.0) & (b < 0.0)
@@ -166,7 +165,7 @@ def _on_sphere(eye: Floats, ray: Floats, radius: float) -> _Places:
     return _Places(reach, uv, np.stack([1.0 / level, np.ones(len(n))], axis=-1), x, np.cross(n, x), n)
 
 
-def _on_drape(eye: Floats, ray: Floats) -> _Places:
+def _on_drape(eye: Float64, ray: Float64) -> _Places:
     places = _Places(
         np.full(len(ray), -1.0), np.zeros((len(ray), 2)), np.ones((len(ray), 2)),
         *(np.tile(axis, (len(ray), 1)) for axis in np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])),
@@ -193,9 +192,9 @@ def _on_drape(eye: Floats, ray: Floats) -> _Places:
     return places
 
 
-def _dot(a: Floats, b: Floats) -> Floats:
+def _dot(a: Float64, b: Float64) -> Float64:
     return np.asarray((a * b).sum(axis=-1))
 
 
-def _unit(a: Floats) -> Floats:
+def _unit(a: Float64) -> Float64:
     return np.asarray(a / np.linalg.norm(a, axis=-1, keepdims=True))

@@ -23,6 +23,7 @@ from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.groups import COLUMNS, DETAILS, USUAL
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
 from pipeline.atomic import atomic_write
+from pipeline.compiled.arrays import Float64
 from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
 from pipeline.scenes.shade import colours
@@ -36,16 +37,7 @@ from pipeline.truth.options import TruthOptions
 from reports.images.texture import png_bytes
 from reports.options import LEAST_TILE, MOST_TILE
 from reports.viewer.generate import network, shipped
-from reports.viewer.shapes import (
-    HALF_ARC,
-    HALF_HEIGHT,
-    VIEW_SPREAD,
-    Seen,
-    Viewpoint,
-    arcs,
-    seen,
-    sphere_radius,
-)
+from reports.viewer.shapes import HALF_ARC, HALF_HEIGHT, VIEW_SPREAD, Seen, Viewpoint, arcs, seen, sphere_radius
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.yarn import Yarn
@@ -183,11 +175,8 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
 def bends(fabric: Fabric) -> tuple[float, ...]:
     """Return the factors of the bends: 1 alone if the yarns are flat."""
     steepest = max(fabric.warp.bend, fabric.weft.bend)
-    return (
-        tuple(factor for factor in BEND_FACTORS if factor <= 1.0 or steepest * factor <= STEEPEST_BEND)
-        if steepest
-        else (1.0,)
-    )
+    factors = BEND_FACTORS if steepest else (1.0,)
+    return tuple(factor for factor in factors if factor <= 1.0 or steepest * factor <= STEEPEST_BEND)
 
 
 def widths(fabric: Fabric) -> tuple[float, ...]:
@@ -290,7 +279,7 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
     return view
 
 
-def _components(picture: Seen, values: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
+def _components(picture: Seen, values: npt.NDArray[np.floating]) -> Float64:
     """Return components in their pixels, (H, W, 4): 0 where nothing lights the cloth, -1 where there is none."""
     whole = np.where(picture.cloth, 0.0, -1.0)[..., None] * np.ones(4)
     whole[picture.lit] = values

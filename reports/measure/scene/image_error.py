@@ -38,15 +38,13 @@ import numpy as np
 import numpy.typing as npt
 from skimage.metrics import structural_similarity
 
-from reports.error import Error, relative_squared_error, relative_weight, squared_error
+from pipeline.compiled.arrays import Float64, Mask
+from reports.error import Error, relative_weight, squared_error
 from reports.measure.block_bootstrap import block_interval, blocks
 from reports.options import ImageOptions
 from reports.record import Metric, Record
 from weaves.colour import LUMINANCE, delta_e, encoded
 from weaves.errors import BadInput
-
-Floats = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 PERCEIVED: Final[tuple[Metric, ...]] = ("psnr", "ssim", "flip_ldr", "flip_hdr", "delta_e")
 """Perceptual measures; the metric of the noise floor is `<metric>_floor`."""
@@ -82,7 +80,7 @@ class ImageErrors:
     mse_relative: Error
     perceived: dict[Metric, Measure]
     """Perceptual measures, by the keys of `PERCEIVED`."""
-    maps: dict[str, Floats]
+    maps: dict[str, Float64]
     """(H, W) by name: `ssim`, `flip_ldr`, `flip_hdr`, `delta_e`, and `square`, that of PSNR."""
     mask: Mask
     """Pixels that count, (H, W)."""
@@ -141,12 +139,12 @@ def noise_floor(
     return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in PERCEIVED}
 
 
-def _light_errors(m: Floats, t: Floats, s: Floats, lit: Mask, options: ImageOptions) -> tuple[Error, Error]:
+def _light_errors(m: Float64, t: Float64, s: Float64, lit: Mask, options: ImageOptions) -> tuple[Error, Error]:
     """Return MSE and relative MSE; values, truth and standard error of the lit pixels, (N, 3)."""
     w = relative_weight(t, RELATIVE_EPSILON)
     squares = ((m - t) ** 2 - s**2).mean(axis=1), (((m - t) ** 2 - s**2) * w**2).mean(axis=1)
-    errors = squared_error(m, t, s, 0), relative_squared_error(m, t, s, RELATIVE_EPSILON, 0)
-    spreads = [block_interval(rows, lit, options.block, options.resamples, options.seed) for rows in squares]
+    errors = squared_error(m, t, s, 0), squared_error(m * w, t * w, s * w, 0)
+    spreads = [block_interval(rows, lit, options) for rows in squares]
     mse, relative = (
         replace(error, standard_error=spread, low=low, high=high)
         for error, (spread, low, high) in zip(errors, spreads, strict=True)
@@ -154,14 +152,14 @@ def _light_errors(m: Floats, t: Floats, s: Floats, lit: Mask, options: ImageOpti
     return mse, relative
 
 
-def _measure(metric: Metric, maps: dict[str, Floats], floor: float, lit: Mask, o: ImageOptions) -> Measure:
+def _measure(metric: Metric, maps: dict[str, Float64], floor: float, lit: Mask, options: ImageOptions) -> Measure:
     rows = _rows(metric, maps, lit)
-    _, *ends = block_interval(rows, lit, o.block, o.resamples, o.seed)
+    _, *ends = block_interval(rows, lit, options)
     low, high = sorted(_unit(metric, end) for end in ends)
     return Measure(_unit(metric, float(rows.mean())), low, high, floor, len(rows))
 
 
-def _rows(metric: Metric, maps: dict[str, Floats], lit: Mask) -> Floats:
+def _rows(metric: Metric, maps: dict[str, Float64], lit: Mask) -> Float64:
     """Return the values whose mean is the measure, one a lit pixel."""
     return maps["square" if metric == "psnr" else metric][lit]
 
@@ -175,7 +173,7 @@ def _unit(metric: Metric, mean: float) -> float:
 
 def _checked(
     picture: npt.ArrayLike, truth: npt.ArrayLike, standard_error: npt.ArrayLike, mask: npt.ArrayLike, o: ImageOptions
-) -> tuple[Floats, Floats, Floats, Mask]:
+) -> tuple[Float64, Float64, Float64, Mask]:
     """Return the arguments as arrays, or say which of them cannot be used."""
     m, t, s = (np.asarray(values, np.float64) for values in (picture, truth, standard_error))
     lit = np.asarray(mask, dtype=np.bool_)
@@ -189,7 +187,7 @@ def _checked(
     return m, t, s, lit
 
 
-def perceived_maps(picture: Floats, truth: Floats, lit: Mask) -> dict[str, Floats]:
+def perceived_maps(picture: Float64, truth: Float64, lit: Mask) -> dict[str, Float64]:
     """Return the maps above by name, (H, W); pictures (H, W, 3), `lit` (H, W) the pixels that count."""
     grey = float(np.median(truth[lit] @ LUMINANCE))
     picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))
@@ -209,7 +207,7 @@ def perceived_maps(picture: Floats, truth: Floats, lit: Mask) -> dict[str, Float
     }
 
 
-def _flip(picture: Floats, truth: Floats, kind: str) -> Floats:
+def _flip(picture: Float64, truth: Float64, kind: str) -> Float64:
     """Return FLIP's error map, (H, W); values are finite (FLIP would take NaN for a colour)."""
     values = [np.ascontiguousarray(array, np.float32) for array in (truth, picture)]
     parameters: dict[str, Any] = {"ppd": _PIXELS_PER_DEGREE}

@@ -20,34 +20,25 @@ import math
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
+from pipeline.models.method import Method
 from reports.error import COLOUR_WEIGHTS, relative_weight, squared_error
 from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
-from reports.measure.scene.image_error import (
-    DISPLAY_EXPOSURE,
-    RELATIVE_EPSILON,
-    ImageErrors,
-    image_errors,
-    noise_floor,
-)
+from reports.measure.scene.image_error import DISPLAY_EXPOSURE, RELATIVE_EPSILON, ImageErrors, image_errors, noise_floor
 from reports.measure.scene.shot import Shot
-from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
+from reports.measure.timing import Contender, affordable, time_side_by_side, timed
 from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
 from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
-
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
-
-Floats = npt.NDArray[np.float64]
 
 LONGEST: Final = 0.01
 """Seconds of a timed call."""
@@ -96,7 +87,7 @@ def measure_scene(
         errors = image_errors(shown[0], truths[0], noises[0], lit[0], image, floor)
         if method.setting in pictures:
             about = {"scene": shot.name, "method": method.name, "setting": method.setting}
-            layers = frame_layers(shown) | difference_maps(shown[0], truths[0], errors, RELATIVE_EPSILON)
+            layers = frame_layers(shown) | difference_maps(shown[0], truths[0], errors)
             write_picture(pictures[method.setting], shown[0], np.ones_like(lit[0]), about, layers=layers)
         subject = _subject(method, shot)
         records += errors.records(subject)
@@ -109,7 +100,7 @@ def measure_scene(
 
 
 def _over_time(
-    subject: Record, own: Floats, truth: Floats, noise: Floats, still: npt.NDArray[np.bool_], image: ImageOptions
+    subject: Record, own: Float64, truth: Float64, noise: Float64, still: Mask, image: ImageOptions
 ) -> list[Record]:
     """Return the aliasing of a method's luminance, and FovVideoVDP's score where that is installed.
 
@@ -117,12 +108,12 @@ def _over_time(
     """
     records = []
     if still.any():
-        value = flicker(own[:, still], truth[:, still], 0.0, noise[:, still])
+        value = flicker(own[:, still], truth[:, still], noise[:, still])
         scale = truth[:, still].mean() ** 2
         rows = (temporal_variances(own[:, still]) - temporal_variances(truth[:, still], noise[:, still])) / scale
-        _, low, high = block_interval(rows, still, image.block, image.resamples, image.seed)
+        _, low, high = block_interval(rows, still, image)
         records.append(subject.of("flicker", value, len(own), low=low, high=high))
-    records.append(subject.of("excess_energy", excess_energy(own, truth, 0.0, noise), len(own)))
+    records.append(subject.of("excess_energy", excess_energy(own, truth, noise), len(own)))
     return records + fovvideovdp(subject, own, truth)
 
 
@@ -146,19 +137,14 @@ def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, 
             rare = np.flatnonzero(method.out_of_domain(fabric, queries))[:1]
             method.predict(fabric, queries.take(rare))
             contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), LONGEST, FEWEST))
-    records = []
     timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
     readings = np.array([timing.samples for timing in timings]).reshape(len(able), len(subjects), -1)
     counts = np.array([len(queries.u) for _, queries in subjects])
-    for method, frames in zip(able, 1e-6 * np.einsum("mct,c->mt", readings, counts), strict=True):
-        samples = tuple(frames.tolist())
-        low, median, high = quartiles(samples)
-        frame_time = _subject(method, shot).of("frame_time", median, len(samples), low=low, high=high, samples=samples)
-        records.append(frame_time)
-    return records
+    frames = (1e-6 * np.einsum("mct,c->mt", readings, counts)).tolist()
+    return [timed(_subject(method, shot), "frame_time", own) for method, own in zip(able, frames, strict=True)]
 
 
-def _colour(subject: Record, shot: Shot, answers: Sequence[npt.NDArray[np.float32]], image: ImageOptions) -> Record:
+def _colour(subject: Record, shot: Shot, answers: Sequence[Float32], image: ImageOptions) -> Record:
     """Return the relative RMSE of the colour measure over the queries of all frames."""
     values, truth, noise = (
         np.concatenate(parts).astype(np.float64)
@@ -173,7 +159,7 @@ def _colour(subject: Record, shot: Shot, answers: Sequence[npt.NDArray[np.float3
     count, sums = (np.bincount(pixel, weights, minlength=size[0] * size[1]) for weights in (None, squares))
     lit = (count > 0).reshape(size)
     rows = sums[lit.ravel()] * lit.sum() / len(pixel)
-    _, *ends = block_interval(rows, lit, image.block, image.resamples, image.seed)
+    _, *ends = block_interval(rows, lit, image)
     low, high = (math.sqrt(max(end, 0.0)) / error.mean for end in ends)
     return subject.of("colour_rrmse", error.relative_rmse, error.count, low=low, high=high)
 
@@ -182,19 +168,17 @@ def _subject(method: Method, shot: Shot) -> Record:
     return Record(method=method.name, setting=method.setting, scene=shot.name, threads=1)
 
 
-def difference_maps(
-    picture: npt.ArrayLike, truth: npt.ArrayLike, errors: ImageErrors, epsilon: float = 0.01
-) -> dict[str, npt.NDArray[Any]]:
+def difference_maps(picture: npt.ArrayLike, truth: npt.ArrayLike, errors: ImageErrors) -> dict[str, npt.NDArray[Any]]:
     """Return the layers of a picture's errors, (H, W) by channel.
 
     They are `lit` (1 where a pixel counts), those of `relative_differences`, and the maps of `ImageErrors`.
     """
-    return {"lit": errors.mask, **relative_differences(picture, truth, errors.mask, epsilon), **errors.maps}
+    return {"lit": errors.mask, **relative_differences(picture, truth, errors.mask), **errors.maps}
 
 
 def relative_differences(
-    picture: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.NDArray[np.bool_], epsilon: float = 0.01
-) -> dict[str, Floats]:
+    picture: npt.ArrayLike, truth: npt.ArrayLike, mask: Mask, epsilon: float = RELATIVE_EPSILON
+) -> dict[str, Float64]:
     """Return (m - t) / sqrt(t^2 + epsilon <t>^2), (H, W), of each channel and of luminance; 0 where nothing counts.
 
     The mean of the channels' squares is the relative MSE as measured (`reports.error`).
@@ -208,7 +192,7 @@ def relative_differences(
     return maps
 
 
-def fovvideovdp(subject: Record, film: Floats, truth: Floats) -> list[Record]:
+def fovvideovdp(subject: Record, film: Float64, truth: Float64) -> list[Record]:
     """Return the quality of a film in JOD as a Record; nothing where pyfvvdp is not installed.
 
     Parameters

@@ -12,14 +12,16 @@ import io
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.atomic import atomic_write
+from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.fingerprint import fingerprint
 from pipeline.models.fallback import Fallback, fallback_answers
+from pipeline.models.method import Method
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
 from pipeline.scenes.gbuffer import GBuffer
@@ -32,12 +34,7 @@ from reports.options import ShotOptions
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-if TYPE_CHECKING:
-    from pipeline.models.method import Method
-
 _COLUMNS = ("frame", "pixel", "weight", "mean", "standard_error", "fallback_values")
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -65,21 +62,21 @@ class ClothQueries:
 
     fabric: Fabric
     queries: Queries
-    frame: npt.NDArray[np.int64]
-    pixel: npt.NDArray[np.int64]
-    weight: npt.NDArray[np.float32]
-    mean: npt.NDArray[np.float32]
-    standard_error: npt.NDArray[np.float32]
-    fallback_values: npt.NDArray[np.float32]
+    frame: Index
+    pixel: Index
+    weight: Float32
+    mean: Float32
+    standard_error: Float32
+    fallback_values: Float32
     colours: npt.NDArray[np.floating]
 
-    def light(self, components: npt.ArrayLike | None = None) -> Floats:
+    def light(self, components: npt.ArrayLike | None = None) -> Float64:
         """Return the light of each query, (M, 3), from a method's components (M, 4); the truth's if left out."""
         if components is None:
             return np.asarray(self.weight * coloured(self.mean, self.colours))
         return np.asarray(self.weight * shade(self.fabric, components, self.queries))
 
-    def noise(self) -> Floats:
+    def noise(self) -> Float64:
         """Return the standard error of the truth's light, (M, 3), components taken to be uncorrelated."""
         squared = np.square(self.standard_error.astype(np.float64))
         return np.asarray(self.weight * np.sqrt(coloured(squared, np.square(self.colours))))
@@ -90,20 +87,20 @@ class Shot:
     """A scene's frames."""
 
     name: str
-    base: npt.NDArray[np.float32]
+    base: Float32
     """Linear RGB without the light that the cloth scatters, (F, H, W, 3)."""
     cloths: list[ClothQueries]
     """In the order of the scene."""
 
     @property
-    def lit(self) -> npt.NDArray[np.bool_]:
+    def lit(self) -> Mask:
         """Pixels with at least one query, (F, H, W)."""
         result = np.zeros(self.base.shape[:3], np.bool_)
         for cloth in self.cloths:
             result.reshape(len(result), -1)[cloth.frame, cloth.pixel] = True
         return result
 
-    def pictures(self, answers: list[npt.NDArray[np.float32]] | None = None) -> Floats:
+    def pictures(self, answers: list[Float32] | None = None) -> Float64:
         """Return the frames, (F, H, W, 3), from each cloth's components (M, 4); the truth's if left out."""
         result = self.base.astype(np.float64)
         flat = result.reshape(len(result), -1, 3)
@@ -112,7 +109,7 @@ class Shot:
             np.add.at(flat, (cloth.frame, cloth.pixel), light)
         return result
 
-    def noise(self) -> Floats:
+    def noise(self) -> Float64:
         """Return the standard error of the truth's frames, (F, H, W, 3); of a pixel's lights it adds in quadrature."""
         squared = np.zeros(self.base.shape)
         flat = squared.reshape(len(squared), -1, 3)
@@ -124,7 +121,7 @@ class Shot:
         """Return whether a method answers for every cloth."""
         return all(method.covers(cloth.fabric) for cloth in self.cloths)
 
-    def answers(self, method: Fallback, seed: int) -> list[npt.NDArray[np.float32]]:
+    def answers(self, method: Fallback, seed: int) -> list[Float32]:
         """Return a method's components for every cloth; random methods draw anew in every frame.
 
         Queries that fall back because light or viewer is behind the cloth were answered once for all methods.
@@ -201,7 +198,7 @@ def read_shot(path: Path) -> Shot:
         return Shot(about["name"], file["base"], cloths)
 
 
-def fallback_values(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[np.float32]:
+def fallback_values(fabric: Fabric, queries: Queries, seed: int) -> Float32:
     """Return the answers of the fallback where light or viewer is behind the cloth, (M, 4); 0 elsewhere."""
     result, rows = np.zeros((len(queries.u), 4), np.float32), queries.behind
     if rows.any():
@@ -209,7 +206,7 @@ def fallback_values(fabric: Fabric, queries: Queries, seed: int) -> npt.NDArray[
     return result
 
 
-def _transparency(gbuffer: GBuffer, answered: npt.NDArray[np.float32]) -> Floats:
+def _transparency(gbuffer: GBuffer, answered: Float32) -> Float64:
     """Return the transparency of each place, from any of its queries; 0 where there is none."""
     result = np.zeros(len(gbuffer.pixel))
     result[gbuffer.place] = answered

@@ -1,12 +1,9 @@
 """Films as PyAV reads them back."""
 
-import sys
-
 import numpy as np
 import pytest
 
-from reports.images.video import refuse_missing, write_film
-from weaves.errors import BadInput
+from reports.images.video import write_film
 
 
 def gradient(frame):
@@ -26,23 +23,3 @@ def test_a_film_has_its_frames_and_their_colours(tmp_path):
         assert frame.shape == (24, 32, 3)
         np.testing.assert_allclose(frame.astype(int), gradient(index).astype(int), atol=2)
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
-
-
-def test_a_film_that_fails_leaves_the_one_before(tmp_path):
-    pytest.importorskip("av")
-
-    def frames():
-        yield gradient(0)
-        raise KeyboardInterrupt
-
-    (tmp_path / "a.mp4").write_bytes(b"before")
-    with pytest.raises(KeyboardInterrupt):
-        write_film(tmp_path / "a.mp4", frames(), (32, 24), 24)
-    assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
-    assert (tmp_path / "a.mp4").read_bytes() == b"before"
-
-
-def test_without_the_library_one_sentence_says_how_to_install_it(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(BadInput, match=r"pip install 'twillight\[video\]'"):
-        refuse_missing("render", "--out", tmp_path / "a.mp4")

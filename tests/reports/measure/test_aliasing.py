@@ -7,36 +7,6 @@ X = np.arange(96)
 Y = np.arange(64)[:, None]
 
 
-def chirp(shift, blur):
-    """A receding pattern: stripes whose frequency grows over Nyquist; blur=True integrates each pixel, else its centre.
-
-    The stripes are cos(phase(x + shift)) with phase' = .02 .. 1.4 cycles a pixel.
-    """
-
-    def phase(x):
-        return 2 * np.pi * (0.02 * x + 0.0072 * x**2)
-
-    offsets = np.linspace(-1.5, 1.5, 301) if blur else np.zeros(1)
-    weights = np.exp(-0.5 * (offsets / 0.5) ** 2)
-    weights /= weights.sum()
-    row = sum(w * np.cos(phase(X + offset + shift)) for offset, w in zip(offsets, weights, strict=True))
-    return np.broadcast_to(1 + 0.5 * row, (64, 96))
-
-
-def frames(blur):
-    return np.array([chirp(0.3 * f, blur) for f in range(8)])
-
-
-def test_point_sampling_scores_higher_than_prefiltering_and_the_truth_zero():
-    """The truth is the prefiltered pattern; a slightly wider filter is a model that errs without aliasing."""
-    truth, points = frames(True), frames(False)
-    model = 0.5 * truth + 0.25 * (np.roll(truth, 1, axis=2) + np.roll(truth, -1, axis=2))
-    for measure, least in ((flicker, 0.05), (excess_energy, 0.02)):
-        assert measure(points, truth) > least > 0 >= measure(model, truth)
-        for noise in (0.0, np.full_like(truth, 0.03)):
-            assert measure(truth, truth, noise, noise) == 0
-
-
 def test_variances_of_pixels_average_to_the_variance():
     random = np.random.default_rng(5)
     shown, noise = random.random((4, 6, 7)), 0.1 * random.random((4, 6, 7))
@@ -104,11 +74,11 @@ def test_both_figures_fall_as_one_over_the_number_of_points():
 
     Each figure's relative error is about sqrt(2/N), N = 8 · 96 · 64 (under the window about a third of it): 5 allowed.
     """
-    truth, random = frames(True), np.random.default_rng(6)
+    truth = 1 + 0.5 * np.sin(X / 5 + 0.3 * np.arange(8)[:, None, None]) + 0 * Y
+    random = np.random.default_rng(6)
     found = {k: truth + 0.3 * random.standard_normal((k, *truth.shape)).mean(axis=0) for k in (1, 4, 16)}
     for measure, expected in ((flicker, 0.09), (excess_energy, 0.09 * (1 - np.pi / 16))):
         values = {k: k * measure(shown, truth) * truth.mean() ** 2 for k, shown in found.items()}
         assert values[1] == pytest.approx(expected, rel=5 * np.sqrt(2 * 3 / truth.size))
         # The cross term with the truth's own motion counts more the smaller the noise is.
         assert list(values.values()) == pytest.approx([expected] * 3, rel=0.15)
-        assert measure(found[1], truth) > measure(found[4], truth) > measure(found[16], truth) > 0

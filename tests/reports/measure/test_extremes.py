@@ -15,33 +15,25 @@ from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import faults
-from reports.measure.extremes import (
-    FAR,
-    FOOTPRINTS,
-    extremes,
-    lustrous,
-    measure_extremes,
-)
+from reports.measure.extremes import FAR, FOOTPRINTS, extremes, lustrous, measure_extremes
 from reports.options import EXTREME_PRECISIONS
+from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import load_fabric
 
 LINING = load_fabric("polyester_lining")
 TWILL = load_fabric("denim")
 
 
-class Scaled:
+class Scaled(FakeMethod):
     """A coarse truth times a factor, but for what `spoil` does to it."""
 
-    name, truth = "scaled", TruthOptions(estimator="quadrature", relative_error=0.1)
+    truth = TruthOptions(estimator="quadrature", relative_error=0.1)
 
     def __init__(self, factor=1.0, setting="", spoil=lambda answers, queries: answers):
         self.factor, self.setting, self.spoil = factor, setting, spoil
 
     def covers(self, fabric):
         return fabric.name != TWILL.name
-
-    def prepare(self, fabric):
-        pass
 
     def predict(self, fabric, queries, seed=0):
         ends, picks = fabric.weave.repeat

@@ -11,37 +11,20 @@ from pipeline.models.bounded import Bounded
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.measure.furnace import DIRECTIONS, furnace_queries, measure_furnace
+from tests.pipeline.models.stand_ins import FakeMethod
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
-class Stub:
-    """Answers by a function of fabric and queries."""
-
-    name, setting = "stub", ""
-
-    def __init__(self, answer):
-        self.answer = answer
-
-    def prepare(self, fabric):
-        pass
-
-    def predict(self, fabric, queries, seed=0):
-        return np.asarray(self.answer(fabric, queries), np.float32)
-
-
-def lambertian(fabric, queries):
+def lambertian(queries):
     """Answer cos / pi in one component, and a constant in another."""
     cosine = queries.wi[:, 2]
     return np.stack([0 * cosine + 0.1, 0 * cosine, cosine / math.pi, 0 * cosine], axis=1)
 
 
-def true(fabric, queries):
-    return estimate(fabric, queries, TruthOptions(estimator="node_table"), 0).mean
-
-
 def test_closed_forms():
     """A white Lambertian surface returns all, f = .1 returns .2 pi; R2 with 256 points is good to half a per cent."""
-    values = {record.metric: record.value for record in measure_furnace(Stub(lambertian), load_fabric("denim"))}
+    values = {record.metric: record.value for record in measure_furnace(FakeMethod(lambertian), load_fabric("denim"))}
     assert values["furnace_diffuse"] == pytest.approx(1.0, abs=5e-3)
     assert values["furnace_specular"] == pytest.approx(0.2 * math.pi, rel=1e-5)
 
@@ -54,36 +37,22 @@ def test_every_patch_sees_the_same_lights():
 
 
 def test_the_truth_makes_no_light():
-    for record in measure_furnace(Stub(true), load_fabric("polyester_lining")):
+    lining, options = load_fabric("polyester_lining"), TruthOptions(estimator="node_table")
+    method = FakeMethod(lambda queries: estimate(lining, queries, options, 0).mean)
+    for record in measure_furnace(method, lining):
         assert 0 < record.value <= 1.005, record.metric
 
 
-def bright(fabric, queries):
-    """Answer as a network gone wrong: a thousand times too much, everywhere."""
-    return np.full((len(queries.u), 4), 1e3)
+@pytest.mark.parametrize("name", ["polyester_lining", "voile", slow("silk_charmeuse"), slow("twill_4_4")])
+def test_the_brightest_method_returns_at_most_what_arrives_and_soft_nodes_no_more(name):
+    """A network gone wrong answers a thousand times too much: what is left are the soft nodes without shadows.
 
-
-@pytest.mark.parametrize(
-    "name",
-    ["polyester_lining", "voile", *(pytest.param(x, marks=pytest.mark.slow) for x in ("silk_charmeuse", "twill_4_4"))],
-)
-def test_the_brightest_method_returns_at_most_what_arrives(name):
-    # The integral is a sum over 256 directions of a smooth lobe: good to 1 %.
-    found = {r.metric: r.value for r in measure_furnace(Bounded(Stub(bright)), load_fabric(name))}
-    assert found["furnace_diffuse"] <= 1.01
-    assert found["furnace_specular"] < 0.6
-
-
-@pytest.mark.slow
-def test_without_shadows_soft_nodes_make_no_light():
-    """The furnace of the bounds, 256 lights a patch: at most 1 but for the error of the sequence; no component above.
-
-    Diffuse: exactly bounded. Specular, scattered once: far below.
+    At most 1 but for the error of 256 directions. Diffuse: exactly bounded. Specular, scattered once: far below.
     """
-    for name in ("polyester_lining", "silk_charmeuse", "voile"):
-        fabric = load_fabric(name)
-        reading = read_queries(tabulate(fabric), furnace_queries(fabric.weave.repeat))
-        energy = 2.0 * math.pi * reading.bounds.reshape(-1, DIRECTIONS, 4).mean(axis=1)
-        assert energy[:, 2:].sum(axis=1).max() < 1.005
-        assert energy[:, :2].sum(axis=1).max() < 0.7
-        assert (reading.components <= reading.bounds * 1.0001 + 1e-7).all()
+    fabric = load_fabric(name)
+    bright = FakeMethod(lambda queries: np.full((len(queries.u), 4), 1e3, np.float32))
+    found = {r.metric: r.value for r in measure_furnace(Bounded(bright), fabric)}
+    assert found["furnace_diffuse"] <= 1.005
+    assert found["furnace_specular"] < 0.6
+    reading = read_queries(tabulate(fabric), furnace_queries(fabric.weave.repeat))
+    assert (reading.components <= reading.bounds * 1.0001 + 1e-7).all()

@@ -13,7 +13,3 @@ def test_plots_are_described_with_their_fronts_and_their_lowest_and_highest_valu
     assert "woven" in texts["error-against-time"] and "NeuMIP" not in texts["error-against-time"]
     assert "Lowest: points, k = 1 (420 ns); highest: points, k = 64" in texts["timing"]
     assert "Lowest, seen fabrics: points, k = 64" in texts["errors"]
-
-
-def test_nothing_measured_names_nothing():
-    assert not any("owest" in text or "front" in text for text in alt_texts(page_frames([])).values())

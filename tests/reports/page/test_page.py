@@ -66,6 +66,7 @@ def test_page_keeps_its_records_and_the_machine_of_the_times(folder, page_input)
     assert machine.model_copy(update={"sha256": ""}) == page_input.machine
     table = pd.read_csv(folder / "tables" / "records.csv")
     assert table["value"].to_numpy() == pytest.approx([record.value for record in page_input.records])
+    assert {"dataset", "seed", "threads"} < {*table} and {"curve", "samples"}.isdisjoint(table)
     for csv in (folder / "tables").glob("*.csv"):
         assert list(pd.read_csv(csv)) == list(pd.read_parquet(csv.with_suffix(".parquet")))
 

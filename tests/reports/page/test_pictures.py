@@ -51,11 +51,6 @@ def test_strips_are_in_order_and_say_their_errors():
     assert [strip.cells[-1]["mse"] for strip in found[1:]] == ["2.00e−3", "–", "5.00e−4"]
 
 
-def test_stems_hold_no_spaces():
-    assert file("point_sampled", "k = 2").stem == "scene-attic-point_sampled-k-2"
-    assert file("truth", fabric="denim").stem == "denim-attic-truth"
-
-
 def test_every_row_shows_its_frames_and_a_slice_over_time():
     frames = np.linspace(0.0, 0.6, 8 * 12 * 20 * 3).reshape(8, 12, 20, 3)
     picture = matplotlib.image.imread(io.BytesIO(filmstrip({"truth": frames, "points": frames[::-1]})), format="png")

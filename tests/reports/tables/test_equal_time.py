@@ -59,7 +59,3 @@ def test_each_setting_of_the_front_is_compared_with_all_but_itself():
     own = table[(table["method"] == "soft_nodes") & (table["measure"] == "specular")].set_index(["setting", "size"])
     assert own["ratio"]["k = 1", "1 to 3"] == pytest.approx(4.0)
     assert own["ratio"]["k = 2", "below .1"] == pytest.approx(0.5)
-
-
-def test_no_records_give_an_empty_table():
-    assert equal_time_table(size_table([])).empty

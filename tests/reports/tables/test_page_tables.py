@@ -84,24 +84,11 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
     assert shown["ms to add a fabric"] == "12.5" and shown["memory of a call"] == "30.00 MB"
 
 
-def test_answers_that_are_not_finite_are_counted():
-    subject = Record(method="m", setting="s", fabric="a")
-    records = [subject.of("extreme_error", 0.5, 9, curve=((1.0, 0.1),))]
-    records += [subject.of("extreme_not_finite", value, 90) for value in (3.0, 1.0)]
-    (extremes,) = tables_of(records, "stability")
-    assert cells_of(extremes, "m, s")["NaN, ∞"].text == "4 of 180 ✗"
-
-
 def test_records_of_before_intervals_are_shown_without_one():
     records = CALIBRATIONS.to_records([Calibration("auto", "solid", 0.9, 0.002, 0.8, 1.0, 1.0, 0.0, 100)])
     old = [record.model_copy(update={"low": None, "high": None}) for record in records]
     shown = [str(tables_of(found, "accuracy")[0].rows[0].cells[1]) for found in (old, records)]
     assert shown == ["0.90", "0.90 (0.80 … 1.00)"]
-
-
-def test_nothing_measured_gives_no_tables():
-    frames = ranged_frames(page_frames([]))
-    assert result_tables([], frames, {}) == {}
 
 
 def measured(method, setting="", **numbers):
@@ -141,15 +128,6 @@ def test_a_scene_has_the_range_over_trainings_beside_its_interval():
     assert ranges["MSE"] == "[2.00 … 6.00]e−3" and ranges["PSNR, dB"] == "[31.2 … 93.8]"
     assert ranges["colour"] == "[0 … 0]" and ranges["ms a frame"] == "" and ranges["flicker"] == "[−6.00 … −2.00]e−3"
     assert not any(cell.range for cell in cells_of(attic(records), "points, k = 2").values())
-
-
-def test_the_table_keeps_intervals_and_floors():
-    table = scene_table(RECORDS)
-    woven, points = table.to_dict("records")
-    assert (woven["mse_low"], woven["mse"], woven["mse_high"]) == (1.8e-3, 2e-3, 2.3e-3)
-    assert (woven["psnr_floor"], woven["truth_noise"], woven["ratio"]) == pytest.approx((40.0, 1e-5, 4.0))
-    assert math.isnan(points["psnr_low"]) and math.isnan(points["fovvideovdp"])
-    assert scene_table([]).columns.tolist() == table.columns.tolist()
 
 
 def test_numbers_of_a_scene_have_their_intervals_and_the_last_row_is_the_truths_noise():

@@ -1,14 +1,12 @@
 """Sentences of a page: what is the cheapest, the paper's comparison, other work on the machine, facts of the limits."""
 
 import math
-import time
 
 import pandas as pd
 import pytest
 
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.bounded import Bounded
-from reports.measure.timing import Contender, time_side_by_side
 from reports.record import Record
 from reports.tables.sentences import (
     BOUNDED,
@@ -22,7 +20,6 @@ from reports.tables.sentences import (
     trade,
     waited,
 )
-from tests.reports.measure.test_timing import many_queries
 
 
 def test_the_cheapest_within_each_limit_is_said():
@@ -151,32 +148,6 @@ def test_the_headline_is_of_what_is_learnt_and_bounded_where_that_was_measured()
     assert learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("selvage", "")]
     assert learnt(errors, {"woven", "neumip", "selvage"}) == [("point_sampled", "k = 1")]
     assert Bounded(SoftNodes()).setting == f"k = 2 {BOUNDED}"
-
-
-def spinning(seconds, share):
-    """Return a method that runs for a share of a time and sleeps for the rest, as if others had the processor."""
-
-    def predict(fabric, queries):
-        end = time.thread_time() + seconds * share
-        while time.thread_time() < end:
-            pass
-        time.sleep(seconds * (1.0 - share))
-
-    return predict
-
-
-def test_time_that_a_method_did_not_run_is_waiting():
-    """Asleep for nine tenths: other work can only add to it, and its own running is a tenth at most."""
-    idle, many = time_side_by_side(
-        [
-            Contender(spinning(0.01, 0.1), many_queries(10)),
-            Contender(spinning(0.01, 0.1), many_queries(10), threads=2),
-        ],
-        repeats=5,
-        warm_up=1,
-    )
-    assert 0.85 < idle.waited < 1.0
-    assert math.isnan(many.waited)
 
 
 def of(*shares):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reports.truth.calibration import CLASSES, RECORDS, Calibration, compared, interval, measure
+from reports.truth.calibration import CLASSES, Calibration, compared, interval, measure
 
 
 def test_the_comparison_of_normal_errors():
@@ -18,18 +18,6 @@ def test_the_comparison_of_normal_errors():
     noisy = wrong + error * rng.standard_normal(error.shape)
     ratio, _ = compared(noisy, error, error, error)
     assert ratio == pytest.approx(1.0, rel=0.02)
-
-
-@pytest.mark.slow
-def test_records_bring_calibrations_back():
-    kinds = ("light behind", "curved")
-    found = list(measure(fabrics=1, rows=8, estimators=("owen", "node_table"), reference=1 << 10, kinds=kinds))
-    assert [(row.kind, row.estimator) for row in found] == [
-        ("curved", "owen"),
-        ("light behind", "owen"),
-        ("light behind", "node_table"),
-    ]
-    assert RECORDS.from_records(RECORDS.to_records(found)) == found
 
 
 @pytest.mark.parametrize(

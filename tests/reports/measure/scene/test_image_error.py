@@ -16,7 +16,6 @@ ALL = np.ones((SIZE, SIZE), dtype=bool)
 DISC = np.hypot(Y - 32, X - 32) < 28
 CLOTH = (0.25 + 0.1 * np.sin(X / 2.5) * np.cos(Y / 4))[..., None] * [1.0, 0.8, 0.6]
 EXACT = np.zeros_like(CLOTH)
-HIGHER_IS_BETTER = ("psnr", "ssim")
 
 
 def flat(*rgb):
@@ -27,14 +26,6 @@ def values(picture, truth=CLOTH):
     errors = image_errors(picture, truth, EXACT, ALL)
     perceived = {metric: measure.value for metric, measure in errors.perceived.items()}
     return perceived | {"mse": errors.mse.value, "mse_relative": errors.mse_relative.value}
-
-
-def assert_ordered(*pictures, truth=CLOTH):
-    """Every measure says that each picture is better than the next."""
-    for better, worse in itertools.pairwise(values(picture, truth) for picture in pictures):
-        for name in better:
-            lower, upper = (worse, better) if name in HIGHER_IS_BETTER else (better, worse)
-            assert lower[name] < upper[name], name
 
 
 def test_equal_pictures_have_no_error():
@@ -78,25 +69,14 @@ def test_measures_that_do_not_know_the_unit_of_light():
     assert bright["delta_e"] != pytest.approx(found["delta_e"], rel=0.1)
 
 
-def test_every_measure_rises_with_noise_and_with_blur():
+def test_every_measure_is_worse_with_noise_and_with_blur():
     noise = np.random.default_rng(1).standard_normal(CLOTH.shape)
-    assert_ordered(CLOTH, *(CLOTH + size * noise for size in (0.005, 0.02, 0.08)))
-    assert_ordered(CLOTH, *(ndimage.gaussian_filter(CLOTH, (size, size, 0)) for size in (0.5, 1.0, 2.0)))
-
-
-def test_aliasing_is_worse_than_filtering():
-    """Stripes of 1.1 pixels: the truth integrates each pixel, a filter half as wide again blurs, its centre aliases."""
-    offsets = np.linspace(-2, 2, 401)
-
-    def stripes(sigma):
-        weights = np.exp(-0.5 * (offsets / sigma) ** 2)
-        row = sum(
-            w * np.cos(2 * np.pi * (X[0] + o) / 1.1) for o, w in zip(offsets, weights / weights.sum(), strict=True)
-        )
-        return np.broadcast_to((0.25 + 0.2 * row)[None, :, None], CLOTH.shape)
-
-    truth = stripes(0.3)
-    assert_ordered(stripes(0.45), stripes(1e-3), truth=truth)
+    noisy = [CLOTH, *(CLOTH + size * noise for size in (0.005, 0.02, 0.08))]
+    blurred = [CLOTH, *(ndimage.gaussian_filter(CLOTH, (size, size, 0)) for size in (0.5, 1.0, 2.0))]
+    for pictures in (noisy, blurred):
+        for better, worse in itertools.pairwise(map(values, pictures)):
+            assert {name for name in better if better[name] > worse[name]} == {"psnr", "ssim"}
+            assert all(better[name] != worse[name] for name in better)
 
 
 def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores():

@@ -16,6 +16,7 @@ from reports.measure.scene.scene_errors import measure_scene, time_scene, write_
 from reports.measure.scene.shot import read_shot, shoot
 from reports.measure.timing import CallTiming
 from reports.options import ImageOptions, RepeatOptions, SceneBenchOptions
+from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.errors import BadInput
 
 pytest.importorskip("mitsuba")
@@ -33,19 +34,14 @@ SCENES = SceneBenchOptions(
 INTERVALS = ("mse", "mse_relative", "psnr", "ssim", "flip_ldr", "flip_hdr", "delta_e", "flicker", "colour_rrmse")
 
 
-class Answers:
+class Answers(FakeMethod):
     """The truth with other points, times a factor."""
-
-    name = "answers"
 
     def __init__(self, factor, covered=True):
         self.factor, self.covered, self.setting = factor, covered, f"x {factor:g}"
 
     def covers(self, fabric):
         return self.covered
-
-    def prepare(self, fabric):
-        pass
 
     def predict(self, fabric, queries, seed=0):
         return self.factor * estimate(fabric, queries, COARSE, seed + 1).mean
@@ -155,7 +151,7 @@ def test_a_frames_time_weighs_every_cloth_by_its_queries(frames, monkeypatch):
     def readings(contenders, repeats, warm_up):
         assert [len(contender.queries) for contender in contenders] == [1] * 2 * len(counts)
         return [
-            CallTiming(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)), 1)
+            CallTiming(tuple(1e3 * (1 + index % len(counts)) * (1 + turn) for turn in range(repeats)))
             for index, _ in enumerate(contenders)
         ]
 
