@@ -47,6 +47,18 @@ def batch_of(queries, target, fabric=0):
     return Batch(torch.tensor([fabric]), **columns, target=torch.as_tensor(target)[None], transparency=through)
 
 
+def descend(optimiser, steps, loss):
+    """Take steps of an optimiser down a loss, a function of the step; return the losses."""
+    losses = []
+    for step in range(steps):
+        value = loss(step)
+        optimiser.zero_grad()
+        value.backward()
+        optimiser.step()
+        losses.append(value.item())
+    return losses
+
+
 class FakeMethod:
     """Answers as a test says, 1 if it says nothing, and remembers what it was asked."""
 

@@ -17,7 +17,7 @@ from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.models.stand_ins import SMALL, batch_of
+from tests.pipeline.models.stand_ins import SMALL, batch_of, descend
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.population import Population, population_fabrics
@@ -40,14 +40,7 @@ def trained_a_little(fabrics, steps):
     """Return a network after some steps on one batch, with its losses."""
     network, batch = SelvageNetwork(SELVAGE, fabrics), true_batch(fabrics, 5, 256)
     optimiser = torch.optim.AdamW(network.parameter_groups(1e-2))
-    losses = []
-    for step in range(steps):
-        loss = network.loss(batch, np.random.default_rng(step))
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-        losses.append(loss.item())
-    return network, losses
+    return network, descend(optimiser, steps, lambda step: network.loss(batch, np.random.default_rng(step)))
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from pipeline.models.domain import Domain
 from pipeline.models.network import NetworkMethod
 from pipeline.models.unified_btf.model import UnifiedBtfNetwork, averaged, decoder, restore
 from pipeline.shards.queries import QueryOptions, draw_queries
-from tests.pipeline.models.stand_ins import SMALL, batch_of, card_of, untrained
+from tests.pipeline.models.stand_ins import SMALL, batch_of, card_of, descend, untrained
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -51,13 +51,7 @@ def test_it_learns_what_differs_from_place_to_place():
     model.start_at(target)
     batch = batch_of(queries, target)
     optimiser = torch.optim.Adam(model.parameters(), lr=1e-2)
-    losses = []
-    for step in range(150):
-        loss = model.loss(batch, np.random.default_rng(step))
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-        losses.append(loss.item())
+    losses = descend(optimiser, 150, lambda step: model.loss(batch, np.random.default_rng(step)))
     assert np.mean(losses[-10:]) < 0.2 * losses[0]
 
 

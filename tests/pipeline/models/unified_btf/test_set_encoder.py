@@ -100,9 +100,3 @@ def test_samples_in_use_are_not_computed_again():
     assert texels_of(LINING.model_copy(update={"name": "other"}), SMALL) is held
     assert texels_of(LINING, SMALL.model_copy(update={"latent": 4})) is held
     assert texels_of(LINING, SMALL.model_copy(update={"max_angle": 60.0})) is not held
-
-
-@pytest.mark.parametrize("change", [{"samples": 3, "fewest_samples": 4}, {"texel_sigma": 0.0}, {"samples": 0}])
-def test_impossible_samples_are_refused(change):
-    with pytest.raises(ValueError, match=r"samples|texel_sigma"):
-        UnifiedBtfOptions.model_validate(change)

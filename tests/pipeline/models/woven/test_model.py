@@ -10,9 +10,9 @@ from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.models.woven.standard_position import SYMMETRIES
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
+from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.images import image_of
 from tests.pipeline.models.stand_ins import SMALL, batch_of
-from weaves.draft import Matrix
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -64,7 +64,7 @@ def test_training_sees_what_rendering_sees(one_blob):
 def test_mirror_images_are_answered_alike(symmetry):
     """Standard position makes it exact, with any weights, for a cloth without symmetries of its own."""
     method = Woven(WovenNetwork(WOVEN))
-    cloth = TWILL.model_copy(update={"draft": Matrix(rows=("##.#.", ".##.#", "#...#", ".#.##"))})
+    cloth = woven("cotton_twill", ("##.#.", ".##.#", "#...#", ".#.##"))
     asked = draw_queries(QueryOptions(), cloth.weave.repeat, 1, 0, 200)
     image, there, one = image_of(symmetry, cloth, asked)
     expected = one.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
@@ -89,14 +89,11 @@ def test_between_two_fabrics_lie_both_at_its_ends(standard):
 
 
 def test_a_colour_edit_needs_no_encoding_and_another_yarn_does():
-    network = WovenNetwork(WOVEN)
-    method, runs = Woven(network), []
-    network.encoder.register_forward_hook(lambda module, inputs, output: runs.append(1))
-    method.prepare(TWILL)
-    method.prepare(TWILL.model_copy(update={"warp": TWILL.warp.model_copy(update={"diffuse": (0.1, 0.2, 0.3)})}))
-    assert len(runs) == 1
-    method.prepare(TWILL.model_copy(update={"warp": TWILL.warp.model_copy(update={"roughness": 0.31})}))
-    assert len(runs) == 2
+    method, runs = Woven(WovenNetwork(WOVEN)), []
+    method.network_of(TWILL).encoder.register_forward_hook(lambda module, inputs, output: runs.append(1))
+    for changes, encoded in (({}, 1), ({"diffuse": (0.1, 0.2, 0.3)}, 1), ({"roughness": 0.31}, 2)):
+        method.prepare(woven("cotton_twill", warp=changes))
+        assert len(runs) == encoded
 
 
 def test_start_at_sets_the_bias_to_the_mean_in_network_space():
@@ -114,9 +111,8 @@ def test_transmission_sees_widths_and_answers_transparency():
     """Cloths that differ in width alone have other latents; transparency stays in [0, 1]; off, it is 0."""
     options = WOVEN.model_copy(update={"transmission": True})
     voile = load_fabric("voile")
-    narrow = voile.model_copy(update={"warp": voile.warp.model_copy(update={"width": 0.6})})
     method = Woven(WovenNetwork(options))
-    cloth = read_cloth([voile, narrow], options)
+    cloth = read_cloth([voile, woven("voile", warp={"width": 0.6})], options)
     assert cloth.parameters.shape == (2, 7)
     assert not torch.equal(cloth.parameters[0], cloth.parameters[1])
     asked = draw_queries(QueryOptions(behind=0.5), voile.weave.repeat, 1, 0, 64)
