@@ -7,6 +7,7 @@ most accurate. `selvage:.02` is that model at a wished relative error.
 
 from __future__ import annotations
 
+from pipeline.models.card import CARD
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
@@ -14,7 +15,7 @@ from pipeline.models.options import Options
 from pipeline.models.registry import load_methods, load_model, model_folder, pretrained_names
 from pipeline.models.selvage.model import Selvage
 from pipeline.storage import place
-from weaves.errors import BadInput, nearest
+from weaves.errors import BadInput
 from weaves.validation import validated
 
 TRUTH = "truth"
@@ -66,12 +67,9 @@ def _loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
             allowed = "a relative error above 0 and below 1 after the colon is needed, such as :.02"
             raise BadInput(where, key, name, allowed) from error
         return chosen, _kinds(chosen)
-    if name not in pretrained_names() and not (place(name, key) / "card.json").is_file():
-        if name in CLASSES:
-            raise BadInput(where, key, name, "must be trained first: name the folder of a trained one, out/models/…")
-        known = [TRUTH, *pretrained_names(), *untrained_names()]
-        raise BadInput(where, key, name, f"the folder of a trained model or a name is needed; {nearest(name, known)}")
-    (method,) = load_model(model_folder(name, where, key))
+    if name in CLASSES and name not in pretrained_names() and not (place(name, key) / CARD).is_file():
+        raise BadInput(where, key, name, "must be trained first: name the folder of a trained one, out/models/…")
+    (method,) = load_model(model_folder(name, where, key, [TRUTH, *untrained_names()]))
     return method, _kinds(method)
 
 

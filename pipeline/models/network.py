@@ -120,7 +120,7 @@ class QueryNetwork(Trainable):
 
 
 Net = TypeVar("Net", bound=QueryNetwork)
-Weighed = TypeVar("Weighed", bound=nn.Module)
+Learnt = TypeVar("Learnt", bound=Trainable)
 
 
 class PerQuery(NamedTuple):
@@ -135,11 +135,11 @@ class PerQuery(NamedTuple):
     constants: tuple[Tensor, ...] = ()
     """Inputs of the module for the fabric. Fabrics whose constants have equal shapes may share the module."""
 
-    def answered(self, queries: Queries, run: Callable[..., Tensor] | None = None) -> Float32:
-        """Return the components of N queries, (N, 4), by the module or by what runs in its place."""
+    def answered(self, queries: Queries, run: Callable[..., Tensor] | None = None, width: int = 4) -> Float32:
+        """Return the components of N queries, (N, 4), by the module; or what runs in its place returns, (N, width)."""
         self.refuse(queries)
         run = run or self.module
-        return evaluated(queries, self.inputs, lambda *inputs: run(*inputs, *self.constants))
+        return evaluated(queries, self.inputs, lambda *inputs: run(*inputs, *self.constants), width)
 
 
 @runtime_checkable
@@ -181,12 +181,6 @@ def one_thread() -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
-
-
-def loaded(network: Weighed, weights: dict[str, Tensor]) -> Weighed:
-    """Return a network with these weights; RuntimeError if they do not fit."""
-    network.load_state_dict(weights)
-    return network
 
 
 def evaluated(
@@ -266,9 +260,9 @@ class NetworkMethod(Generic[Net]):
 
 
 def restored(
-    options: Options, trained: Trained, make: Callable[[tuple[int, int]], Net]
-) -> tuple[dict[str, Net], Domain | None]:
-    """Return what a `NetworkMethod` is made of: trained networks, and their joint domain.
+    options: Options, trained: Trained, make: Callable[[tuple[int, int]], Learnt]
+) -> tuple[dict[str, Learnt], Domain | None]:
+    """Return what a `NetworkMethod` is made of: trained networks, and their joint domain; RuntimeError if they misfit.
 
     `make` returns an untrained network; a network of one material is made for the repeat (ends, picks) of its fabric.
     """
@@ -279,5 +273,6 @@ def restored(
             (fabric,) = card["fabrics"]
             key, (ends, picks) = fabric["optics"], fabric["repeat"]
             repeat = (ends, picks)
-        networks[key] = loaded(make(repeat), weights)
+        networks[key] = make(repeat)
+        networks[key].load_state_dict(weights)
     return networks, domain_of([card for card, _ in trained])

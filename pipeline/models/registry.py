@@ -8,7 +8,7 @@ the columns of its rows, fabric by fabric.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -55,7 +55,7 @@ def pretrained_names() -> list[str]:
     return sorted(path.parents[1].name for path in Path(__file__).parent.glob(f"*/pretrained/{CARD}"))
 
 
-def model_folder(model: str, where: str, key: str) -> Path:
+def model_folder(model: str, where: str, key: str, others: Iterable[str] = ()) -> Path:
     """Return the folder of a trained model.
 
     Parameters
@@ -64,6 +64,8 @@ def model_folder(model: str, where: str, key: str) -> Path:
         Name of one that comes with the package, or path of a folder with ``model.safetensors`` and ``card.json``.
     where, key : str
         The function or verb and its argument that name the model, for messages.
+    others : iterable of str
+        Names that are allowed there beside those of the package's models.
 
     Raises
     ------
@@ -73,11 +75,12 @@ def model_folder(model: str, where: str, key: str) -> Path:
     known = pretrained_names()
     folder = pretrained_folder(model) if model in known else place(model, key)
     if not (folder / CARD).is_file():
-        raise BadInput(where, key, model, f"the folder of a trained model or a name is needed; {nearest(model, known)}")
+        names = nearest(model, [*known, *others])
+        raise BadInput(where, key, model, f"the folder of a trained model or a name is needed; {names}")
     return folder
 
 
-def build_network(options: ModelOptions, fabrics: Sequence[Fabric], extra: Sequence[Any] = ()) -> Any:
+def build_network(options: ModelOptions, fabrics: Sequence[Fabric], extra: Iterable[Any] = ()) -> Any:
     """Return an untrained `pipeline.models.network.Trainable`.
 
     Parameters
@@ -86,7 +89,7 @@ def build_network(options: ModelOptions, fabrics: Sequence[Fabric], extra: Seque
         The design; it must be one that learns.
     fabrics : sequence of Fabric
         What it learns; one for a model of one material.
-    extra : sequence
+    extra : iterable
         One list for each set that ``options.extra_rows`` declares: the columns of its rows, fabric by fabric.
 
     Raises

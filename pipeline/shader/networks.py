@@ -17,8 +17,8 @@ from pipeline.analytic.soft_nodes import features
 from pipeline.analytic.soft_nodes.features import OF_QUERY
 from pipeline.compiled.arrays import Float32
 from pipeline.models.networks.layers import SLOPE, LinearLayer, layers_of
-from pipeline.models.networks.texture import DEPTH_SCALE, STEEPEST, texels_of
-from pipeline.models.neumip.model import LAYERS, Neumip, NeumipNetwork
+from pipeline.models.networks.texture import DEPTH_SCALE, LAYERS, STEEPEST, texels_of
+from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.models.runtimes import as_onnx
 from pipeline.models.selvage.model import LARGEST_FACTOR, Selvage
 from pipeline.shader.constants import TEXTURE_WIDTH, shared_constants

@@ -33,6 +33,7 @@ from pipeline.training.dataset import TARGET, Batches, Order, load_rows
 from pipeline.training.options import TrainingOptions
 from pipeline.training.validation import HeldOut
 from weaves.errors import BadInput, nearest
+from weaves.fabric import Fabric
 
 ROWS = "rows.npy"
 
@@ -74,11 +75,11 @@ def train(
     """
     device = chosen_device(training.device)
     manifest = Manifest.load(manifest_folder)
-    for name in fabrics:
-        if name not in manifest.fabrics:
-            raise BadInput(str(manifest_folder), "fabric", name, nearest(name, manifest.fabrics))
+    if missing := [name for name in fabrics if name not in manifest.fabrics]:
+        raise BadInput(str(manifest_folder), "fabric", missing[0], nearest(missing[0], manifest.fabrics))
     members = [manifest.fabrics[name] for name in fabrics]
-    identity = _identity(options, training, manifest, fabrics)
+    card = _card(options, training, manifest, members)
+    identity = fingerprint(card)  # of everything that shapes the weights
     with _reproducible(training.threads, device):
         rows = load_rows(manifest, manifest_folder, fabrics, folder / f"{identity}-{ROWS}")
         order = Order(rows.counts, training.batch, training.fabrics, training.seed)
@@ -87,9 +88,8 @@ def train(
         # Build the network; its last bias starts at the mean of a spread of targets.
         torch.manual_seed(training.seed)
         sets = [set_name(rows) for rows in options.extra_rows]
-        extra = [[manifest.columns(manifest_folder, name, own) for name in fabrics] for own in sets]
+        extra = ([manifest.columns(manifest_folder, name, own) for name in fabrics] for own in sets)
         network = build_network(options, members, extra)
-        del extra
         stride = max(len(rows.table) // _START_ROWS, 1)
         network.start_at(torch.from_numpy(rows.table[::stride, TARGET].copy()))
         network.to(device).train()
@@ -97,7 +97,7 @@ def train(
         optimiser = torch.optim.AdamW(groups, weight_decay=training.weight_decay, fused=True)
         peaks = [group["lr"] for group in optimiser.param_groups]
         learnt = torch.compile(network.loss) if training.compile else network.loss
-        card = _card(options, training, manifest, fabrics) | {"architecture": network.architecture()}
+        card["architecture"] = network.architecture()
         held_out = HeldOut(options, card, manifest, manifest_folder, training.validation_rows)
         watched = held_out.batch(device)
 
@@ -107,7 +107,8 @@ def train(
         interval = math.ceil(training.steps / training.curve_points)
         looks = math.ceil(training.curve_points / training.held_out_points) * interval
         for step in range(first, training.steps):
-            _set_rate(optimiser, peaks, rate_factor(step, training))
+            for group, peak in zip(optimiser.param_groups, peaks, strict=True):
+                group["lr"] = rate_factor(step, training) * peak
             network.schedule(step / training.steps)
             batch, random = batches.step(step), order.random(step)
             with network.call("loss"):
@@ -156,12 +157,6 @@ def _kept(state: State) -> dict[str, Any]:
         return {"weights": "running average of the last step", "watched": "nothing: there are no held-out queries"}
     watched = "held_out_loss: the loss of the training on held-out queries of the fabrics it learns from"
     return {"weights": "running average of the step with the lowest held_out_loss", "watched": watched, **state.best}
-
-
-def _set_rate(optimiser: torch.optim.Optimizer, peaks: Sequence[float], factor: float) -> None:
-    """Set the learning rate of each group of parameters to a share of its peak."""
-    for group, peak in zip(optimiser.param_groups, peaks, strict=True):
-        group["lr"] = factor * peak
 
 
 def _descend(network: nn.Module, optimiser: torch.optim.Optimizer, loss: torch.Tensor, clip: float) -> torch.Tensor:
@@ -215,28 +210,18 @@ def _reproducible(threads: int, device: torch.device) -> Iterator[None]:
         torch.use_deterministic_algorithms(before[1])
 
 
-def _identity(options: Any, training: TrainingOptions, manifest: Manifest, fabrics: Sequence[str]) -> str:
-    """Fingerprint everything that shapes the weights."""
-    return fingerprint(_card(options, training, manifest, fabrics))
-
-
-def _card(options: Any, training: TrainingOptions, manifest: Manifest, fabrics: Sequence[str]) -> dict[str, Any]:
+def _card(options: Any, training: TrainingOptions, manifest: Manifest, fabrics: Sequence[Fabric]) -> dict[str, Any]:
     """Return the part of the card that is known before the training."""
-    members = [manifest.fabrics[name] for name in fabrics]
     return {
         "model": options.model,
         "name": options.name,
-        "domain": Domain.of(manifest.about, members).model_dump(mode="json"),
+        "domain": Domain.of(manifest.about, fabrics).model_dump(mode="json"),
         "version": {"model": options.version, "training": versions.TRAINING},
         "options": options.model_dump(mode="json", context=IDENTITY),
         "training": training.model_dump(mode="json", context=IDENTITY, exclude={"device", "checkpoint_every"}),
         "dataset": {"name": manifest.name, "fingerprint": manifest.fingerprint},
         "fabrics": [
-            {
-                "name": name,
-                "optics": fingerprint(manifest.fabrics[name].optics()),
-                "repeat": list(manifest.fabrics[name].weave.repeat),
-            }
-            for name in fabrics
+            {"name": fabric.name, "optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)}
+            for fabric in fabrics
         ],
     }

@@ -68,8 +68,7 @@ class HeldOut:
     def error_and_noise(self, weights: dict[str, Tensor]) -> tuple[float, float]:
         """Return the mean squared error over all components, as measured, and the truth's own; not without queries."""
         sums = np.zeros(2)
-        for name, prediction, _, answers in self._answered(weights, self._look):
-            del name
+        for _, prediction, _, answers in self._answered(weights, self._look):
             sums += [np.square(prediction - answers.mean).mean(), np.square(answers.standard_error).mean()]
         error, noise = (sums / len(self._rows)).tolist()
         return error, noise

@@ -75,12 +75,7 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
     with faults_of(source.name, "import", LOADING, source.root):
         module = source.imported()
     make = source.of(module)
-    code = {
-        "source": source.text,
-        "folder": source.folder,
-        "sha256": sha256,
-        "distribution": source.distribution(),
-    }
+    code = {"source": source.text, "folder": source.folder, "sha256": sha256, "distribution": source.distribution()}
     if inspect.isfunction(make):
         return {**_stated_by_function(make, text), **code}
     if not callable(make):

@@ -71,35 +71,34 @@ class GuardedNetwork(Trainable):
 
     def start_at(self, target: Tensor) -> None:
         """Show the network some targets (M, 4) before the first step."""
-        with self.call("start_at"):
-            self._own("start_at", super().start_at)(target)
+        self._own("start_at", super().start_at, target)
 
     def schedule(self, progress: float) -> None:
         """Adjust scheduled parameters."""
-        with self.call("schedule"):
-            self._own("schedule", super().schedule)(progress)
+        self._own("schedule", super().schedule, progress)
 
     def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
         """Return the optimiser's parameter groups."""
+        groups: list[dict[str, Any]] = self._own("parameter_groups", super().parameter_groups, rate)
         with self.call("parameter_groups"):
-            groups: list[dict[str, Any]] = self._own("parameter_groups", super().parameter_groups)(rate)
             torch.optim.AdamW(groups)  # refuses what is no group here, where the fault has a name
-            return groups
+        return groups
 
     def architecture(self) -> dict[str, Any]:
         """Return parameters and layers for the model card, what the network says of itself, and its fabrics."""
         counted = super().architecture()
         layers = {name.removeprefix("network."): shape for name, shape in counted["layers"].items()}
+        own = self._own("architecture", dict)
         with self.call("architecture"):
-            own = dict(self._own("architecture", dict)())
+            own = dict(own)
             json.dumps(own, allow_nan=False)
         fabrics = [{"name": fabric.name, **fabric.optics()} for fabric in self.fabrics]
         return {**counted, "layers": layers, **own, "fabrics": fabrics}
 
-    def _own(self, function: str, default: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function of the network, or its default."""
-        own: Callable[..., Any] = getattr(self.network, function, default)
-        return own
+    def _own(self, function: str, default: Callable[..., Any], *given: Any) -> Any:
+        """Call a function of the network, or its default."""
+        with self.call(function):
+            return getattr(self.network, function, default)(*given)
 
 
 class PerFabricMethod:

@@ -8,7 +8,7 @@ product of the means.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -19,11 +19,6 @@ from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
     from pipeline.materials.lookup import MaterialMaps
-
-_Colour = tuple[float, float, float]
-_RED: Final[_Colour] = (1.0, 0.0, 0.0)
-_GREEN: Final[_Colour] = (0.0, 1.0, 0.0)
-_WHITE: Final[_Colour] = (1.0, 1.0, 1.0)
 
 
 def _power_of_two(size: int) -> int:
@@ -79,17 +74,17 @@ def _tables(fabric: Fabric, options: MapMaterialOptions) -> MaterialMaps:
     if options.sheen:
         # What a white cloth lacks at grazing views goes to the components that have light there.
         grazing = np.concatenate([options.specular * share.grazing_specular, share.grazing_diffuse])
-        white = _painted(fabric, options.specular, (_WHITE, _WHITE))
+        white = _painted(fabric, options.specular, warp=(1.0, 1.0, 1.0), weft=(1.0, 1.0, 1.0))
         sheen = constants(white, share).sheen[0] * grazing / grazing.sum()
-    painted = _painted(fabric, options.specular, (_RED, _GREEN))
+    painted = _painted(fabric, options.specular, warp=(1.0, 0.0, 0.0), weft=(0.0, 1.0, 0.0))
     chosen = layout(painted, options.size)
     return tabulate(planes(painted, chosen, share), constants(painted, share), chosen, sheen, options.specular)
 
 
-def _painted(fabric: Fabric, specular: float, colours: tuple[_Colour, _Colour]) -> Fabric:
+def _painted(fabric: Fabric, specular: float, **colours: tuple[float, float, float]) -> Fabric:
     """Return the fabric with all ends of one colour and all picks of one; `specular` scales their highlights."""
     yarns = {}
-    for name, colour in zip(("warp", "weft"), colours, strict=True):
+    for name, colour in colours.items():
         glossy = tuple(specular * channel for channel in colour)
         every = {"diffuse": colour, "diffuse_transmission": colour, "specular": glossy}
         yarns[name] = getattr(fabric, name).model_copy(update=every)

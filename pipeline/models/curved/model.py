@@ -32,9 +32,9 @@ from torch.nn import functional
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.curved import CurvedOptions
-from pipeline.models.network import Batch, NetworkMethod, Trained, evaluated, restored
+from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import component_error, perceptron, to_components, to_network
-from pipeline.models.networks.texture import TextureNetwork, level_shapes, random_pyramid
+from pipeline.models.networks.texture import LAYERS, TextureNetwork, level_shapes, random_pyramid
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.opacity import has_gaps
 from pipeline.truth.options import TruthOptions
@@ -42,7 +42,6 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-_LAYERS = 3  # hidden ones of all perceptrons
 _SHARPEST = 0.02  # least deviation of the grazing cosine, in units of sqrt(kappa): a step of no width cannot be learnt
 _NO_FALL = -1.0  # finite, because weights are averaged
 
@@ -131,18 +130,12 @@ class CurvedNetwork(TextureNetwork):
         super().__init__(options, repeat)
         self.silhouettes = silhouettes
         self.register_buffer("fall", torch.tensor(fall, dtype=torch.float32))
-        shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)
-        channels, hidden, view = options.channels, options.hidden, _view_inputs(options)
+        view, light = _axes(options) + (2 if options.curvature_input == "touch" else 1), _axes(options)
         coarse = level_shapes(options.silhouette_texels_per_yarn, options.levels, repeat)
-        self.opacity_levels = random_pyramid(channels, coarse)
-        self.opacity = perceptron(channels + view, hidden, _LAYERS, 2 if options.silhouette == "grazing" else 1)
-        self.levels = random_pyramid(channels, shapes)
-        self.decoder = perceptron(channels + view + _axes(options), hidden, _LAYERS, 4)
-        self.depth = None
-        self.offset = None
-        if options.offset:
-            self.depth = nn.Parameter(torch.zeros(channels, *shapes[0]))
-            self.offset = perceptron(channels + view, hidden, _LAYERS, 1)
+        self.opacity_levels = random_pyramid(options.channels, coarse)
+        outputs = 2 if options.silhouette == "grazing" else 1
+        self.opacity = perceptron(options.channels + view, options.hidden, LAYERS, outputs)
+        self.create_reflectance(view, light)
 
     def forward(self, view: View, wi: Tensor) -> Tensor:
         """Answer in network space, (n, 4), for light from wi (n, 3)."""
@@ -185,7 +178,7 @@ class CurvedNetwork(TextureNetwork):
         target = to_network(batch.target.flatten(0, 1), options.log_k)
         output = self(view, batch.wi.flatten(0, 1))
         error = component_error(output, target, options)
-        if self.silhouettes is None or options.silhouette_weight == 0:
+        if self.silhouettes is None:
             return error
         return error + options.silhouette_weight * self._edge_loss(*self.silhouettes.draw(len(view.u), random))
 
@@ -221,22 +214,17 @@ def _axes(options: CurvedOptions) -> int:
     return 3 if options.directions == "vector" else 2
 
 
-def _view_inputs(options: CurvedOptions) -> int:
-    return _axes(options) + (2 if options.curvature_input == "touch" else 1)
-
-
 class Curved(NetworkMethod[CurvedNetwork]):
     """Trained materials for curved surfaces, one network for each fabric."""
 
     def missed(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
-        self.refuse(queries)
         network = self.network_of(fabric)
 
         def through(*inputs: Tensor) -> Tensor:
             return (1.0 - network.cover(View(*inputs[:-1]))).unsqueeze(-1)
 
-        return evaluated(queries, self.per_query(fabric).inputs, through, 1)[:, 0]
+        return self.per_query(fabric).answered(queries, through, 1)[:, 0]
 
     def refuse(self, queries: Queries) -> None:
         """Refuse queries of kinds not trained on, and those of cloth that bends more than any trained on."""

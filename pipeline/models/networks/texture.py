@@ -19,7 +19,7 @@ from torch.nn import functional
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.network import QueryNetwork
-from pipeline.models.networks.layers import start_at_mean
+from pipeline.models.networks.layers import perceptron, start_at_mean
 from pipeline.models.options import TextureOptions
 
 _FEATURE_SCALE = 0.1  # standard deviation of the first features
@@ -29,6 +29,9 @@ DEPTH_SCALE: Final = 0.1
 
 STEEPEST: Final = 0.6
 """Smallest wo.z that parallax is computed with."""
+
+LAYERS: Final = 3
+"""Hidden layers of all perceptrons."""
 
 
 def level_shapes(texels_per_yarn: int, levels: int, repeat: tuple[int, int]) -> list[tuple[int, int]]:
@@ -153,7 +156,7 @@ def texels_of(texture: Tensor) -> Float32:
 
 
 class TextureNetwork(QueryNetwork):
-    """Textures of one fabric, and perceptrons that read them; subclasses create the parts named here.
+    """Textures of one fabric, and perceptrons that read them.
 
     Parameters
     ----------
@@ -166,6 +169,8 @@ class TextureNetwork(QueryNetwork):
     ----------
     textures : tuple of str
         Names of those parts that are textures.
+    levels : nn.ParameterList
+        Pyramid of features, finest first.
     decoder : nn.Sequential
         Puts out the four components in network space.
     depth : nn.Parameter or None
@@ -176,6 +181,7 @@ class TextureNetwork(QueryNetwork):
 
     textures: ClassVar[tuple[str, ...]]
     options: TextureOptions
+    levels: nn.ParameterList
     decoder: nn.Sequential
     depth: nn.Parameter | None
     offset: nn.Sequential | None
@@ -184,6 +190,18 @@ class TextureNetwork(QueryNetwork):
         super().__init__()
         self.options, self.repeat = options, repeat
         self._blur = 0.0  # standard deviation, in finest texels
+
+    def create_reflectance(self, view: int, light: int) -> None:
+        """Create levels, decoder, depth and offset, for perceptrons that read so many numbers of view and light."""
+        options, channels = self.options, self.options.channels
+        shapes = level_shapes(options.texels_per_yarn, options.levels, self.repeat)
+        self.levels = random_pyramid(channels, shapes)
+        self.decoder = perceptron(channels + view + light, options.hidden, LAYERS, 4)
+        self.depth = None
+        self.offset = None
+        if options.offset:
+            self.depth = nn.Parameter(torch.zeros(channels, *shapes[0]))
+            self.offset = perceptron(channels + view, options.hidden, LAYERS, 1)
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean target."""

@@ -17,25 +17,17 @@ a mask. So are the counts of texels, queries and steps; the published training t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Final
+from typing import ClassVar
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import (
-    component_error,
-    perceptron,
-    to_components,
-    to_network,
-)
-from pipeline.models.networks.texture import TextureNetwork, level_shapes, random_pyramid
+from pipeline.models.networks.layers import component_error, to_components, to_network
+from pipeline.models.networks.texture import TextureNetwork
 from pipeline.models.neumip import NeumipOptions
 from weaves.fabric import Fabric
-
-LAYERS: Final = 3
-"""Hidden layers of both perceptrons."""
 
 
 class NeumipNetwork(TextureNetwork):
@@ -46,14 +38,7 @@ class NeumipNetwork(TextureNetwork):
 
     def __init__(self, options: NeumipOptions, repeat: tuple[int, int]) -> None:
         super().__init__(options, repeat)
-        shapes = level_shapes(options.texels_per_yarn, options.levels, repeat)  # (rows, columns), finest first
-        self.levels = random_pyramid(options.channels, shapes)
-        self.decoder = perceptron(options.channels + 4, options.hidden, LAYERS, 4)
-        self.depth = None
-        self.offset = None
-        if options.offset:
-            self.depth = nn.Parameter(torch.zeros(options.channels, *shapes[0]))
-            self.offset = perceptron(options.channels + 2, options.hidden, LAYERS, 1)
+        self.create_reflectance(2, 2)
 
     def forward(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
         """Answer in network space, (n, 4); u, v (n,) are shares of the repeat, sigma is in yarn spacings."""

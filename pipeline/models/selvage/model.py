@@ -45,11 +45,11 @@ from pipeline.analytic.soft_nodes.features import (
 )
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
 from pipeline.compiled.arrays import Float32, nbytes
-from pipeline.models.analytic.soft_nodes import Level, SoftNodes, soft_tables
-from pipeline.models.domain import Domain, domain_of
+from pipeline.models.analytic.soft_nodes import SoftNodes, soft_tables
+from pipeline.models.domain import Domain
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import CHUNK_ROWS, Around, refuse_other, row_by_row
-from pipeline.models.network import Answering, Batch, Columns, PerQuery, Trainable, Trained, loaded
+from pipeline.models.network import Answering, Batch, Columns, PerQuery, Trainable, Trained, restored
 from pipeline.models.networks.layers import SLOPE, LinearLayer
 from pipeline.models.per_fabric import PerFabric
 from pipeline.models.selvage import SelvageOptions
@@ -210,7 +210,24 @@ class _Folded:
         return x
 
 
-class Selvage:
+class _OverNodes:
+    """A method over soft nodes, which answer all that its network is not trained for."""
+
+    without_training: ClassVar[frozenset[str]] = SelvageOptions.without_training
+    """Kinds of queries that need no training: the soft nodes know them."""
+    turns: ClassVar[bool] = SelvageOptions.turns
+    nodes: SoftNodes
+
+    def outside_domain(self, fabric: Fabric, queries: Queries) -> Float32:
+        """Answer N queries that the network is not trained for, float32 (N, 4), by the soft nodes alone."""
+        return self.nodes.predict(fabric, queries)
+
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
+        """Return the transparency of N footprints, float32 (N,), by the soft nodes."""
+        return self.nodes.transparency(fabric, looks)
+
+
+class Selvage(_OverNodes):
     """A trained network that answers for any fabric; it tabulates each once.
 
     Parameters
@@ -221,16 +238,12 @@ class Selvage:
         Range of its training; any query of the soft nodes if left out.
     """
 
-    without_training: ClassVar[frozenset[str]] = SelvageOptions.without_training
-    """Kinds of queries that need no training: the soft nodes know them."""
-    turns: ClassVar[bool] = SelvageOptions.turns
-
     def __init__(self, network: SelvageNetwork, domain: Domain | None = None) -> None:
         self.name, self.setting, self.domain = network.options.name, "", domain
         self.bound = network.options.bound
         self._network = network.eval()
         self._cloths = PerFabric(self._tabulate)
-        self._nodes = SoftNodes(network.options.level, self.name)
+        self.nodes = SoftNodes(network.options.level, self.name)
         self._tables = soft_tables(network.options.level)
         self._correction = _Folded([*network.hidden, network.last], network)
         self._estimate = _Folded([network.errors.hidden, network.errors.last], network)
@@ -253,17 +266,9 @@ class Selvage:
         return row_by_row(
             queries,
             queries.wi[:, 2] < 0.0,
-            lambda part: self._nodes.predict(fabric, part),
+            lambda part: self.nodes.predict(fabric, part),
             lambda part: self._corrected(fabric, part),
         )
-
-    def outside_domain(self, fabric: Fabric, queries: Queries) -> Float32:
-        """Answer N queries that the network is not trained for, float32 (N, 4), by the soft nodes alone."""
-        return self._nodes.predict(fabric, queries)
-
-    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
-        """Return the transparency of N footprints, float32 (N,), by the soft nodes."""
-        return self._nodes.transparency(fabric, looks)
 
     def per_query(self, fabric: Fabric) -> PerQuery:
         """Return the network; the soft nodes are summed before it, and the bias of the fabric is its constant."""
@@ -320,12 +325,12 @@ class Selvage:
 
     def within(self, error: float) -> Adaptive:
         """Return the method that answers by more nodes where the estimated error exceeds a relative error."""
-        return Adaptive(self, self._network.options.finest, error)
+        return Adaptive(self, error)
 
     def _corrected(self, fabric: Fabric, queries: Queries, errors: Float32 | None = None) -> Float32:
         """Answer by the soft nodes and the network; write estimated `errors` (N, 2), if an array is given."""
         cloth = self._cloths.of(fabric)
-        table = self._nodes.table_for(fabric, queries) if (queries.curvature > 0.0).any() else cloth.table
+        table = self.nodes.table_for(fabric, queries) if (queries.curvature > 0.0).any() else cloth.table
         result = np.empty((len(queries.u), 4), np.float32)
         with torch.inference_mode():
             for start in range(0, len(result), CHUNK_ROWS):
@@ -348,34 +353,28 @@ class Selvage:
         return _Cloth(table, self._correction.bias(own), self._estimate.bias(own))
 
 
-class Adaptive(Around):
+class Adaptive(_OverNodes, Around):
     """A trained `selvage` that answers by more nodes where its error would exceed the wished one.
 
     Parameters
     ----------
     selvage : Selvage
         Answers first, and estimates errors.
-    finest : int
-        Level of detail of the soft nodes that answer second.
     error : float
         Wished relative error, above 0 and below 1; BadInput if it is another number.
     """
 
-    without_training: ClassVar[frozenset[str]] = SelvageOptions.without_training
-    """Kinds of queries that need no training: the soft nodes know them."""
-    turns: ClassVar[bool] = SelvageOptions.turns
-
-    def __init__(self, selvage: Selvage, finest: Level, error: float) -> None:
+    def __init__(self, selvage: Selvage, error: float) -> None:
         if not 0.0 < error < 1.0:
             raise BadInput(selvage.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
         super().__init__(selvage, f"error {100 * error:g} %")
         self.domain, self.error = selvage.domain, error
-        self._selvage, self._finest = selvage, SoftNodes(finest, selvage.name)
+        self._selvage, self.nodes = selvage, SoftNodes(selvage.options.finest, selvage.name)
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric for both levels of soft nodes and for the fallback, once."""
         self._selvage.prepare(fabric)
-        self._finest.prepare(fabric)
+        self.nodes.prepare(fabric)
         fallback_answers(fabric, _ANY, 0)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
@@ -383,21 +382,13 @@ class Adaptive(Around):
         return row_by_row(
             queries,
             queries.wi[:, 2] < 0.0,
-            lambda part: self._finest.predict(fabric, part),
+            lambda part: self.nodes.predict(fabric, part),
             lambda part: self._answers(fabric, part, seed),
         )
 
-    def outside_domain(self, fabric: Fabric, queries: Queries) -> Float32:
-        """Answer N queries that the network is not trained for, float32 (N, 4), by the finest soft nodes."""
-        return self._finest.predict(fabric, queries)
-
-    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
-        """Return the transparency of N footprints, float32 (N,), by the finest soft nodes."""
-        return self._finest.transparency(fabric, looks)
-
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of both tables and of the network; the tables of the fallback are shared by all methods."""
-        return self._selvage.bytes_stored(fabric) + self._finest.bytes_stored(fabric)
+        return self._selvage.bytes_stored(fabric) + self.nodes.bytes_stored(fabric)
 
     def _answers(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
         """Answer queries with the light in front."""
@@ -406,7 +397,7 @@ class Adaptive(Around):
         finer = too_far & (errors[:, FINEST] <= self.error)
         left = too_far & ~finer
         if finer.any():
-            result[finer] = self._finest.predict(fabric, queries.take(finer))
+            result[finer] = self.nodes.predict(fabric, queries.take(finer))
         if left.any():
             result[left] = fallback_answers(fabric, queries.take(left), seed)
         return result
@@ -419,4 +410,5 @@ def build(options: SelvageOptions, fabrics: Sequence[Fabric]) -> SelvageNetwork:
 
 def restore(options: SelvageOptions, trained: Trained) -> list[Selvage]:
     """Return the method of a trained network."""
-    return [Selvage(loaded(SelvageNetwork(options), weights), domain_of([card])) for card, weights in trained]
+    networks, domain = restored(options, trained, lambda _: SelvageNetwork(options))
+    return [Selvage(network, domain) for network in networks.values()]

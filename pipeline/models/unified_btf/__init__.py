@@ -52,14 +52,7 @@ class BtfOptions(ComponentLossOptions):
     @property
     def angular_samples(self) -> AngularSamples:
         """The samples of a fabric's texels."""
-        return AngularSamples(
-            texels_per_yarn=self.texels_per_yarn,
-            texel_sigma=self.texel_sigma,
-            samples=self.samples,
-            directions=self.directions,
-            max_angle=self.max_angle,
-            truth=self.truth,
-        )
+        return AngularSamples(**{name: getattr(self, name) for name in AngularSamples.model_fields if name != "kind"})
 
     @property
     def extra_rows(self) -> tuple[ExtraRows, ...]:

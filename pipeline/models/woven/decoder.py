@@ -82,11 +82,6 @@ def encoded_size(sigma: Tensor, smallest: float, largest: float) -> Tensor:
     return (torch.log2(sigma / smallest) / span).clamp(0.0, 1.0)
 
 
-def patch_size(options: WovenOptions) -> int:
-    """Return the length of the encoded place and size of a footprint."""
-    return 3 if options.one_blob == "none" else 3 * options.bins
-
-
 def encode_patch(
     options: WovenOptions, u: Tensor, v: Tensor, sigma: Tensor, repeat: Tensor
 ) -> tuple[Tensor | None, Tensor]:
@@ -135,7 +130,7 @@ class Decoder(nn.Module):
 
     def __init__(self, options: WovenOptions) -> None:
         super().__init__()
-        hidden, patch = options.hidden, patch_size(options)
+        hidden, patch = options.hidden, 3 if options.one_blob == "none" else 3 * options.bins
         self.latent = options.latent
         self.first = nn.Linear(options.latent + patch + (0 if options.spatial_fusion else _DIRECTIONS), hidden)
         self.filters: nn.Linear | None = None

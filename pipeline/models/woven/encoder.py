@@ -27,11 +27,6 @@ from weaves.fabric import Fabric
 from weaves.surface import surface_at
 
 
-def parameter_count(options: WovenOptions) -> int:
-    """Return how many parameters a fabric has beside its maps."""
-    return 7 if options.transmission else 4
-
-
 class WovenInputs(NamedTuple):
     """Inputs of the network from F fabrics, in standard position.
 
@@ -126,7 +121,7 @@ class Encoder(nn.Module):
         self.local, self.bins = options.one_blob == "local", options.bins
         flat = channels[-1] if self.local else channels[-1] * (options.map_texels // 16) ** 2
         self.flat = nn.Linear(flat, options.latent)
-        self.join = nn.Linear(options.latent + parameter_count(options), options.hidden)
+        self.join = nn.Linear(options.latent + (7 if options.transmission else 4), options.hidden)
         self.mix = Residual(options.hidden)
         self.last = nn.Linear(options.hidden, options.latent)
         if self.local:

@@ -28,7 +28,7 @@ import torch
 from torch import Tensor, nn
 
 from pipeline.compiled.arrays import Float32
-from pipeline.models.network import Batch, NetworkMethod, Trained, evaluated, restored
+from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import (
     SLOPE,
     EncoderDecoder,
@@ -191,13 +191,12 @@ class Woven(NetworkMethod[WovenNetwork]):
         """
         if not self.options.transmission:
             return np.zeros(len(queries.u), np.float32)
-        self.refuse(queries)
-        part, network = self.per_query(fabric), self.network_of(fabric)
+        network = self.network_of(fabric)
 
         def read(*inputs: Tensor) -> Tensor:
-            return network.outputs(*inputs, *part.constants)[0, :, 4:].clamp(0.0, 1.0)
+            return network.outputs(*inputs)[0, :, 4:].clamp(0.0, 1.0)
 
-        return evaluated(queries, part.inputs, read, 1)[:, 0]
+        return self.per_query(fabric).answered(queries, read, 1)[:, 0]
 
 
 def build(options: WovenOptions, fabrics: Sequence[Fabric]) -> WovenNetwork:

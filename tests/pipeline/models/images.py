@@ -2,21 +2,16 @@
 
 import torch
 
-from pipeline.models.woven.standard_position import Placement, moved
+from pipeline.models.woven.standard_position import moved, placement
 from pipeline.truth.query import Queries
 
 
 def image_of(symmetry, cloth, asked):
     """Return the image of a cloth and of queries about it, and the placement that moved them."""
-    one = Placement(
-        torch.tensor([[symmetry.mirror_x, symmetry.mirror_y]]),
-        torch.tensor([[symmetry.exchange]]),
-        torch.zeros(1, 2),
-        torch.ones(1, 2),
-    )
+    place = placement(cloth, symmetry, (0, 0))
     ends, picks = cloth.weave.repeat
-    u, v, wi, wo = one.move(*(torch.from_numpy(c)[None] for c in (asked.u / ends, asked.v / picks, asked.wi, asked.wo)))
+    columns = asked.u / ends, asked.v / picks, asked.wi, asked.wo
+    u, v, wi, wo = (part[0].numpy() for part in place.move(*(torch.from_numpy(column)[None] for column in columns)))
     image = moved(cloth, symmetry)
     ends, picks = image.weave.repeat
-    there = Queries.round(u[0].numpy() * ends, v[0].numpy() * picks, asked.sigma, wi[0].numpy(), wo[0].numpy())
-    return image, there, one
+    return image, Queries.round(u * ends, v * picks, asked.sigma, wi, wo), place

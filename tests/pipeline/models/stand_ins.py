@@ -1,9 +1,62 @@
-"""Stand-ins for trained methods: one of this package, and one from outside as the text of its file."""
+"""Stand-ins for trained methods: networks of few weights, a method, and one from outside as the text of its file."""
 
 import numpy as np
+import torch
 
+from pipeline.fingerprint import fingerprint
 from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.source import locate
+from pipeline.models.btf_autoencoder import BtfAutoencoderOptions
+from pipeline.models.curved import CurvedOptions
+from pipeline.models.network import Batch
+from pipeline.models.neumip import NeumipOptions
+from pipeline.models.registry import build_network
+from pipeline.models.selvage import SelvageOptions
+from pipeline.models.unified_btf import UnifiedBtfOptions
+from pipeline.models.woven import WovenOptions
+
+_BTF = {"texels_per_yarn": 2, "samples": 8, "fewest_samples": 4, "encoder_hidden": 16, "weights": 8, "hidden": 16}
+
+SMALL = {
+    "woven": WovenOptions(map_texels=16, encoder_channels=4),
+    "neumip": NeumipOptions(texels_per_yarn=4),
+    "curved": CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_points=32, silhouette_sigma=(0.5, 8.0)),
+    "unified_btf": UnifiedBtfOptions(**_BTF),
+    "btf_autoencoder": BtfAutoencoderOptions(**_BTF),
+    "selvage": SelvageOptions(width=16, measured_rows=64),
+}
+"""A small design of every network."""
+
+
+def untrained(options, *fabrics):
+    """Return an untrained network for these fabrics, with the extra rows that it learns from."""
+    extra = [[rows.answer(fabric, 0, rows.count(fabric)) for fabric in fabrics] for rows in options.extra_rows]
+    return build_network(options, fabrics, extra)
+
+
+def card_of(fabric, domain=None):
+    """Return the card of a network of one fabric, as far as it is read again."""
+    about = {"name": fabric.name, "optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)}
+    return {"fabrics": [about]} | ({} if domain is None else {"domain": domain.model_dump(mode="json")})
+
+
+def batch_of(queries, target, fabric=0):
+    """Return a step of a training with queries about one fabric; no light passes it unscattered."""
+    columns = {name: torch.from_numpy(np.array(column))[None] for name, column in queries._asdict().items()}
+    through = torch.zeros(1, len(queries.u))
+    return Batch(torch.tensor([fabric]), **columns, target=torch.as_tensor(target)[None], transparency=through)
+
+
+def descend(optimiser, steps, loss):
+    """Take steps of an optimiser down a loss, a function of the step; return the losses."""
+    losses = []
+    for step in range(steps):
+        value = loss(step)
+        optimiser.zero_grad()
+        value.backward()
+        optimiser.step()
+        losses.append(value.item())
+    return losses
 
 
 class FakeMethod:

@@ -36,10 +36,11 @@ class Fake:
 @pytest.mark.parametrize("name", ["soft_nodes:1", "selvage"])
 def test_no_bit_depends_on_the_number_of_threads(name):
     method = own_method(name, "test", "name")
-    one, two, five = (AllCores(method, threads).predict(DENIM, queries()) for threads in (1, 2, 5))
+    one, *others = (AllCores(method, threads).predict(DENIM, queries()) for threads in (1, 2, 5))
     assert one.shape == (ROWS, 4) and one.dtype == np.float32
-    np.testing.assert_array_equal(one, two)
-    np.testing.assert_array_equal(one, five)
+    for other in others:
+        np.testing.assert_array_equal(one, other)
+    assert AllCores(method).predict(DENIM, queries(0)).shape == (0, 4)
     if name == "soft_nodes:1":  # products of matrices of other sizes may differ in the last bits
         np.testing.assert_array_equal(one, method.predict(DENIM, queries()))
     np.testing.assert_allclose(one, method.predict(DENIM, queries()), rtol=1e-4, atol=1e-6)
@@ -55,7 +56,3 @@ def test_runs_have_seeds_of_their_own_and_few_queries_have_the_callers():
     assert (drawn[:CHUNK_ROWS] == 0).all() and len(set(drawn[::CHUNK_ROWS].tolist())) == 4
     np.testing.assert_array_equal(drawn[CHUNK_ROWS:-17:CHUNK_ROWS], drawn[2 * CHUNK_ROWS - 1 :: CHUNK_ROWS])
     assert (AllCores(Fake(), threads=2).predict(DENIM, queries(7), seed=5) == 5).all()
-
-
-def test_no_queries_have_no_answers():
-    assert AllCores(own_method("soft_nodes:1", "test", "name")).predict(DENIM, queries(0)).shape == (0, 4)

@@ -11,13 +11,6 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-class Bright(FakeMethod):
-    """A network gone wrong, which knows all cloths but one."""
-
-    def covers(self, fabric):
-        return fabric.name != "basket"
-
-
 def test_what_is_below_the_bound_stays_as_it_is():
     # Shadows only take light away: the sums themselves lie below their bound.
     fabric = load_fabric("denim")
@@ -46,15 +39,9 @@ def test_an_excess_goes_to_the_other_yarn_up_to_its_bound(components, bounds, ex
     np.testing.assert_allclose(found, [expected], rtol=1e-6)
 
 
-def test_it_is_named_apart_and_answers_for_the_same_fabrics():
-    bounded = counterpart(Bright())
+def test_it_is_named_apart_and_refuses_light_from_behind():
+    bounded, fabric = counterpart(FakeMethod()), load_fabric("voile")
     assert (bounded.name, bounded.setting) == ("fake", "bounded")
-    assert not bounded.covers(load_fabric("basket"))
-    assert bounded.bytes_stored(load_fabric("denim")) > 48
-
-
-def test_light_from_behind_is_refused():
-    fabric = load_fabric("voile")
-    queries = draw_queries(QueryOptions(behind=1.0), fabric.weave.repeat, 3, 0, 5)
+    assert bounded.bytes_stored(fabric) > 48
     with pytest.raises(BadInput, match="light from the viewer's side"):
-        Bounded(Bright()).predict(fabric, queries)
+        bounded.predict(fabric, draw_queries(QueryOptions(behind=1.0), fabric.weave.repeat, 3, 0, 5))

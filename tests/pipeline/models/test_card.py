@@ -1,5 +1,3 @@
-import json
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,14 +15,11 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_what_is_written_is_read(folder):
+def test_what_is_written_is_read_and_gives_the_same_bytes_again(folder, tmp_path):
     card = read_card(folder)
     assert read_weights(folder, card) == bytes(range(256))
     assert {key: value for key, value in card.items() if key != "sha256"} == CONTENT
-
-
-def test_a_card_that_is_written_again_has_the_same_bytes(folder, tmp_path):
-    write_model(tmp_path, bytes(range(256)), read_card(folder))
+    write_model(tmp_path, bytes(range(256)), card)
     assert (tmp_path / CARD).read_bytes() == (folder / CARD).read_bytes()
 
 
@@ -40,26 +35,19 @@ def test_every_flip_of_a_card_is_refused(folder, tmp_path_factory, data):
         read_card(damaged)
 
 
-def test_every_flip_of_weights_is_refused(folder, tmp_path):
-    for place in range(0, 256, 15):
-        write_model(tmp_path, bytes(range(256)), CONTENT)
-        content = bytearray(range(256))
-        content[place] ^= 1 << place % 8
-        (tmp_path / WEIGHTS).write_bytes(content)
-        with pytest.raises(BadInput, match=r"model\.safetensors: damaged, its SHA-256.*train it again"):
-            read_weights(tmp_path, read_card(tmp_path))
+def test_a_flip_of_weights_is_refused(folder, tmp_path):
+    write_model(tmp_path, bytes(range(256)), CONTENT)
+    (tmp_path / WEIGHTS).write_bytes(bytes([*range(255), 127]))
+    with pytest.raises(BadInput, match=r"model\.safetensors: damaged, its SHA-256.*train it again"):
+        read_weights(tmp_path, read_card(tmp_path))
 
 
-def test_a_card_of_an_earlier_version_is_refused(tmp_path):
-    (tmp_path / CARD).write_text(json.dumps(CONTENT, indent=1, sort_keys=True) + "\n")
-    with pytest.raises(BadInput, match="has no hashes: it is of an earlier version"):
-        read_card(tmp_path)
-
-
-@pytest.mark.parametrize("content", [b"", b"[]", b"7", b"\xff", b"[" * 100_000, b'{"sha256": 3}', b'{"sha256": {}}'])
-def test_what_is_no_card_is_refused(tmp_path, content):
+@pytest.mark.parametrize(
+    "content", [b"", b"[]", b"7", b"\xff", b"[" * 100_000, b'{"sha256": 3}', b'{"sha256": {}}', b"{}"]
+)
+def test_what_is_no_card_or_of_an_earlier_version_is_refused(tmp_path, content):
     (tmp_path / CARD).write_bytes(content)
-    with pytest.raises(BadInput, match="damaged"):
+    with pytest.raises(BadInput, match="has no hashes: it is of an earlier version" if content == b"{}" else "damaged"):
         read_card(tmp_path)
 
 

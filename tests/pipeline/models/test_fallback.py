@@ -5,7 +5,6 @@ import pytest
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.models.curved import CurvedOptions
 from pipeline.models.curved.model import Curved, CurvedNetwork
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import FLAT_TURN, Fallback, fallback_answers
@@ -13,7 +12,9 @@ from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.models.stand_ins import FakeMethod
+from tests.pipeline.analytic.methods import woven
+from tests.pipeline.models.against_truth import colour_error
+from tests.pipeline.models.stand_ins import SMALL, FakeMethod
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -26,6 +27,13 @@ def mixed(count=60):
     wo[::3, 2] *= -1.0
     # Seen from behind, cloth is flat: curved cloth is known from outside alone.
     return queries._replace(wo=wo, curvature=np.where(wo[:, 2] > 0, queries.curvature, np.float32(0.0)))
+
+
+def fallback_of(fabric, about, kinds=()):
+    """Return the fallback of a method with the domain of a data set about one fabric."""
+    method = FakeMethod()
+    method.domain = Domain.of(about, [fabric])
+    return Fallback(method, kinds)
 
 
 def test_a_method_is_asked_in_the_nearest_form_that_it_knows():
@@ -49,8 +57,7 @@ def test_a_method_is_asked_in_the_nearest_form_that_it_knows():
 
 def test_what_no_form_stands_for_is_answered_by_quadrature():
     fabric, queries = load_fabric("voile"), mixed()
-    method = FakeMethod()
-    fallback = Fallback(method, ())
+    fallback = Fallback(FakeMethod(), ())
     strange = fallback.out_of_domain(fabric, queries)
     np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
     found = fallback.predict(fabric, queries)
@@ -77,41 +84,34 @@ def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
         assert not fallback.out_of_domain(fabric, turned).any()
         found = fallback.predict(fabric, turned)
         np.testing.assert_array_equal(found, fallback.predict(fabric.back(), queries))
-        wrong = (found - truth.mean) @ [0.3, 0.3, 0.5, 0.5]
-        assert np.sqrt(np.mean(wrong**2)) < 0.06 * np.mean(truth.mean @ [0.3, 0.3, 0.5, 0.5])
+        assert colour_error(found, truth.mean) < 0.06
         clear = fallback.transparency(fabric, turned)
         assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
 
 
-class Narrow(FakeMethod):
-    """A trained method with a domain."""
-
-    domain = Domain.of({}, [load_fabric("denim")])
+DENIM = load_fabric("denim")
+ROUGH = woven("denim", warp={"roughness": 1.0})
 
 
 def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
-    denim = load_fabric("denim")
-    rough = denim.model_copy(update={"warp": denim.warp.model_copy(update={"roughness": 1.0})})
-    fallback, queries = Fallback(Narrow(), ()), draw_queries(QueryOptions(sigma=(0.5, 1.0)), (4, 4), 3, 0, 20)
-    assert not fallback.out_of_domain(denim, queries).any() and fallback.out_of_domain(rough, queries).all()
-    found = fallback.predict(rough, queries)
-    np.testing.assert_array_equal(found, fallback_answers(rough, queries, 0))
+    fallback, queries = fallback_of(DENIM, {}), draw_queries(QueryOptions(sigma=(0.5, 1.0)), (4, 4), 3, 0, 20)
+    assert not fallback.out_of_domain(DENIM, queries).any() and fallback.out_of_domain(ROUGH, queries).all()
+    np.testing.assert_array_equal(fallback.predict(ROUGH, queries), fallback_answers(ROUGH, queries, 0))
 
 
 @pytest.mark.slow
 def test_a_method_may_answer_outside_its_domain_itself():
     """`selvage` does, by its soft nodes; the network answers within the domain, and nothing is left to the fallback."""
     (selvage,) = load_model(pretrained_folder("selvage"))
-    fallback, denim = Fallback(selvage, selvage.without_training), load_fabric("denim")
-    rough = denim.model_copy(update={"warp": denim.warp.model_copy(update={"roughness": 1.0})})
-    queries = draw_queries(QueryOptions(sigma=(1e-3, 1.0), behind=0.3), denim.weave.repeat, 3, 0, 200)
-    assert not fallback.out_of_domain(rough, queries).any()
-    np.testing.assert_array_equal(fallback.predict(rough, queries), SoftNodes().predict(rough, queries))
-    alone = selvage.domain.out_of_domain(denim, queries) | (queries.wi[:, 2] < 0)
+    fallback = Fallback(selvage, selvage.without_training)
+    queries = draw_queries(QueryOptions(sigma=(1e-3, 1.0), behind=0.3), DENIM.weave.repeat, 3, 0, 200)
+    assert not fallback.out_of_domain(ROUGH, queries).any()
+    np.testing.assert_array_equal(fallback.predict(ROUGH, queries), SoftNodes().predict(ROUGH, queries))
+    alone = selvage.domain.out_of_domain(DENIM, queries) | (queries.wi[:, 2] < 0)
     assert 0.3 < alone.mean() < 0.9
-    found = fallback.predict(denim, queries)
-    np.testing.assert_array_equal(found[alone], SoftNodes().predict(denim, queries.take(alone)))
-    np.testing.assert_array_equal(found[~alone], selvage.predict(denim, queries.take(~alone)))
+    found = fallback.predict(DENIM, queries)
+    np.testing.assert_array_equal(found[alone], SoftNodes().predict(DENIM, queries.take(alone)))
+    np.testing.assert_array_equal(found[~alone], selvage.predict(DENIM, queries.take(~alone)))
 
 
 @pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT_TURN, 0.03), (3.0 * FLAT_TURN, 0.1)])
@@ -130,10 +130,9 @@ def test_what_stands_in_is_the_truth_of_ellipses_on_flat_and_on_curved_cloth(tur
 
 
 def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_method():
-    fabric, method = load_fabric("voile"), FakeMethod()
-    method.domain = Domain.of({"queries": {"sigma": [0.3, 1.0], "max_angle": 60.0}}, [fabric])
+    fabric = load_fabric("voile")
+    fallback = fallback_of(fabric, {"queries": {"sigma": [0.3, 1.0], "max_angle": 60.0}})
     queries = draw_queries(QueryOptions(sigma=(0.05, 32.0)), fabric.weave.repeat, 5, 0, 400)
-    fallback = Fallback(method, ())
     strange = fallback.out_of_domain(fabric, queries)
     cosine = np.cos(np.radians(60.0))
     steep = np.minimum(queries.wi[:, 2], queries.wo[:, 2]) < cosine
@@ -144,19 +143,17 @@ def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_met
     found = fallback.predict(fabric, queries)
     assert (found[~strange] == 1.0).all()
     np.testing.assert_array_equal(found[strange], fallback_answers(fabric, queries.take(strange), 0))
-    (asked,) = method.asked
+    (asked,) = fallback.method.asked
     assert asked.sigma.max() <= 1.03 and asked.sigma.min() >= 0.29
 
 
 def test_a_kind_that_a_method_could_know_and_was_not_taught_is_none_of_its_own():
     """A recipe narrowed to a scene without light from behind teaches none, though the model could learn it."""
-    fabric, queries, method = load_fabric("voile"), mixed(), FakeMethod()
-    method.domain = Domain.of({}, [fabric])
-    fallback = Fallback(method, {"behind", "stretch", "curvature"})
-    strange = fallback.out_of_domain(fabric, queries)
-    assert strange[queries.behind].all()
+    fabric, queries = load_fabric("voile"), mixed()
+    fallback = fallback_of(fabric, {}, {"behind", "stretch", "curvature"})
+    assert fallback.out_of_domain(fabric, queries)[queries.behind].all()
     fallback.predict(fabric, queries)
-    (asked,) = method.asked
+    (asked,) = fallback.method.asked
     assert not asked.curvature.any() and not asked.behind.any()
     np.testing.assert_array_equal(asked.sigma, asked.sigma_minor)
 
@@ -173,15 +170,13 @@ def test_plain_queries_are_the_methods_alone(rows):
 
 def test_cloth_steeper_than_was_taught_is_quadratures():
     """The scenes' drape bends up to 1 a yarn; `curved` knows up to .5, and refuses beyond."""
-    denim = load_fabric("denim")
-    options = CurvedOptions(texels_per_yarn=2, silhouette_texels_per_yarn=1)
-    about = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}
-    network = CurvedNetwork(options, denim.weave.repeat)
-    method = Curved({fingerprint(denim.optics()): network}, Domain.of(about, [denim]))
-    queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), denim.weave.repeat, 3, 0, 40)
+    about, options = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}, SMALL["curved"]
+    network = CurvedNetwork(options, DENIM.weave.repeat)
+    method = Curved({fingerprint(DENIM.optics()): network}, Domain.of(about, [DENIM]))
+    queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), DENIM.weave.repeat, 3, 0, 40)
     fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
     assert steep.any() and not steep.all()
-    np.testing.assert_array_equal(fallback.out_of_domain(denim, queries), steep)
-    answers = fallback.predict(denim, queries)
-    np.testing.assert_array_equal(answers[~steep], method.predict(denim, queries.take(~steep)))
-    np.testing.assert_array_equal(answers[steep], fallback_answers(denim, queries.take(steep), 0))
+    np.testing.assert_array_equal(fallback.out_of_domain(DENIM, queries), steep)
+    answers = fallback.predict(DENIM, queries)
+    np.testing.assert_array_equal(answers[~steep], method.predict(DENIM, queries.take(~steep)))
+    np.testing.assert_array_equal(answers[steep], fallback_answers(DENIM, queries.take(steep), 0))

@@ -1,4 +1,4 @@
-"""Chunks of inference, the part of a network that runs for every query, and networks of one fabric each as a method."""
+"""What all networks have in common: answers of restored weights, chunks, domains, and the part run for every query."""
 
 import numpy as np
 import pytest
@@ -7,27 +7,72 @@ import torch
 from pipeline.fingerprint import fingerprint
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.domain import Domain
-from pipeline.models.network import Portable, evaluated, restored
-from pipeline.models.neumip import NeumipOptions
+from pipeline.models.network import NetworkMethod, Portable, evaluated, restored
 from pipeline.models.neumip.model import NeumipNetwork
-from pipeline.models.registry import load_methods
-from pipeline.models.selvage import SelvageOptions
+from pipeline.models.registry import load_methods, restore_methods
 from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.query import Queries
+from tests.pipeline.models.stand_ins import SMALL, card_of, untrained
 from weaves.fabric import load_fabric
 
-DENIM = load_fabric("denim")
-REPEAT = DENIM.weave.repeat
+DENIM, BASKET = load_fabric("denim"), load_fabric("basket")
+
+
+@pytest.mark.parametrize("model", SMALL)
+def test_restored_weights_answer_alike_also_at_extremes(model):
+    """Finite and not negative; alike in every repeat, and wherever a footprint sees thousands of them.
+
+    A network of one material knows its fabric whatever its name is; any other answers for a fabric never seen.
+    """
+    options = SMALL[model]
+    network = untrained(options, DENIM)
+    (method,) = restore_methods(options, [(card_of(DENIM), network.state_dict())])
+    fabric = DENIM if options.of_one_material else BASKET
+    assert method.covers(fabric) and method.covers(fabric.model_copy(update={"name": "other"}))
+    assert method.covers(BASKET) != options.of_one_material
+    angles = np.radians([0.0, 89.0, 89.9])
+    sigma, i, o, centre = np.meshgrid(
+        [1e-4, 0.25, 1e4], angles, angles, [0.25, 0.25 - 2**20, 0.0, -1e-30], indexing="ij"
+    )
+    wi, wo = (np.stack([x * np.sin(w), y * np.sin(w), np.cos(w)], -1) for w, x, y in ((i, 0.6, 0.8), (o, 1.0, 0.0)))
+    columns = (centre, -3.0 * centre, sigma)
+    queries = Queries.round(*(column.ravel() for column in columns), wi.reshape(-1, 3), wo.reshape(-1, 3))
+    found = method.predict(fabric, queries)
+    assert found.shape == (108, 4) and found.dtype == np.float32
+    assert np.isfinite(found).all() and (found >= 0).all()
+    by_centre = found.reshape(3, 9, 4, 4)
+    np.testing.assert_array_equal(by_centre[:, :, 0::2], by_centre[:, :, 1::2])
+    assert np.ptp(by_centre[0], axis=1).max() > 0
+    np.testing.assert_allclose(by_centre[2], by_centre[2][:, :1].repeat(4, 1), rtol=1e-4, atol=1e-6)
+    alone = (Selvage if model == "selvage" else NetworkMethod)(network)
+    np.testing.assert_array_equal(found, alone.predict(fabric, queries))
+
+
+def test_each_fabric_is_answered_by_its_own_network_and_their_domains_are_joined():
+    """Whichever was read last: ranges hold those of every fabric and nothing more."""
+    options, cloths = SMALL["neumip"], [load_fabric(name) for name in ("denim", "silk_charmeuse", "polyester_lining")]
+    parts = [(card_of(cloth, Domain.of({}, [cloth])), untrained(options, cloth).state_dict()) for cloth in cloths]
+    queries = draw_queries(QueryOptions(), (4, 4), 5, 0, 8)
+    for order in ((0, 1, 2), (2, 0, 1)):
+        networks, domain = restored(options, [parts[k] for k in order], lambda repeat: NeumipNetwork(options, repeat))
+        assert networks.keys() == {fingerprint(cloth.optics()) for cloth in cloths}
+        assert domain == Domain.of({}, cloths)
+        assert all(domain.knows(cloth) for cloth in cloths) and not domain.knows(load_fabric("voile"))
+    together = NetworkMethod(networks)
+    for cloth, part in zip(cloths, parts, strict=True):
+        (alone,) = restore_methods(options, [part])
+        np.testing.assert_array_equal(together.predict(cloth, queries), alone.predict(cloth, queries))
+        assert together.bytes_stored(cloth) == alone.bytes_stored(cloth)
 
 
 @pytest.mark.parametrize("bound", [True, False])
 def test_the_network_of_selvage_alone_answers_what_the_method_does(bound):
-    torch.manual_seed(1)
-    network = SelvageNetwork(SelvageOptions(width=16, measured_rows=64), [DENIM])
+    network = SelvageNetwork(SMALL["selvage"], [DENIM])
     torch.nn.init.normal_(network.last.weight, std=0.3)  # they are 0 at first
     method = Selvage(network).with_bound(bound)
     assert isinstance(method, Portable)
-    queries = draw_queries(QueryOptions(), REPEAT, 2, 0, 300)
+    queries = draw_queries(QueryOptions(), DENIM.weave.repeat, 2, 0, 300)
     own = method.predict(DENIM, queries)
     assert np.abs(own).max() > 0
     # The same products in another order: a few roundings of the largest terms.
@@ -40,38 +85,13 @@ def test_what_learns_nothing_has_no_such_part():
     assert not isinstance(method, Portable)
 
 
-QUERIES = draw_queries(QueryOptions(), (4, 4), 0, 0, 37)
-
-
 @pytest.mark.parametrize("chunk", [1, 10, 37, 100])
 def test_chunks_keep_the_order_of_rows_and_columns(chunk, monkeypatch):
+    """Answers are as wide as asked even of no rows."""
     monkeypatch.setattr("pipeline.models.method.CHUNK_ROWS", chunk)
-    found = evaluated(QUERIES, lambda q: (q.wo, q.u), lambda wo, u: torch.cat([u[:, None], wo], dim=-1))
-    np.testing.assert_array_equal(found, np.concatenate([QUERIES.u[:, None], QUERIES.wo], axis=1))
-
-
-def test_answers_are_as_wide_as_asked_even_of_no_rows():
+    queries = draw_queries(QueryOptions(), (4, 4), 0, 0, 37)
+    found = evaluated(queries, lambda q: (q.wo, q.u), lambda wo, u: torch.cat([u[:, None], wo], dim=-1))
+    np.testing.assert_array_equal(found, np.concatenate([queries.u[:, None], queries.wo], axis=1))
     for rows in (37, 0):
-        answers = evaluated(QUERIES.take(slice(0, rows)), lambda q: (q.u,), lambda u: u[:, None], 1)
+        answers = evaluated(queries.take(slice(0, rows)), lambda q: (q.u,), lambda u: u[:, None], 1)
         assert answers.shape == (rows, 1) and answers.dtype == np.float32
-
-
-NEUMIP = NeumipOptions(texels_per_yarn=2)
-CLOTHS = [load_fabric(name) for name in ("denim", "silk_charmeuse", "polyester_lining")]
-
-
-def trained(fabric):
-    """Return the card and the weights of a network of one fabric."""
-    domain = Domain.of({}, [fabric]).model_dump(mode="json")
-    card = {"fabrics": [{"optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)}]}
-    return card | {"domain": domain}, NeumipNetwork(NEUMIP, fabric.weave.repeat).state_dict()
-
-
-@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])
-def test_the_ranges_hold_those_of_every_fabric_and_nothing_more(order):
-    """Whichever was read last."""
-    parts = [trained(CLOTHS[index]) for index in order]
-    networks, domain = restored(NEUMIP, parts, lambda repeat: NeumipNetwork(NEUMIP, repeat))
-    assert networks.keys() == {fingerprint(fabric.optics()) for fabric in CLOTHS}
-    assert domain == Domain.of({}, CLOTHS)
-    assert all(domain.knows(fabric) for fabric in CLOTHS) and not domain.knows(load_fabric("voile"))

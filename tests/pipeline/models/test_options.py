@@ -1,6 +1,5 @@
 import subprocess
 import sys
-from importlib.util import find_spec
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
@@ -9,14 +8,6 @@ from pipeline.fingerprint import IDENTITY
 from pipeline.models.catalogue import CLASSES, ModelOptions
 
 MODEL = TypeAdapter(ModelOptions)
-
-
-@pytest.mark.parametrize("model", CLASSES)
-def test_options_lie_in_the_file_or_folder_of_their_model(model):
-    options = CLASSES[model]
-    assert options.__module__ == f"pipeline.models.{'' if options.learns else 'analytic.'}{model}"
-    assert options().name == model
-    assert not options.learns or find_spec(f"pipeline.models.{model}.model") is not None
 
 
 @pytest.mark.parametrize("model", CLASSES)
@@ -42,6 +33,11 @@ def test_identities_state_all_choices_of_the_design(model):
         {"model": "woven", "name": "../woven"},
         {"model": "point_sampled", "counts": [2, 0]},
         {"model": "point_sampled", "footprint": "disc"},
+        {"model": "point_sampled", "footprint": "box", "visibility": "horizon"},
+        {"model": "map_material", "size": 100},
+        {"model": "unified_btf", "samples": 3, "fewest_samples": 4},
+        {"model": "unified_btf", "samples": 0},
+        {"model": "unified_btf", "texel_sigma": 0.0},
     ],
 )
 def test_bad_model_options_are_refused(table):

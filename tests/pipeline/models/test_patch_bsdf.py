@@ -1,6 +1,7 @@
 """`sample`, `pdf` and `eval` agree: chi-square over the sphere, means of weights, the delta lobe; bad input."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy import stats
 from pipeline.models.named import named_method
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.truth.query import Queries
+from tests.directions import sphere, unit
 from tests.presets import slow
 from weaves.colour import LUMINANCE
 from weaves.errors import BadInput
@@ -32,11 +34,6 @@ CONFIGURATIONS = {
 }
 
 
-def unit(degrees, azimuth):
-    theta, phi = math.radians(degrees), math.radians(azimuth)
-    return math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)
-
-
 def looks_of(name, count, wi=None):
     _, major, minor, angle, theta, phi = CONFIGURATIONS[name]
     columns = (np.full(count, value, np.float32) for value in (0.62, 0.57, major, minor, angle, 0.0))
@@ -45,41 +42,28 @@ def looks_of(name, count, wi=None):
     return Queries(u, v, sigma, wo if wi is None else wi.astype(np.float32), wo, sigma_minor, angle, curvature)
 
 
-@pytest.fixture(scope="module")
-def bsdfs():
-    class Made(dict):
-        def __missing__(self, name):
-            self[name] = PatchBSDF(load_fabric(CONFIGURATIONS[name][0]))
-            return self[name]
-
-    return Made()
-
-
-def directions(rows, columns):
-    """Return the middles of cells of equal solid angle, cosine by azimuth, (rows columns, 3)."""
-    z = -1.0 + 2.0 * (np.arange(rows) + 0.5) / rows
-    turn = 2.0 * math.pi * (np.arange(columns) + 0.5) / columns
-    sine = np.sqrt(1.0 - z * z)[:, None]
-    return np.stack(np.broadcast_arrays(sine * np.cos(turn), sine * np.sin(turn), z[:, None]), axis=-1).reshape(-1, 3)
+@cache
+def bsdf_of(name):
+    return PatchBSDF(load_fabric(CONFIGURATIONS[name][0]))
 
 
 def expected_shares(bsdf, name):
     """Integrate the density over each cell by midpoints: 4 times as many nodes move chi-square by less than .001."""
-    wi = directions(ROWS * NODES, COLUMNS * NODES)
+    wi = sphere(ROWS * NODES, COLUMNS * NODES)
     pdf = bsdf.pdf(looks_of(name, len(wi), wi)).astype(np.float64)
     cell = 4.0 * math.pi / (ROWS * COLUMNS * NODES**2)
     return pdf.reshape(ROWS, NODES, COLUMNS, NODES).sum(axis=(1, 3)) * cell
 
 
 @pytest.mark.parametrize("names", [("ellipse", "behind"), slow(*[tuple(CONFIGURATIONS)])])
-def test_samples_follow_their_density(bsdfs, names):
+def test_samples_follow_their_density(names):
     """Chi-square over the cells of the sphere and the delta lobe, those of fewer than 20 expected samples pooled.
 
     Sidak over the configurations at LEVEL.
     """
     values = {}
     for number, name in enumerate(names):
-        bsdf, looks = bsdfs[name], looks_of(name, COUNT)
+        bsdf, looks = bsdf_of(name), looks_of(name, COUNT)
         shares, straight = expected_shares(bsdf, name), float(bsdf.straight(looks.take(slice(1)))[0])
         assert shares.sum() + straight == pytest.approx(1.0, abs=2e-3), name
         sample = bsdf.sample(looks, np.random.default_rng(number).random((COUNT, 3)))
@@ -99,12 +83,12 @@ def test_samples_follow_their_density(bsdfs, names):
 
 
 @pytest.mark.slow
-def test_weights_have_the_integral_of_eval_as_their_mean(bsdfs):
+def test_weights_have_the_integral_of_eval_as_their_mean():
     """A z-test of scattered light and of light straight through, against even directions; Sidak at LEVEL."""
     scores, count = {}, 40_000
     for number, name in enumerate(CONFIGURATIONS):
-        bsdf = bsdfs[name]
-        wi = directions(160, 320)
+        bsdf = bsdf_of(name)
+        wi = sphere(160, 320)
         even = bsdf.eval(looks_of(name, len(wi), wi)) @ LUMINANCE
         scattered = even.mean() * 4.0 * math.pi
         looks = looks_of(name, count)
@@ -122,8 +106,8 @@ def test_weights_have_the_integral_of_eval_as_their_mean(bsdfs):
 
 
 @pytest.mark.parametrize("name", ["ellipse", "voile", "behind"])
-def test_a_sample_is_what_asking_for_it_gives(bsdfs, name):
-    bsdf, looks, random = bsdfs[name], looks_of(name, 500), np.random.default_rng(1).random((500, 3))
+def test_a_sample_is_what_asking_for_it_gives(name):
+    bsdf, looks, random = bsdf_of(name), looks_of(name, 500), np.random.default_rng(1).random((500, 3))
     sample = bsdf.sample(looks, random)
     scattered = ~sample.straight
     queries = looks._replace(wi=sample.wi).take(scattered)
@@ -132,28 +116,25 @@ def test_a_sample_is_what_asking_for_it_gives(bsdfs, name):
     np.testing.assert_array_equal(values, bsdf.eval(queries))
     np.testing.assert_allclose(values / pdf[:, None], sample.weight[scattered])
     np.testing.assert_array_equal(sample.wi[sample.straight], -looks.wo[sample.straight])
-    lobes = bsdf.lobes(looks)
-    again = bsdf.sample(looks, random, lobes)
-    for one, other in zip(sample, again, strict=True):
+    for one, other in zip(sample, bsdf.sample(looks, random, bsdf.lobes(looks)), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
-def test_viewers_on_both_sides_are_answered_together(bsdfs):
-    bsdf, random = bsdfs["behind"], np.random.default_rng(2).random((60, 3))
+def test_viewers_on_both_sides_are_answered_together():
+    bsdf, random = bsdf_of("behind"), np.random.default_rng(2).random((60, 3))
     looks = looks_of("behind", 60)
     front = np.arange(60) % 3 == 0
     wo = np.where(front[:, None], -looks.wo, looks.wo)
     both = bsdf.sample(looks._replace(wo=wo), random)
-    alone = bsdf.sample(looks._replace(wo=wo).take(front), random[front])
-    np.testing.assert_array_equal(both.wi[front], alone.wi)
-    np.testing.assert_array_equal(both.pdf[front], alone.pdf)
-    alone = bsdf.sample(looks.take(~front), random[~front])
-    np.testing.assert_array_equal(both.wi[~front], alone.wi)
+    for side in (front, ~front):
+        alone = bsdf.sample(looks._replace(wo=wo).take(side), random[side])
+        np.testing.assert_array_equal(both.wi[side], alone.wi)
+        np.testing.assert_array_equal(both.pdf[side], alone.pdf)
 
 
-def test_the_back_is_the_front_of_the_turned_cloth(bsdfs):
+def test_the_back_is_the_front_of_the_turned_cloth():
     """Reflected in the fabric plane, a viewer behind sees the front of `Fabric.back()`."""
-    bsdf, looks = bsdfs["behind"], looks_of("behind", 200)
+    bsdf, looks = bsdf_of("behind"), looks_of("behind", 200)
     back = PatchBSDF(bsdf.fabric.back())
     wi = np.random.default_rng(3).standard_normal((200, 3))
     queries = looks._replace(wi=(wi / np.linalg.norm(wi, axis=1, keepdims=True)).astype(np.float32))
@@ -172,9 +153,8 @@ def test_patches_that_nobody_sees_still_have_samples():
 
 def test_any_method_answers():
     method, looks = named_method("prefiltered", "test", "method"), looks_of("front", 50)
-    bsdf = PatchBSDF(load_fabric("polyester_lining"), method)
-    queries = looks._replace(wi=np.tile(np.array(unit(20.0, 200.0), np.float32), (50, 1)))
-    other = PatchBSDF(load_fabric("polyester_lining"))
+    other, queries = bsdf_of("front"), looks._replace(wi=np.tile(np.float32(unit(20.0, 200.0)), (50, 1)))
+    bsdf = PatchBSDF(other.fabric, method)
     np.testing.assert_array_equal(bsdf.pdf(queries), other.pdf(queries))
     assert not np.array_equal(bsdf.eval(queries), other.eval(queries))
 
@@ -191,19 +171,15 @@ def test_any_method_answers():
         ([[0.1, 0.2, 0.3], [0.1]], "random"),
     ],
 )
-def test_numbers_that_are_not_in_the_unit_interval_are_refused(bsdfs, random, message):
+def test_numbers_that_are_not_in_the_unit_interval_are_refused(random, message):
     with pytest.raises(BadInput, match=message):
-        bsdfs["front"].sample(looks_of("front", 2), random)
+        bsdf_of("front").sample(looks_of("front", 2), random)
 
 
-def test_bad_settings_are_refused(bsdfs):
-    fabric = load_fabric("polyester_lining")
-    with pytest.raises(BadInput, match="points"):
-        PatchBSDF(fabric, points=0)
-    with pytest.raises(BadInput, match="widening"):
-        PatchBSDF(fabric, widening=math.nan)
-    with pytest.raises(BadInput, match="PatchBSDF"):
-        PatchBSDF(fabric, "no_such_method")
-    bsdf = bsdfs["front"]
+def test_bad_settings_are_refused():
+    bsdf = bsdf_of("front")
+    for settings in ({"points": 0}, {"widening": math.nan}, {"method": "no_such_method"}):
+        with pytest.raises(BadInput, match=f"PatchBSDF: {next(iter(settings))}"):
+            PatchBSDF(bsdf.fabric, **settings)
     with pytest.raises(BadInput, match="lobes"):
         bsdf.pdf(looks_of("front", 3), bsdf.lobes(looks_of("front", 2)))

@@ -4,14 +4,11 @@ import torch
 
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.card import write_model
-from pipeline.models.neumip import NeumipOptions
 from pipeline.models.registry import load_methods, load_model, module_of
 from pipeline.models.woven import WovenOptions
 from weaves.errors import BadInput
 
-
-def card_of(options, version=1):
-    return {"options": options.model_dump(mode="json", context=IDENTITY), "version": {"model": version}}
+WOVEN = WovenOptions().model_dump(mode="json", context=IDENTITY)
 
 
 def test_an_unknown_model_names_the_nearest():
@@ -19,25 +16,22 @@ def test_an_unknown_model_names_the_nearest():
         module_of("neumipp")
 
 
-def test_options_of_no_model_are_bad_input(tmp_path):
-    write_model(tmp_path, b"", {"options": {"model": "wovenn"}})
-    with pytest.raises(BadInput, match="options"):
+@pytest.mark.parametrize(
+    ("options", "version", "weights", "refused"),
+    [
+        ({"model": "wovenn"}, 1, b"", "options"),
+        (WOVEN, 1, b"\0" * 16, r"model\.safetensors"),
+        (WOVEN, 1, safetensors.torch.save({"a": torch.zeros(2)}), "do not fit together"),
+        (WOVEN, 99, b"", "version = 99"),
+    ],
+)
+def test_folders_that_hold_no_model_are_bad_input(tmp_path, options, version, weights, refused):
+    write_model(tmp_path, weights, {"options": options, "version": {"model": version}})
+    with pytest.raises(BadInput, match=refused):
         load_model(tmp_path)
 
 
-def test_files_of_weights_that_are_none_are_bad_input(tmp_path):
-    write_model(tmp_path, b"\0" * 16, card_of(WovenOptions()))
-    with pytest.raises(BadInput, match=r"model\.safetensors"):
-        load_model(tmp_path)
-    write_model(tmp_path, safetensors.torch.save({"a": torch.zeros(2)}), card_of(WovenOptions()))
-    with pytest.raises(BadInput, match="do not fit together"):
-        load_model(tmp_path)
-
-
-def test_other_options_or_versions_than_the_trained_ones_are_bad_input(tmp_path):
-    write_model(tmp_path, b"", card_of(NeumipOptions(hidden=16)))
+def test_other_options_than_the_trained_ones_are_bad_input(tmp_path):
+    write_model(tmp_path, b"", {"options": WOVEN, "version": {"model": 1}})
     with pytest.raises(BadInput, match="other options"):
-        load_methods(NeumipOptions(), [tmp_path])
-    write_model(tmp_path, b"", card_of(NeumipOptions(), version=99))
-    with pytest.raises(BadInput, match="version = 99"):
-        load_methods(NeumipOptions(), [tmp_path])
+        load_methods(WovenOptions(hidden=16), [tmp_path])

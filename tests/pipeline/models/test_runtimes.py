@@ -1,6 +1,7 @@
 """Ways to run a method: closed forms of their rounding, agreement in single precision, and what a machine lacks."""
 
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,15 +11,14 @@ from torch import nn
 from pipeline.fingerprint import fingerprint
 from pipeline.models import runtimes
 from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.models.method import CHUNK_ROWS
+from pipeline.models.method import CHUNK_ROWS, refuse_other
 from pipeline.models.network import Answering, PerQuery
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.models.runtimes import RUNTIME_TOLERANCE, RUNTIMES, RunBy, Runtime, not_run, runs
-from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
-from tests.pipeline.models.stand_ins import FakeMethod
+from tests.pipeline.models.stand_ins import SMALL, FakeMethod
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 
@@ -43,10 +43,7 @@ class Linear(FakeMethod):
         return columns @ self.layer.weight.detach().numpy().T + self.constant.numpy()
 
     def per_query(self, fabric):
-        def refuse(queries):
-            if (queries.wi[:, 2] < 0).any():
-                raise BadInput("queries", "wi", -1, "front only")
-
+        refuse = partial(refuse_other, who="the method answers", kinds=("stretch",))
         return PerQuery(refuse, lambda q: (q.u, q.v, q.sigma), self.module, (self.constant,))
 
 
@@ -79,13 +76,9 @@ def test_any_number_of_rows_in_their_order(runtime):
 def test_onnx_agrees_in_single_precision_and_fabrics_share_one_module(monkeypatch):
     loads = []
     plain = RUNTIMES["onnx"]
-
-    def load(*given):
-        loads.append(given)
-        return plain.load(*given)
-
-    monkeypatch.setitem(RUNTIMES, "onnx", Runtime(plain.missing, load))
-    woven = Woven(WovenNetwork(WovenOptions(map_texels=16, latent=16, hidden=32)))
+    noted = plain._replace(load=lambda *given: loads.append(given) or plain.load(*given))
+    monkeypatch.setitem(RUNTIMES, "onnx", noted)
+    woven = Woven(WovenNetwork(SMALL["woven"]))
     run = RunBy(woven, "onnx")
     assert (run.name, run.setting) == ("woven", "onnx")
     for fabric in FABRICS:
@@ -128,18 +121,15 @@ def test_torch_compiles_a_module_and_any_thread_may_call_it():
 
 
 def test_an_answer_of_its_own_is_refused(monkeypatch):
-    def load(module, example, rows):
-        return runtimes._Program(lambda *given: 1.001 * module(*given))
-
-    monkeypatch.setitem(RUNTIMES, "onnx", Runtime(lambda: "", load))
+    wrong = Runtime(lambda: "", lambda module, *_: runtimes._Program(lambda *given: 1.001 * module(*given)))
+    monkeypatch.setitem(RUNTIMES, "onnx", wrong)
     with pytest.raises(WorkFailed, match=r"linear by onnx on denim: answers differ .* by 1\.0e-03, beyond 0\.0001"):
         RunBy(Linear(np.eye(4, 3)), "onnx").prepare(DENIM)
 
 
 def test_what_was_not_taught_is_refused_however_it_is_run():
     run = RunBy(Linear(np.eye(4, 3)), "eager-bf16")
-    run.prepare(DENIM)
-    with pytest.raises(BadInput, match="front only"):
+    with pytest.raises(BadInput, match="viewer's side only"):
         run.predict(DENIM, asked(50, behind=1.0))
 
 

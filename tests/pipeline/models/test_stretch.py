@@ -1,8 +1,5 @@
 """Every method that says it knows footprints of any shape, asked about ellipses at all angles, against the truth."""
 
-import math
-
-import numpy as np
 import pytest
 
 from pipeline.models.analytic.point_sampled import PointSampledOptions
@@ -11,11 +8,8 @@ from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.models.fallback import Fallback
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
-from pipeline.truth.options import TruthOptions
+from tests.pipeline.models.against_truth import colour_error, truth_of
 from weaves.fabric import load_fabric
-
-COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
 
 
 @pytest.mark.parametrize(
@@ -33,12 +27,9 @@ def test_ellipses_are_answered_as_such(options, bound, clusters):
     fabric = load_fabric("cotton_twill")
     kinds = QueryOptions(sigma=(0.25, 0.6), max_angle=60.0, stretch=5.0)
     queries = draw_queries(kinds, fabric.weave.repeat, 9, 0, 96)
-    truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean @ COLOUR
+    truth = truth_of(fabric, queries)
     method = clusters if options.model == clusters.name else load_methods(options)[0]
     assert "stretch" in options.kinds
-    errors = []
-    for known in ({"stretch"}, set()):
-        found = Fallback(method, known).predict(fabric, queries, 3) @ COLOUR
-        errors.append(math.sqrt(np.mean((found - truth) ** 2)) / truth.mean())
-    assert errors[0] < bound
-    assert errors[1] > 1.5 * errors[0]
+    known, unknown = (colour_error(Fallback(method, k).predict(fabric, queries, 3), truth) for k in ({"stretch"}, ()))
+    assert known < bound
+    assert unknown > 1.5 * known

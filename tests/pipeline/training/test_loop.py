@@ -26,13 +26,9 @@ from weaves.errors import BadInput, WorkFailed
 WOVEN = WovenOptions(map_texels=16, encoder_channels=4, hidden=32, log_k=10, diffuse_weight=10)
 NEUMIP = NeumipOptions(texels_per_yarn=4, log_k=10, diffuse_weight=10)
 SHORT = TrainingOptions(steps=30, batch=256, fabrics=2, checkpoint_every=8, curve_points=5, device="cpu")
-FABRICS = {
-    "woven": ["polyester_lining", "cotton_twill"],
-    "neumip": ["cotton_twill"],
-    "selvage": ["polyester_lining", "cotton_twill"],
-}
+BOTH = ["polyester_lining", "cotton_twill"]
+FABRICS = {"woven": BOTH, "neumip": ["cotton_twill"], "selvage": BOTH, "theirs": BOTH}
 OPTIONS = {"woven": WOVEN, "neumip": NEUMIP, "selvage": SelvageOptions(width=16, measured_rows=64)}
-
 
 NETWORK = """
 class Network(nn.Module):
@@ -59,16 +55,23 @@ class Killed(KeyboardInterrupt):
     pass
 
 
-def killed_at(share):
+def kill_at(share, *arguments):
+    """Train until a share of the steps is done."""
+
     def progress(fraction):
         if fraction >= share:
             raise Killed
 
-    return progress
+    with pytest.raises(Killed):
+        train(*arguments, progress)
 
 
 def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def card_in(folder):
+    return json.loads((folder / "card.json").read_text())
 
 
 @pytest.fixture(scope="module")
@@ -77,51 +80,36 @@ def whole(folder, tmp_path_factory):
 
     @cache
     def of(model):
-        out = tmp_path_factory.mktemp(model)
-        train(OPTIONS[model], SHORT, folder, FABRICS[model], out)
+        out, theirs = tmp_path_factory.mktemp(model), written(tmp_path_factory.mktemp("code"), NETWORK)
+        train(OPTIONS.get(model) or theirs(), SHORT, folder, FABRICS[model], out)
         return out
 
     return of
 
 
-@pytest.mark.parametrize("model", ["woven", slow("neumip"), slow("selvage")])
-def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, whole):
-    """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike."""
+@pytest.mark.parametrize("model", ["woven", slow("neumip"), slow("selvage"), "theirs"])
+def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, whole, theirs):
+    """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike.
+
+    The network from outside reads the random numbers of torch, and its code may lie elsewhere when it goes on.
+    """
     whole, resumed = whole(model), tmp_path / "resumed"
-    with pytest.raises(Killed):
-        train(OPTIONS[model], SHORT, folder, FABRICS[model], resumed, killed_at(20 / 30))
+    kill_at(20 / 30, OPTIONS.get(model) or theirs(), SHORT, folder, FABRICS[model], resumed)
     assert read_checkpoint(resumed / CHECKPOINT)[0]["step"] == 16
     shares = []
-    train(OPTIONS[model], SHORT, folder, FABRICS[model], resumed, shares.append)
+    (tmp_path / "elsewhere").mkdir()
+    moved = written(tmp_path / "elsewhere", NETWORK)(limit=50.0)
+    train(OPTIONS.get(model, moved), SHORT, folder, FABRICS[model], resumed, shares.append)
     assert shares[0] == pytest.approx(17 / 30)
     assert contents(resumed) == contents(whole)
     assert set(contents(whole)) == {"model.safetensors", "card.json"}
 
 
-def test_a_killed_training_from_outside_goes_on_to_the_same_bytes(folder, tmp_path, theirs):
-    """Its dropout reads the random numbers of torch; the code may lie elsewhere when it goes on."""
-    whole, resumed, fabrics = tmp_path / "whole", tmp_path / "resumed", FABRICS["woven"]
-    train(theirs(), SHORT, folder, fabrics, whole)
-    with pytest.raises(Killed):
-        train(theirs(), SHORT, folder, fabrics, resumed, killed_at(20 / 30))
-    (tmp_path / "elsewhere").mkdir()
-    moved = (tmp_path / "theirs.py").rename(tmp_path / "elsewhere" / "theirs.py")
-    options = theirs().model_copy(update={"source": f"{moved}:Theirs", "limit": 50.0})
-    (tmp_path / "theirs.py").unlink()
-    assert read_checkpoint(resumed / CHECKPOINT)[0]["step"] == 16
-    shares = []
-    train(options, SHORT, folder, fabrics, resumed, shares.append)
-    assert shares[0] == pytest.approx(17 / 30)
-    assert contents(resumed) == contents(whole)
-    card = json.loads(contents(whole)["card.json"])
-    assert (card["name"], card["options"]["sha256"]) == ("theirs", options.sha256)
-    assert str(tmp_path) not in contents(whole)["card.json"].decode()
-
-
-def test_a_network_from_outside_learns_and_answers(folder, tmp_path, theirs):
-    train(theirs(), SHORT, folder, FABRICS["woven"], tmp_path / "out")
-    (method,) = load_methods(theirs(), [tmp_path / "out"])
-    card = json.loads((tmp_path / "out" / "card.json").read_text())
+def test_a_network_from_outside_learns_and_answers(folder, theirs, whole):
+    out = whole("theirs")
+    (method,) = load_methods(theirs(), [out])
+    card = card_in(out)
+    assert (card["name"], card["options"]["sha256"]) == ("theirs", theirs().sha256)
     assert card["curve"][-1]["held_out_mse"] < card["curve"][0]["held_out_mse"]
     manifest = Manifest.load(folder)
     queries, answers = manifest.read(folder, "cotton_twill", "validation")
@@ -130,9 +118,9 @@ def test_a_network_from_outside_learns_and_answers(folder, tmp_path, theirs):
     assert mse == pytest.approx(card["validation"]["cotton_twill"][COMPONENTS[1]]["mse"], rel=1e-4)
     assert method.domain.kinds == frozenset()
     with pytest.raises(BadInput, match="whose code is not here: measure it with --add"):
-        load_model(tmp_path / "out")
+        load_model(out)
     with pytest.raises(BadInput, match="trained with other options; train it again"):
-        load_methods(theirs("width=16", "width=17"), [tmp_path / "out"])
+        load_methods(theirs("width=16", "width=17"), [out])
 
 
 @pytest.mark.parametrize(
@@ -153,25 +141,21 @@ def test_a_fault_of_a_loss_from_outside_is_a_sentence(folder, tmp_path, theirs, 
 
 def test_a_foreign_checkpoint_is_not_gone_on_from(folder, tmp_path, whole):
     whole, other = whole("neumip"), tmp_path / "other"
-    with pytest.raises(Killed):
-        train(NEUMIP, SHORT.model_copy(update={"seed": 1}), folder, FABRICS["neumip"], other, killed_at(0.9))
+    kill_at(0.9, NEUMIP, SHORT.model_copy(update={"seed": 1}), folder, FABRICS["neumip"], other)
     train(NEUMIP, SHORT, folder, FABRICS["neumip"], other)
     assert contents(other)["model.safetensors"] == contents(whole)["model.safetensors"]
 
 
 def test_flipped_bytes_of_a_checkpoint_or_of_cached_rows_are_not_used(folder, tmp_path, whole):
     whole, damaged = whole("neumip"), tmp_path / "damaged"
-    for place in (300, -1000):  # in what a checkpoint says of itself, in a tensor
-        with pytest.raises(Killed):
-            train(NEUMIP, SHORT, folder, FABRICS["neumip"], damaged, killed_at(0.9))
-        for path in damaged.iterdir():
-            content = bytearray(path.read_bytes())
-            content[place] ^= 16
-            path.write_bytes(content)
-        assert read_checkpoint(damaged / CHECKPOINT) is None
-        shares = []
-        train(NEUMIP, SHORT, folder, FABRICS["neumip"], damaged, shares.append)
-        assert shares[0] == pytest.approx(1 / 30) and contents(damaged) == contents(whole)
+    kill_at(0.9, NEUMIP, SHORT, folder, FABRICS["neumip"], damaged)
+    for path in damaged.iterdir():
+        content = bytearray(path.read_bytes())
+        content[-1000] ^= 16
+        path.write_bytes(content)
+    shares = []
+    train(NEUMIP, SHORT, folder, FABRICS["neumip"], damaged, shares.append)
+    assert shares[0] == pytest.approx(1 / 30) and contents(damaged) == contents(whole)
 
 
 @pytest.mark.parametrize("model", [slow("woven"), "neumip"])
@@ -189,13 +173,13 @@ def test_a_smooth_problem_is_learnt(model, folder, tmp_path):
         queries, answers = manifest.read(folder, name, "validation")
         error = np.square(method.predict(manifest.fabrics[name], queries) - answers.mean).mean()
         assert error < 0.5 * answers.mean.var(axis=0).mean()
-    curve = [point["loss"] for point in json.loads((tmp_path / "card.json").read_text())["curve"]]
+    curve = [point["loss"] for point in card_in(tmp_path)["curve"]]
     assert curve[-1] < 0.1 * curve[0]
 
 
 def test_the_card_tells_what_was_trained_and_how_well(whole):
     folder = whole("woven")
-    card = json.loads((folder / "card.json").read_text())
+    card = card_in(folder)
     assert card["model"] == "woven"
     assert WovenOptions.model_validate(card["options"]) == WOVEN
     assert card["dataset"] == {"name": "tiny", "fingerprint": "f" * 16}
@@ -208,10 +192,8 @@ def test_the_card_tells_what_was_trained_and_how_well(whole):
         figures = card["validation"][name]["diffuse_warp"]
         assert figures["noise"] == pytest.approx(1e-6, rel=1e-3)  # the tiny data set's standard error is 1e-3
         assert figures["relative_rmse"] == pytest.approx(math.sqrt(figures["mse"]) / figures["mean"], rel=1e-4)
-
-    curve = card["curve"]
     assert card["steps_taken"] == 30
-    assert all(0 < point["held_out_noise"] < point["held_out_mse"] for point in curve)
+    assert all(0 < point["held_out_noise"] < point["held_out_mse"] for point in card["curve"])
     assert set(card["validation"]["cotton_twill"]["footprints"]) <= set(footprint_labels())
 
 
@@ -221,37 +203,33 @@ def test_the_state_of_the_lowest_held_out_loss_is_shipped(folder, tmp_path, monk
         steps=60, batch=64, fabrics=1, learning_rate=0.3, warm_up=0, average=0, curve_points=20, held_out_points=20,
         device="cpu",
     )  # fmt: skip
-    manifest, seen = Manifest.load(folder), []
-    begin = HeldOut.__init__
-
-    def noted(self, *arguments):
-        begin(self, *arguments)
-        seen.append(self)
-
-    monkeypatch.setattr(HeldOut, "__init__", noted)
     monkeypatch.setattr("pipeline.training.loop.rate_factor", lambda step, training: 1.0)
     train(NEUMIP, training, folder, FABRICS["neumip"], tmp_path)
-    card = json.loads((tmp_path / "card.json").read_text())
+    card = card_in(tmp_path)
     losses = {point["step"]: point["held_out_loss"] for point in card["curve"]}
     best = min(losses, key=losses.__getitem__)
     assert card["kept"]["step"] == best < 60
     assert "held_out_loss" in card["kept"]["watched"]
 
     # The loss of the shipped weights, from the file.
+    manifest = Manifest.load(folder)
+    held_out = HeldOut(NEUMIP, card, manifest, folder, training.validation_rows).batch(torch.device("cpu"))
     network = module_of("neumip").build(NEUMIP, [manifest.fabrics[name] for name in FABRICS["neumip"]])
     network.load_state_dict(safetensors.torch.load_file(tmp_path / "model.safetensors"))
     network.schedule(best / 60)
     with torch.no_grad():
-        loss = network.loss(seen[0].batch(torch.device("cpu")), np.random.default_rng(0))
+        loss = network.loss(held_out, np.random.default_rng(0))
     assert float(loss) == pytest.approx(losses[best], rel=1e-3)
 
 
-def test_a_training_stops_where_the_truth_is_all_noise(folder, tmp_path, monkeypatch):
+def test_a_training_stops_where_the_truth_is_all_noise_and_leaves_torch_as_it_was(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(HeldOut, "error_and_noise", lambda self, weights: (1.9e-6, 1e-6))
-    train(NEUMIP, SHORT, folder, FABRICS["neumip"], tmp_path)
-    assert json.loads((tmp_path / "card.json").read_text())["steps_taken"] == 6
-    train(NEUMIP, SHORT.model_copy(update={"stop_at_noise": False}), folder, FABRICS["neumip"], tmp_path)
-    assert json.loads((tmp_path / "card.json").read_text())["steps_taken"] == 30
+    threads = torch.get_num_threads()
+    for changes, steps in (({"threads": threads + 1}, 6), ({"stop_at_noise": False}, 30)):
+        train(NEUMIP, SHORT.model_copy(update=changes), folder, FABRICS["neumip"], tmp_path)
+        assert card_in(tmp_path)["steps_taken"] == steps
+    assert torch.get_num_threads() == threads
+    assert not torch.are_deterministic_algorithms_enabled()
 
 
 def test_the_average_follows_its_closed_form(tmp_path):
@@ -269,8 +247,7 @@ def test_the_average_follows_its_closed_form(tmp_path):
 
 
 def test_a_diverging_training_stops_and_keeps_its_checkpoint(folder, tmp_path, monkeypatch):
-    network = module_of("neumip").NeumipNetwork
-    steps = []
+    network, steps = module_of("neumip").NeumipNetwork, []
     learn = network.loss
 
     def broken(self, batch, random):
@@ -285,22 +262,12 @@ def test_a_diverging_training_stops_and_keeps_its_checkpoint(folder, tmp_path, m
     assert all(tensor.isfinite().all() for tensor in tensors.values())
 
 
-def test_a_gpu_that_is_not_there_is_bad_input(folder, tmp_path, monkeypatch):
+def test_a_gpu_or_a_fabric_that_is_not_there_is_bad_input(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(BadInput, match=r"training: device = 'cuda': torch finds no GPU"):
         train(NEUMIP, SHORT.model_copy(update={"device": "cuda"}), folder, FABRICS["neumip"], tmp_path)
-
-
-def test_a_fabric_without_rows_is_bad_input(folder, tmp_path):
     with pytest.raises(BadInput, match="denim"):
         train(NEUMIP, SHORT, folder, ["denim"], tmp_path)
-
-
-def test_torch_is_left_as_it_was(folder, tmp_path):
-    threads = torch.get_num_threads()
-    train(NEUMIP, SHORT.model_copy(update={"steps": 2}), folder, FABRICS["neumip"], tmp_path)
-    assert torch.get_num_threads() == threads
-    assert not torch.are_deterministic_algorithms_enabled()
 
 
 def test_rate_rises_and_falls_to_zero():

@@ -35,7 +35,14 @@ def rows(count=3):
 
 
 def guarded(answers):
-    return Guarded(Theirs(answers), OPTIONS, Path("/theirs.py"))
+    """Return the method that answers with an array, an error, or what a function returns."""
+
+    def answer(queries):
+        if isinstance(answers, BaseException):
+            raise answers
+        return answers(queries) if callable(answers) else answers
+
+    return Guarded(Theirs(answer), OPTIONS, Path("/theirs.py"))
 
 
 def some(value, row=1):
@@ -49,28 +56,21 @@ def changed(queries):
     return some(1)
 
 
-def raises(error):
-    def answers(queries):
-        raise error
-
-    return answers
-
-
 @pytest.mark.parametrize(
     ("answers", "sentence"),
     [
-        (lambda q: [[0, 0, 0, 0]] * 3, "list; a NumPy array is needed"),
-        (lambda q: some(1)[:, :3], "float32 (3, 3); float32 (3, 4) is needed"),
-        (lambda q: some(1)[:2], "float32 (2, 4); float32 (3, 4) is needed"),
-        (lambda q: some(1).astype(np.float64), "float64 (3, 4); float32 (3, 4) is needed"),
-        (lambda q: some(np.nan), "1 of 3 rows with values that are not finite (first row 1: [ 1. 1. nan 1.])"),
-        (lambda q: some(np.inf, 2), "1 of 3 rows with values that are not finite (first row 2"),
-        (lambda q: some(-1e-9), "1 of 3 rows with values that are negative (first row 1"),
+        ([[0, 0, 0, 0]] * 3, "list; a NumPy array is needed"),
+        (some(1)[:, :3], "float32 (3, 3); float32 (3, 4) is needed"),
+        (some(1)[:2], "float32 (2, 4); float32 (3, 4) is needed"),
+        (some(1).astype(np.float64), "float64 (3, 4); float32 (3, 4) is needed"),
+        (some(np.nan), "1 of 3 rows with values that are not finite (first row 1: [ 1. 1. nan 1.])"),
+        (some(np.inf, 2), "1 of 3 rows with values that are not finite (first row 2"),
+        (some(-1e-9), "1 of 3 rows with values that are negative (first row 1"),
         (changed, "changed the arrays of its queries"),
-        (raises(ValueError("no such cloth")), "predict: ValueError: no such cloth"),
-        (raises(SystemExit(0)), "predict: SystemExit"),
-        (raises(MemoryError()), "predict: MemoryError"),
-        (raises(BadInput("queries", "wi", 1, "too steep")), "predict: BadInput: queries: wi = 1: too steep"),
+        (ValueError("no such cloth"), "predict: ValueError: no such cloth"),
+        (SystemExit(0), "predict: SystemExit"),
+        (MemoryError(), "predict: MemoryError"),
+        (BadInput("queries", "wi", 1, "too steep"), "predict: BadInput: queries: wi = 1: too steep"),
     ],
 )
 def test_a_fault_of_predict_is_a_sentence_with_the_name(answers, sentence):
@@ -82,35 +82,29 @@ def test_a_fault_of_predict_is_a_sentence_with_the_name(answers, sentence):
 
 def test_sound_answers_are_those_of_the_method():
     answers = some(0)
-    method = guarded(lambda queries: answers)
+    method = guarded(answers)
     assert method.predict(DENIM, rows()) is answers
     assert isinstance(method, Method) and (method.name, method.setting) == ("theirs", "k = 2")
     assert method.covers(DENIM) is True
-    assert guarded(lambda queries: some(1)[:0]).predict(DENIM, rows(0)).shape == (0, 4)
+    assert guarded(some(1)[:0]).predict(DENIM, rows(0)).shape == (0, 4)
+    assert guarded(np.int64(12)).bytes_stored(DENIM) == 12
 
 
 def test_a_measurement_that_counts_wrong_values_gets_them():
-    method = unchecked(guarded(lambda queries: some(np.nan)))
+    method = unchecked(guarded(some(np.nan)))
     assert np.isnan(method.predict(DENIM, rows())).sum() == 1
     with pytest.raises(MethodFailed, match="is needed"):
-        unchecked(guarded(lambda queries: some(1)[:2])).predict(DENIM, rows())
+        unchecked(guarded(some(1)[:2])).predict(DENIM, rows())
     other = Theirs(None)
     assert unchecked(other) is other
 
 
-def test_a_fault_of_another_function_names_it():
-    with pytest.raises(MethodFailed, match=r"^theirs: prepare: RuntimeError: no table of two lines$"):
-        guarded(None).prepare(DENIM)
-
-
 @pytest.mark.parametrize("wrong", [-1, 2.5, True, None, "8"])
-def test_bytes_are_an_integer(wrong):
+def test_bytes_are_an_integer_and_faults_name_their_function(wrong):
     with pytest.raises(MethodFailed, match="an integer from 0 on is needed"):
-        guarded(lambda _: wrong).bytes_stored(DENIM)
-
-
-def test_bytes_of_numpy_are_integers():
-    assert guarded(lambda _: np.int64(12)).bytes_stored(DENIM) == 12
+        guarded(wrong).bytes_stored(DENIM)
+    with pytest.raises(MethodFailed, match=r"^theirs: prepare: RuntimeError: no table of two lines$"):
+        guarded(wrong).prepare(DENIM)
 
 
 def test_a_failure_crosses_processes():
@@ -126,35 +120,24 @@ def test_code_that_is_not_the_planned_one_is_refused(tmp_path):
         load_added(options)
 
 
-@pytest.fixture
-def metric(tmp_path):
-    """A metric from outside whose body is given."""
-
-    def of(body):
-        path = tmp_path / "metrics.py"
-        path.write_text(f"def theirs(*given):\n    return {body}\n")
-        fields = {"title": "t", "definition": "d", "unit": "1", "better": "lower", "format": "percent"}
-        source = locate(f"{path}:theirs")
-        return AddedFunction(name="theirs", source=source.text, sha256=source.sha256(), stated="1", **fields)
-
-    return of
-
-
-def test_a_metric_is_a_number(metric):
-    assert load_function(metric("sum(given)"))(1, 2, 3) == 6.0
-    assert load_function(metric("__import__('numpy').float32(0.5)"))() == 0.5
-
-
 @pytest.mark.parametrize(
-    ("body", "sentence"),
+    ("body", "found"),
     [
+        ("sum(given)", 6.0),
+        ("__import__('numpy').float32(0.5)", 0.5),
         ("float('nan')", "theirs: it returned nan; a finite number is needed"),
         ("None", "theirs: it returned None; a finite number is needed"),
         ("True", "theirs: it returned True; a finite number is needed"),
         ("1 / 0", "theirs: the metric: ZeroDivisionError: division by zero (metrics.py, line 2)"),
     ],
 )
-def test_a_metric_that_is_no_number_fails_in_a_sentence(metric, body, sentence):
-    with pytest.raises(MethodFailed) as failure:
-        load_function(metric(body))()
-    assert str(failure.value) == sentence
+def test_a_metric_is_a_number_or_fails_in_a_sentence(tmp_path, body, found):
+    path = tmp_path / "metrics.py"
+    path.write_text(f"def theirs(*given):\n    return {body}\n")
+    source = locate(f"{path}:theirs")
+    fields = {"title": "t", "definition": "d", "unit": "1", "better": "lower", "format": "percent", "stated": "1"}
+    metric = load_function(AddedFunction(name="theirs", source=source.text, sha256=source.sha256(), **fields))
+    try:
+        assert metric(1, 2, 3) == found
+    except MethodFailed as failure:
+        assert str(failure) == found

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.fingerprint import fingerprint
 from pipeline.models.added.guarded import MethodFailed
 from pipeline.models.added.network import build_added, restore_added
 from pipeline.models.network import Batch
 from pipeline.truth.query import Queries
-from tests.pipeline.models.stand_ins import written
-from weaves.errors import WorkFailed
+from tests.pipeline.analytic.methods import woven
+from tests.pipeline.models.stand_ins import card_of, written
 from weaves.fabric import load_fabric
 
 CLOTHS = load_fabric("denim"), load_fabric("cotton_twill")
@@ -43,15 +42,14 @@ def batch():
 
 
 def queries(count):
-    one = np.ones(count, np.float32)
-    up = np.tile(np.float32([0, 0, 1]), (count, 1))
+    one, up = np.ones(count), np.tile([0, 0, 1], (count, 1))
     return Queries.round(one, one, one, up, up)
 
 
 def trained(network, cloths, answer):
     """The card and the weights that a training of the network would leave."""
-    optics = [{"name": cloth.name, "optics": fingerprint(cloth.optics())} for cloth in cloths]
-    card = {"architecture": network.architecture(), "fabrics": optics}
+    fabrics = [about for cloth in cloths for about in card_of(cloth)["fabrics"]]
+    card = {"architecture": network.architecture(), "fabrics": fabrics}
     return json.loads(json.dumps(card)), {"network.answer": torch.full((4,), float(answer))}
 
 
@@ -94,57 +92,52 @@ def test_random_numbers_of_torch_are_those_of_the_step(theirs):
     assert losses[0] == losses[2] != losses[1]
 
 
+LOSS = "(torch.rand(()) * self.answer - batch.target).square().mean()"
+
+
+def own_function(head, body):
+    return "    def loss", f"    def {head}:\n        {body}\n\n    def loss"
+
+
 @pytest.mark.parametrize(
-    ("old", "new", "sentence"),
+    ("change", "sentence"),
     [
-        ("return Network(fabrics)", "return 5", "network returned int; a torch.nn.Module is needed"),
-        ("return Network(fabrics)", "raise KeyError('x')", "network: KeyError: 'x' (theirs.py, line 36)"),
-        ("def loss", "def los", "network returned Network, which lacks the function 'loss'"),
-        ("nn.Parameter(torch.ones(4))", "torch.ones(4)", "network returned Network, which has nothing to train"),
+        (("return Network(fabrics)", "return 5"), "network returned int; a torch.nn.Module is needed"),
+        (("return Network(fabrics)", "raise KeyError('x')"), "network: KeyError: 'x' (theirs.py, line 36)"),
+        (("def loss", "def los"), "network returned Network, which lacks the function 'loss'"),
+        (("nn.Parameter(torch.ones(4))", "torch.ones(4)"), "network returned Network, which has nothing to train"),
+        ((LOSS, "5.0"), "loss returned float; a tensor with one number is needed"),
+        ((LOSS, "None"), "loss returned NoneType; a tensor with one number is needed"),
+        ((LOSS, "self.answer"), "loss returned a tensor float32 (4,); one number, shape (), is needed"),
+        ((LOSS, "self.answer[:1]"), "loss returned a tensor float32 (1,); one number, shape (), is needed"),
+        ((LOSS, "torch.tensor(1)"), "loss returned a tensor int64 (); one number, shape (), is needed"),
+        (
+            (LOSS, "self.answer.detach().sum()"),
+            "loss returned a number that does not depend on the network's parameters",
+        ),
+        (own_function("start_at(self, target)", "raise ValueError('no')"), "start_at: ValueError: no"),
+        (own_function("schedule(self, progress)", "raise SystemExit"), "schedule: SystemExit"),
+        (own_function("parameter_groups(self, rate)", "return [{'lr': rate}]"), "parameter_groups: KeyError: 'params'"),
+        (own_function("parameter_groups(self, rate)", "return 5"), "parameter_groups: TypeError"),
+        (own_function("architecture(self)", "return {'a': torch.ones(1)}"), "architecture: TypeError"),
+        (own_function("architecture(self)", "return 5"), "architecture: TypeError"),
+        (("self.trained = network", "raise OSError('full')"), "load: OSError: full"),
+        (("torch.ones(4)", "torch.ones(5)"), "network: RuntimeError: Error(s) in loading state_dict"),
     ],
 )
-def test_what_is_no_network_gets_a_sentence(theirs, old, new, sentence):
+def test_a_fault_is_a_sentence_with_the_name_of_the_function(theirs, change, sentence):
+    part = trained(build_added(theirs(), CLOTHS), CLOTHS, 1)
+    options = theirs(*change)
     with pytest.raises(MethodFailed) as failure:
-        build_added(theirs(old, new), CLOTHS)
-    assert str(failure.value) == f"theirs: {sentence}"
-
-
-@pytest.mark.parametrize(
-    ("value", "sentence"),
-    [
-        ("5.0", "float; a tensor with one number is needed"),
-        ("None", "NoneType; a tensor with one number is needed"),
-        ("self.answer", "a tensor float32 (4,); one number, shape (), is needed"),
-        ("self.answer[:1]", "a tensor float32 (1,); one number, shape (), is needed"),
-        ("torch.tensor(1)", "a tensor int64 (); one number, shape (), is needed"),
-        ("self.answer.detach().sum()", "a number that does not depend on the network's parameters"),
-    ],
-)
-def test_a_loss_is_one_number(theirs, value, sentence):
-    network = build_added(theirs("(torch.rand(()) * self.answer - batch.target).square().mean()", value), CLOTHS)
-    with pytest.raises(MethodFailed) as failure:
-        network.loss(batch(), np.random.default_rng(0))
-    assert str(failure.value) == f"theirs: loss returned {sentence}"
-
-
-@pytest.mark.parametrize(
-    ("function", "body", "sentence"),
-    [
-        ("start_at(self, target)", "raise ValueError('no')", "start_at: ValueError: no"),
-        ("schedule(self, progress)", "raise SystemExit", "schedule: SystemExit"),
-        ("parameter_groups(self, rate)", "return [{'lr': rate}]", "parameter_groups: KeyError: 'params'"),
-        ("parameter_groups(self, rate)", "return 5", "parameter_groups: TypeError"),
-        ("architecture(self)", "return {'a': torch.ones(1)}", "architecture: TypeError"),
-        ("architecture(self)", "return 5", "architecture: TypeError"),
-    ],
-)
-def test_a_fault_of_another_function_names_it(theirs, function, body, sentence):
-    network = build_added(theirs("    def loss", f"    def {function}:\n        {body}\n\n    def loss"), CLOTHS)
-    with pytest.raises(MethodFailed, match=f"^theirs: {sentence}"):
+        network = build_added(options, CLOTHS)
         network.start_at(torch.ones(1, 4))
         network.schedule(0.0)
         network.parameter_groups(0.1)
         network.architecture()
+        if "torch.ones(5)" not in change:
+            network.loss(batch(), np.random.default_rng(0))
+        restore_added(options, [part])
+    assert str(failure.value).startswith(f"theirs: {sentence}")
 
 
 def test_weights_are_loaded_into_the_method(theirs):
@@ -170,27 +163,7 @@ def test_networks_of_one_fabric_answer_for_theirs(theirs):
     parts = [trained(build_added(options, [cloth]), [cloth], index + 1) for index, cloth in enumerate(CLOTHS)]
     method = restore_added(options, parts)
     for index, cloth in enumerate(CLOTHS):
-        blue = cloth.warp.model_copy(update={"diffuse": (0.0, 0.0, 0.5)})
-        for one in (cloth, cloth.model_copy(update={"warp": blue})):
+        for one in (cloth, woven(cloth.name, warp={"diffuse": (0.0, 0.0, 0.5)})):
             assert method.covers(one)
             assert method.predict(one, queries(1)).tolist() == [[index + 1.0] * 4]
     assert not method.covers(load_fabric("polyester_lining"))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "sentence"),
-    [
-        ("self.trained = network", "raise OSError('full')", "load: OSError: full"),
-        ("torch.ones(4)", "torch.ones(len(fabrics) + 1)", "network: RuntimeError: Error.s. in loading state_dict"),
-    ],
-)
-def test_a_fault_of_loading_is_a_sentence(theirs, old, new, sentence):
-    network = build_added(theirs(), CLOTHS)
-    part = trained(network, CLOTHS, 1)
-    with pytest.raises(MethodFailed, match=f"^theirs: {sentence}"):
-        restore_added(theirs(old, new), [part])
-
-
-def test_code_that_is_not_the_planned_one_is_refused(theirs):
-    with pytest.raises(WorkFailed, match="000000000000… was planned"):
-        build_added(theirs().model_copy(update={"sha256": "0" * 64}), CLOTHS)

@@ -8,8 +8,7 @@ from pipeline.compiled.arrays import nbytes
 from pipeline.models.analytic.soft_nodes import SoftNodes, SoftNodesOptions
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
-from pipeline.truth.options import TruthOptions
+from tests.pipeline.models.against_truth import colour_error, truth_of
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -25,9 +24,6 @@ def test_each_level_is_its_sums_in_chunks():
         assert method.bytes_stored(fabric) == nbytes(table)
 
 
-COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
-
-
 @pytest.mark.parametrize("sigma", [(0.06, 0.3), slow((0.3, 1.5))])
 @pytest.mark.parametrize("name", ["cotton_twill", slow("wool_gabardine")])
 def test_curved_cloth_is_as_near_to_the_truth_as_flat_cloth(name, sigma):
@@ -38,25 +34,10 @@ def test_curved_cloth_is_as_near_to_the_truth_as_flat_cloth(name, sigma):
     steep = np.minimum(curved.wi[:, 2], curved.wo[:, 2]) < np.cos(np.radians(70.0))
     curved = curved.take(np.flatnonzero(steep)[:400])
     flat = curved._replace(curvature=np.zeros_like(curved.curvature))
-    options = TruthOptions(estimator="owen", relative_error=0.01)
-    of_curved, of_flat = (estimate(fabric, queries, options, 1).mean @ COLOUR for queries in (curved, flat))
-
-    def error(queries, truth):
-        return np.sqrt(np.mean((method.predict(fabric, queries) @ COLOUR - truth) ** 2)) / truth.mean()
-
-    wrong = error(curved, of_curved)
-    assert wrong < 1.2 * error(flat, of_flat)
-    assert wrong**2 < 0.9 * error(flat, of_curved) ** 2
-
-
-@pytest.mark.slow
-def test_flat_rows_do_not_depend_on_curved_ones():
-    fabric, method = load_fabric("voile"), SoftNodes()
-    asked = draw_queries(QueryOptions(behind=0.3), fabric.weave.repeat, 2, 0, 300)
-    curvature = np.where(np.arange(300) % 2 == 0, np.float32(0.2), np.float32(0.0))
-    alone, mixed = method.predict(fabric, asked), method.predict(fabric, asked._replace(curvature=curvature))
-    np.testing.assert_array_equal(mixed[1::2], alone[1::2])
-    assert (mixed[::2] != alone[::2]).any(axis=1).mean() > 0.5
+    of_curved, of_flat = (truth_of(fabric, queries, estimator="owen") for queries in (curved, flat))
+    wrong = colour_error(method.predict(fabric, curved), of_curved)
+    assert wrong < 1.2 * colour_error(method.predict(fabric, flat), of_flat)
+    assert wrong**2 < 0.9 * colour_error(method.predict(fabric, flat), of_curved) ** 2
 
 
 @pytest.mark.slow
@@ -76,3 +57,13 @@ def test_lights_on_both_sides_are_answered_row_by_row():
     found = method.predict(fabric, asked)
     np.testing.assert_array_equal(found[~behind], method.predict(fabric, asked.take(~behind)))
     np.testing.assert_array_equal(found[behind], method.behind(fabric, asked.take(behind))[:, :4])
+
+
+@pytest.mark.slow
+def test_flat_rows_do_not_depend_on_curved_ones():
+    fabric, method = load_fabric("voile"), SoftNodes()
+    asked = draw_queries(QueryOptions(behind=0.3), fabric.weave.repeat, 2, 0, 300)
+    curvature = np.where(np.arange(300) % 2 == 0, np.float32(0.2), np.float32(0.0))
+    alone, mixed = method.predict(fabric, asked), method.predict(fabric, asked._replace(curvature=curvature))
+    np.testing.assert_array_equal(mixed[1::2], alone[1::2])
+    assert (mixed[::2] != alone[::2]).any(axis=1).mean() > 0.5

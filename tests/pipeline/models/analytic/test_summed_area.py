@@ -5,8 +5,7 @@ from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
-from pipeline.truth.options import TruthOptions
+from tests.pipeline.models.against_truth import colour_error, truth_of
 from weaves.fabric import load_fabric
 
 
@@ -25,8 +24,7 @@ def test_it_errs_less_than_points_of_the_same_time(sigma, clusters):
     """RMSE of a grey cloth's colour: 16 R2 points take about as long as 64 clusters."""
     fabric = load_fabric("cotton_twill")
     queries = draw_queries(QueryOptions(sigma=sigma), fabric.weave.repeat, 1, 0, 300)
-    colour = np.array([0.3, 0.3, 0.5, 0.5])
-    truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean @ colour
+    truth = truth_of(fabric, queries)
     (points,) = load_methods(PointSampledOptions(counts=[16], sequence="r2", visibility="soft_horizon"))
-    own, others = (np.mean((m.predict(fabric, queries) @ colour - truth) ** 2) for m in (clusters, points))
-    assert own < 0.8 * others
+    own, others = (colour_error(method.predict(fabric, queries), truth) for method in (clusters, points))
+    assert own**2 < 0.8 * others**2

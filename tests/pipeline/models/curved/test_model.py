@@ -7,24 +7,20 @@ import pytest
 import torch
 
 from pipeline.fingerprint import IDENTITY, fingerprint
-from pipeline.models.curved import CurvedOptions
-from pipeline.models.curved.model import Curved, CurvedNetwork, SilhouetteData, View, build
+from pipeline.models.curved.model import Curved, CurvedNetwork, SilhouetteData, View
 from pipeline.models.domain import Domain
-from pipeline.models.network import Batch
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.query import Queries
+from tests.pipeline.analytic.methods import woven
+from tests.pipeline.models.stand_ins import SMALL, batch_of, descend, untrained
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
-SMALL = CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_points=32, silhouette_sigma=(0.5, 8.0))
-GRAZING = SMALL.model_copy(update={"silhouette": "grazing"})
+CURVED = SMALL["curved"]
+GRAZING = CURVED.model_copy(update={"silhouette": "grazing"})
 DENIM = load_fabric("denim")
-
-
-def _built(options=SMALL, fabric=DENIM):
-    return build(options, [fabric], [options.silhouettes.answer(fabric, 0, options.silhouette_rows)])
 
 
 def _wo(cosine, azimuth=0.0):
@@ -47,15 +43,13 @@ def _queries(count, curvature=0.1, behind=False):
     return Queries.round(u, v, sigma, wi, wo)._replace(curvature=np.full(count, curvature, np.float32))
 
 
-def _method(options=SMALL, domain=None):
-    torch.manual_seed(1)
-    network = CurvedNetwork(options, DENIM.weave.repeat)
-    return Curved({fingerprint(DENIM.optics()): network}, domain)
+def _method(domain=None):
+    return Curved({fingerprint(DENIM.optics()): CurvedNetwork(CURVED, DENIM.weave.repeat)}, domain)
 
 
 def test_published_sizes():
     """One texture and three hidden layers of 24 for each module; directions x and y, curvature as it is."""
-    options = SMALL.model_copy(update={"levels": 1, "directions": "projected", "curvature_input": "linear"})
+    options = CURVED.model_copy(update={"levels": 1, "directions": "projected", "curvature_input": "linear"})
     network = CurvedNetwork(options, (4, 4))
     widths = {
         name: [layer.weight.shape for layer in getattr(network, name) if isinstance(layer, torch.nn.Linear)]
@@ -66,18 +60,13 @@ def test_published_sizes():
     assert widths["decoder"] == [(24, 7 + 5), *hidden, (4, 24)]
     assert len(network.levels) == len(network.opacity_levels) == 1
     assert network.architecture()["parameters"]["textures"] == 3 * 7 * 16 * 16
-
-
-def test_every_departure_is_named():
-    assert SMALL.model_copy(update={"levels": 1, "curvature_input": "linear", "certain": False}).departures == (
-        "four components in place of RGB",
-    )
-    assert len(SMALL.departures) == 4
+    assert options.model_copy(update={"certain": False}).departures == ("four components in place of RGB",)
+    assert len(CURVED.departures) == 4
 
 
 @pytest.mark.parametrize("way", ["linear", "root", "touch"])
 def test_curvature_enters_as_asked(way):
-    network = CurvedNetwork(SMALL.model_copy(update={"curvature_input": way}), (4, 4))
+    network = CurvedNetwork(CURVED.model_copy(update={"curvature_input": way}), (4, 4))
     seen = network._view(_view([0.6, 1.0], 0.25))
     expected = {"linear": [0.25], "root": [0.5], "touch": [0.5, 0.75 / math.sqrt(0.75**2 + 0.5)]}[way]
     torch.testing.assert_close(seen[0], torch.tensor([0.8, 0.0, 0.6, *expected]))
@@ -98,24 +87,28 @@ def test_rays_that_sink_below_every_yarn_have_hit_one():
     fall, curvature = 0.5, 0.1
     edge = math.sqrt(2 * curvature * fall)
     cosine = edge / math.sqrt(1 + edge * edge) * np.array([0.99, 1.01])
-    network = CurvedNetwork(SMALL, (4, 4), fall=fall)
+    network = CurvedNetwork(CURVED, (4, 4), fall=fall)
     below, above = network.cover(_view(cosine, curvature)).tolist()
     assert below < 1.0
     assert above == 1.0
     assert network.cover(_view([0.001], 0.0)).tolist() == [1.0]
-    assert CurvedNetwork(SMALL, (4, 4)).cover(_view([0.9], 0.0)).item() < 1.0
+    assert CurvedNetwork(CURVED, (4, 4)).cover(_view([0.9], 0.0)).item() < 1.0
 
 
 @pytest.mark.slow
 def test_a_cloth_with_gaps_is_never_certain():
-    front = height_field(DENIM)
-    assert _built().fall.item() == pytest.approx(front.highest - front.lowest)
-    narrow = {family: getattr(DENIM, family).model_copy(update={"width": 0.7}) for family in ("warp", "weft")}
-    assert _built(fabric=DENIM.model_copy(update=narrow)).fall.item() < 0.0
+    """The fall is a part of the weights; the silhouettes are none."""
+    front, network = height_field(DENIM), untrained(CURVED, DENIM)
+    assert network.fall.item() == pytest.approx(front.highest - front.lowest)
+    assert "fall" in network.state_dict() and not [name for name in network.state_dict() if "silhouettes" in name]
+    assert untrained(CURVED, woven("denim", width=0.7)).fall.item() < 0.0
 
 
 def test_opacity_of_the_grazing_variant_is_the_gaussian_share_below_the_cosine():
+    """Which does not depend on the angle of the view."""
     network = CurvedNetwork(GRAZING, (4, 4))
+    steep, flat = (torch.stack(network.grazing(_view([cosine], 0.2))) for cosine in (0.9, 0.1))
+    torch.testing.assert_close(steep, flat)
     with torch.no_grad():
         for weight in network.opacity.parameters():
             weight.zero_()
@@ -128,27 +121,16 @@ def test_opacity_of_the_grazing_variant_is_the_gaussian_share_below_the_cosine()
     assert network.cover(_view([0.01], 0.0)).tolist() == [1.0]
 
 
-def test_grazing_cosines_do_not_depend_on_the_angle_of_the_view():
-    network = CurvedNetwork(GRAZING, (4, 4))
-    steep, flat = (torch.stack(network.grazing(_view([cosine], 0.2))) for cosine in (0.9, 0.1))
-    torch.testing.assert_close(steep, flat)
-
-
-@pytest.mark.parametrize("options", [SMALL, GRAZING])
+@pytest.mark.parametrize("options", [CURVED, GRAZING])
 def test_silhouettes_are_learnt(options):
     """A few hundred steps find opacities that no constant comes near; silhouettes alone, which no light concerns."""
-    torch.manual_seed(0)
     options = options.model_copy(update={"silhouette_rows": 2048, "blur": 0.0})
-    network = _built(options).train()
+    network = untrained(options, DENIM).train()
     optimiser = torch.optim.Adam(network.parameter_groups(5e-3))
     random = np.random.default_rng(3)
-    for _ in range(120):
-        loss = network._edge_loss(*network.silhouettes.draw(128, random))
-        assert loss > 0 or options.silhouette == "opacity"
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-    other = SMALL.model_copy(update={"silhouette_seed": 5, "silhouette_points": 256})
+    losses = descend(optimiser, 120, lambda _: network._edge_loss(*network.silhouettes.draw(128, random)))
+    assert min(losses) > 0 or options.silhouette == "opacity"
+    other = CURVED.model_copy(update={"silhouette_seed": 5, "silhouette_points": 256})
     others = SilhouetteData(other.silhouettes.answer(DENIM, 0, 512), DENIM.weave.repeat)
     view = View(*(others.get_buffer(name) for name in View._fields))
     target = others.get_buffer("target")[:, 0]
@@ -159,45 +141,27 @@ def test_silhouettes_are_learnt(options):
 
 
 def test_loss_adds_the_silhouettes_to_the_components():
-    network = _built().eval()
-    random = np.random.default_rng(0)
-    columns = [torch.from_numpy(random.random((1, 64)).astype(np.float32)) for _ in range(7)]
-    directions = [torch.from_numpy(_wo(random.random((1, 64)))) for _ in range(2)]
-    u, v, sigma, minor, angle, curvature, through = columns
-    target = torch.from_numpy(random.random((1, 64, 4)).astype(np.float32))
-    fabric = torch.zeros(1, dtype=torch.int64)
-    batch = Batch(fabric, u, v, sigma, *directions, minor, angle, curvature, target, through)
+    network = untrained(CURVED, DENIM).eval()
+    batch = batch_of(_queries(64), torch.rand(64, 4))
     both = network.loss(batch, np.random.default_rng(1))
     edge = network._edge_loss(*network.silhouettes.draw(64, np.random.default_rng(1)))
     network.silhouettes = None
     alone = network.loss(batch, np.random.default_rng(1))
-    torch.testing.assert_close(both, alone + SMALL.silhouette_weight * edge)
+    torch.testing.assert_close(both, alone + CURVED.silhouette_weight * edge)
 
 
-def test_silhouettes_are_no_part_of_the_weights():
-    network = _built()
-    assert not [name for name in network.state_dict() if "silhouettes" in name]
-    restored = CurvedNetwork(SMALL, DENIM.weave.repeat)
-    restored.load_state_dict(network.state_dict())
-    assert restored.fall == network.fall
-
-
-def test_method_answers_at_extremes_and_refuses_what_it_was_not_taught():
+def test_silhouettes_at_extremes_are_shares_and_what_was_not_taught_is_refused():
     method = _method()
     for behind in (False, True):
         queries = _queries(40, behind=behind)
         queries = queries._replace(u=queries.u * np.float32(1e6), sigma=queries.sigma * np.float32(1e-4))
         prediction, through = method.predict(DENIM, queries), method.missed(DENIM, queries)
-        assert prediction.shape == (40, 4)
-        assert np.isfinite(prediction).all()
-        assert (prediction >= 0).all()
+        assert np.isfinite(prediction).all() and (prediction >= 0).all()
         assert ((through >= 0) & (through <= 1)).all()
     assert method.predict(DENIM, queries.take(slice(0))).shape == (0, 4)
     with pytest.raises(BadInput, match=r"curvature\[3\].*trained up to 0.5"):
-        curvature = np.float32([0, 0.1, 0.5, 0.6])
-        method.predict(DENIM, _queries(4)._replace(curvature=curvature))
-    about = {"queries": {"curvature": [0.01, 0.2], "behind": 0.0}}
-    taught = _method(domain=Domain.of(about, [DENIM]))
+        method.predict(DENIM, _queries(4)._replace(curvature=np.float32([0, 0.1, 0.5, 0.6])))
+    taught = _method(Domain.of({"queries": {"curvature": [0.01, 0.2], "behind": 0.0}}, [DENIM]))
     with pytest.raises(BadInput, match=r"trained up to 0\.2"):
         taught.missed(DENIM, _queries(4, curvature=0.3))
     with pytest.raises(BadInput, match="wi"):
@@ -206,9 +170,9 @@ def test_method_answers_at_extremes_and_refuses_what_it_was_not_taught():
 
 def test_a_flat_material_may_take_part():
     """neumip with ignore_curvature: 0 for light from behind, rows lit from there weigh nothing, others as ever."""
-    options = NeumipOptions(texels_per_yarn=4, ignore_curvature=True)
-    torch.manual_seed(2)
-    network = NeumipNetwork(options, DENIM.weave.repeat)
+    options, repeat = NeumipOptions(texels_per_yarn=4, ignore_curvature=True), DENIM.weave.repeat
+    network, plain = NeumipNetwork(options, repeat), NeumipNetwork(NeumipOptions(texels_per_yarn=4), repeat)
+    plain.load_state_dict(network.state_dict())
     method = Neumip({fingerprint(DENIM.optics()): network})
     front, behind = _queries(30), _queries(30, behind=True)
     assert (method.predict(DENIM, behind) == 0).all()
@@ -217,13 +181,7 @@ def test_a_flat_material_may_take_part():
     assert "ignore_curvature" not in NeumipOptions().model_dump(mode="json", context=IDENTITY)
     assert NeumipOptions.model_validate(options.model_dump(mode="json", context=IDENTITY)) == options
 
-    random = np.random.default_rng(0)
-    columns = [torch.from_numpy(random.random((1, 60)).astype(np.float32)) for _ in range(7)]
-    u, v, sigma, minor, angle, curvature, through = columns
-    wi = torch.from_numpy(np.concatenate([front.wi, behind.wi]))[None]
-    target = torch.from_numpy(random.random((1, 60, 4)).astype(np.float32))
-    both = Batch(torch.zeros(1, dtype=torch.int64), u, v, sigma, wi, wi.abs(), minor, angle, curvature, target, through)
-    lit = Batch(both.fabric, *(column[:, :30] for column in both[1:]))
-    blind, plain = network.loss(both, random), NeumipNetwork(NeumipOptions(texels_per_yarn=4), DENIM.weave.repeat)
-    plain.load_state_dict(network.state_dict())
-    torch.testing.assert_close(blind, plain.loss(lit, random))
+    random, target = np.random.default_rng(0), torch.rand(60, 4)
+    both = Queries(*map(np.concatenate, zip(front, behind, strict=True)))
+    blind = network.loss(batch_of(both, target), random)
+    torch.testing.assert_close(blind, plain.loss(batch_of(front, target[:30]), random))

@@ -19,14 +19,6 @@ def test_texture_is_read_bilinearly_and_wraps():
     torch.testing.assert_close(read_texture([texture], u, v, level), torch.tensor(expected))
 
 
-def test_levels_are_blended():
-    fine, coarse = torch.full((2, 4, 4), 1.0), torch.full((2, 2, 2), 3.0)
-    levels = [torch.tensor([0]), torch.tensor([1])]
-    shares = [torch.tensor([0.25]), torch.tensor([0.75])]
-    read = read_texture([fine, coarse], torch.tensor([0.1]), torch.tensor([0.9]), levels, shares)
-    torch.testing.assert_close(read, torch.full((1, 2), 2.5))
-
-
 def test_blur_keeps_the_mean_and_spreads_as_a_gaussian():
     texture = torch.zeros(1, 64, 64, dtype=torch.float64)
     texture[0, 32, 32] = 1.0

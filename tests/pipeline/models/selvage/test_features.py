@@ -7,10 +7,9 @@ from pipeline.analytic.soft_nodes.features import EXCHANGED, EXCHANGED_SIGN, rea
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.woven.standard_position import SYMMETRIES, moved
 from pipeline.shards.queries import QueryOptions, draw_queries
+from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.images import image_of
 from tests.presets import slow
-from weaves.draft import Matrix
-from weaves.fabric import load_fabric
 
 SIZES = {"narrow": (0.05, 0.24), "middle": (0.25, 1.0), "wide": (3.0, 8.0)}
 GENERATORS = [SYMMETRIES[1], SYMMETRIES[2], SYMMETRIES[4]]
@@ -19,10 +18,7 @@ GENERATORS = [SYMMETRIES[1], SYMMETRIES[2], SYMMETRIES[4]]
 @pytest.fixture(scope="module")
 def lopsided():
     """A cloth without symmetries of its own, its yarns unlike and with gaps."""
-    fabric = load_fabric("denim")
-    warp = fabric.warp.model_copy(update={"width": 0.8, "twist": 20.0})
-    draft = Matrix(rows=("##.#", ".##.", "#..#"))
-    return fabric.model_copy(update={"draft": draft, "warp": warp})
+    return woven("denim", ("##.#", ".##.", "#..#"), warp={"width": 0.8, "twist": 20.0})
 
 
 @pytest.fixture(scope="module")

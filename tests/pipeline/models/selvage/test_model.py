@@ -10,21 +10,19 @@ from pipeline.compiled.arrays import nbytes
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import fallback_answers
-from pipeline.models.method import Method
-from pipeline.models.network import Batch
-from pipeline.models.registry import load_model, module_of, pretrained_folder
+from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.error_network import FINEST, FLOOR, OWN, colour_weights
 from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
+from tests.pipeline.models.stand_ins import SMALL, batch_of, descend
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.population import Population, population_fabrics
 
-SMALL = SelvageOptions(width=16, measured_rows=64)
+SELVAGE = SMALL["selvage"]
 
 
 @pytest.fixture(scope="module")
@@ -32,63 +30,31 @@ def fabrics():
     return [load_fabric("polyester_lining"), load_fabric("cotton_twill")]
 
 
-def batch_of(fabric, index, seed, rows, answers=None):
-    asked = draw_queries(QueryOptions(), fabric.weave.repeat, seed, 0, rows)
-    if answers is None:
-        answers = estimate(fabric, asked, TruthOptions(estimator="node_table"), 1).mean
-    columns = (*asked, answers, np.zeros(rows, np.float32))
-    return asked, Batch(torch.tensor([index]), *(torch.from_numpy(column)[None] for column in columns))
+def true_batch(fabrics, seed, rows):
+    """Return a step about the second fabric, with the truth as its target."""
+    asked = draw_queries(QueryOptions(), fabrics[1].weave.repeat, seed, 0, rows)
+    return batch_of(asked, estimate(fabrics[1], asked, TruthOptions(estimator="node_table"), 1).mean, 1)
 
 
-def trained_a_little(fabrics, options=SMALL, steps=60):
+def trained_a_little(fabrics, steps):
     """Return a network after some steps on one batch, with its losses."""
-    network = SelvageNetwork(options, fabrics)
-    _, batch = batch_of(fabrics[1], 1, 5, 256)
+    network, batch = SelvageNetwork(SELVAGE, fabrics), true_batch(fabrics, 5, 256)
     optimiser = torch.optim.AdamW(network.parameter_groups(1e-2))
-    losses = []
-    for step in range(steps):
-        loss = network.loss(batch, np.random.default_rng(step))
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-        losses.append(loss.item())
-    return network, losses
-
-
-@pytest.fixture(scope="module")
-def learnt(fabrics):
-    """A network after five steps, which no test changes."""
-    torch.manual_seed(0)
-    return trained_a_little(fabrics, steps=5)[0]
-
-
-@pytest.mark.parametrize(("width", "count"), [(16, 2374), (32, 3878), (64, 8422)])
-def test_number_of_parameters(width, count):
-    assert SelvageNetwork(SelvageOptions(width=width)).architecture()["parameters"]["total"] == count
-
-
-def test_an_untrained_network_is_the_sums(fabrics):
-    asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 64)
-    method = Selvage(SelvageNetwork(SMALL))
-    assert isinstance(method, Method)
-    np.testing.assert_allclose(method.predict(fabrics[0], asked), SoftNodes().predict(fabrics[0], asked), rtol=1e-6)
+    return network, descend(optimiser, steps, lambda step: network.loss(batch, np.random.default_rng(step)))
 
 
 @pytest.mark.slow
 def test_it_learns_and_training_sees_what_rendering_sees(fabrics):
     """The loss falls by a fifth; against the network's own predictions it is 0."""
-    network, losses = trained_a_little(fabrics)
+    network, losses = trained_a_little(fabrics, 60)
     assert losses[-1] < 0.8 * losses[0]
     method = Selvage(network)
-    asked, _ = batch_of(fabrics[1], 1, 9, 64)
+    asked = draw_queries(QueryOptions(), fabrics[1].weave.repeat, 9, 0, 64)
     answers = method.predict(fabrics[1], asked)
     assert np.abs(answers - SoftNodes().predict(fabrics[1], asked)).max() > 1e-3
-    _, batch = batch_of(fabrics[1], 1, 9, 64, answers)
-    kept = SelvageNetwork(SMALL.model_copy(update={"exchange": False}), fabrics)
-    kept.load_state_dict(network.state_dict())
-    read = kept._read(batch)
-    answer = kept(read.features, read.components, read.bounds)
-    assert kept.correction_loss(answer, read.target).item() < 1e-10
+    read = network._read(batch_of(asked, answers, 1))
+    answer = network(read.features, read.components, read.bounds)
+    assert network.correction_loss(answer, read.target).item() < 1e-10
 
 
 def test_normalised_features_have_mean_0_and_deviation_1(fabrics):
@@ -105,54 +71,28 @@ def test_normalised_features_have_mean_0_and_deviation_1(fabrics):
     np.testing.assert_allclose(normal[:, varied].std(axis=0), 1.0, atol=0.3)  # hidden patches are rare
 
 
-def test_exchanged_batches_teach_exchanged_answers(fabrics, learnt):
+def test_exchanged_batches_teach_exchanged_answers(fabrics):
     """A batch and its exchange cost a network that knows nothing of the exchange the same, in both orders."""
-    _, batch = batch_of(fabrics[1], 1, 3, 64)
+    batch = true_batch(fabrics, 3, 64)
     seeds = [next(s for s in range(50) if np.random.default_rng(s).integers(2) == side) for side in (0, 1)]
-    straight, exchanged = (learnt.loss(batch, np.random.default_rng(seed)).item() for seed in seeds)
-    assert straight != exchanged
-    untrained = SelvageNetwork(SMALL, fabrics)
-    straight, exchanged = (untrained.loss(batch, np.random.default_rng(seed)).item() for seed in seeds)
-    assert straight == pytest.approx(exchanged, rel=1e-5)
+    for steps in (0, 5):
+        network, _ = trained_a_little(fabrics, steps)
+        straight, exchanged = (network.loss(batch, np.random.default_rng(seed)).item() for seed in seeds)
+        assert (straight == pytest.approx(exchanged, rel=1e-5)) == (steps == 0)
 
 
-def test_a_trained_folder_comes_back(fabrics, learnt):
-    module = module_of("selvage")
-    (method,) = module.restore(SMALL, [({}, learnt.state_dict())])
-    asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 64)
-    np.testing.assert_array_equal(method.predict(fabrics[0], asked), Selvage(learnt).predict(fabrics[0], asked))
-    table = nbytes(tabulate(fabrics[0]))
-    assert method.bytes_stored(fabrics[0]) == table + 4 * 2374
-    assert learnt.mean.abs().max() > 0
-
-
-def test_extreme_queries_are_answered_with_finite_numbers(fabrics, learnt):
-    angles, sizes = np.radians([0.0, 89.0, 89.9]), [1e-3, 0.25, 1e4]
-    i, o, sigma, centre = (
-        axis.ravel().astype(np.float32) for axis in np.meshgrid(angles, angles, sizes, [1e6 + 0.3, -1e6], indexing="ij")
-    )
-    wi = np.stack([0.6 * np.sin(i), 0.8 * np.sin(i), np.cos(i)], axis=1).astype(np.float32)
-    wo = np.stack([np.sin(o), 0 * o, np.cos(o)], axis=1).astype(np.float32)
-    answers = Selvage(learnt).predict(fabrics[1], Queries.round(centre, -centre, sigma, wi, wo))
-    assert np.isfinite(answers).all()
-    assert (answers >= 0).all()
-
-
-def test_it_refuses_what_it_was_not_taught(fabrics):
-    domain = Domain.of({}, fabrics)
-    method = Selvage(SelvageNetwork(SMALL), domain)
+def test_viewers_behind_the_cloth_are_refused(fabrics):
     asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 8)
-    changed = asked._replace(wo=-asked.wo)
     with pytest.raises(BadInput, match="selvage"):
-        method.predict(fabrics[0], changed)
-    # Without a domain it still knows no more than the sums do.
-    with pytest.raises(BadInput, match="selvage"):
-        Selvage(SelvageNetwork(SMALL)).predict(fabrics[0], changed)
+        Selvage(SelvageNetwork(SELVAGE)).predict(fabrics[0], asked._replace(wo=-asked.wo))
 
 
-def test_the_network_corrects_soft_nodes_over_curved_cloth(fabrics):
-    """An untrained network is the soft nodes; a flat row beside curved ones keeps its bits."""
-    fabric, method = fabrics[0], Selvage(SelvageNetwork(SMALL.model_copy(update={"bound": False})))
+def test_an_untrained_network_is_the_soft_nodes_over_curved_cloth_too(fabrics):
+    """A flat row beside curved ones keeps its bits."""
+    network = SelvageNetwork(SELVAGE.model_copy(update={"bound": False}))
+    fabric, method = fabrics[0], Selvage(network)
+    weights = network.architecture()["parameters"]["total"]
+    assert method.bytes_stored(fabric) == nbytes(tabulate(fabric)) + 4 * weights
     asked = draw_queries(QueryOptions(curvature=(0.05, 0.5)), fabric.weave.repeat, 1, 0, 64)
     asked.curvature[::3] = 0.0
     found = method.predict(fabric, asked)
@@ -165,7 +105,7 @@ def test_the_network_corrects_soft_nodes_over_curved_cloth(fabrics):
 @pytest.mark.parametrize("finest", [False, True])
 def test_light_from_behind_is_answered_by_the_soft_nodes(fabrics, finest):
     """By the finest ones, if an error is wished."""
-    fabric, method, nodes = fabrics[0], Selvage(SelvageNetwork(SMALL), Domain.of({}, fabrics)), SoftNodes()
+    fabric, method, nodes = fabrics[0], Selvage(SelvageNetwork(SELVAGE), Domain.of({}, fabrics)), SoftNodes()
     if finest:
         method, nodes = method.within(0.05), SoftNodes(8)
     asked = draw_queries(QueryOptions(behind=0.5), fabric.weave.repeat, 1, 0, 64)
@@ -182,7 +122,7 @@ def test_a_network_told_to_shine_is_bounded(fabrics):
     asked = draw_queries(QueryOptions(), fabric.weave.repeat, 1, 0, 200)
     bounds = read_queries(tabulate(fabric), asked).bounds
     for bound in (True, False):
-        network = SelvageNetwork(SMALL.model_copy(update={"bound": bound}))
+        network = SelvageNetwork(SELVAGE.model_copy(update={"bound": bound}))
         torch.nn.init.constant_(network.last.bias, 30.0)
         answers = Selvage(network).predict(fabric, asked)
         assert (answers <= bounds).all() == bound

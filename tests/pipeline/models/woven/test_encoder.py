@@ -5,11 +5,11 @@ import torch
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.encoder import read_cloth
 from pipeline.models.woven.standard_position import standard as standard_of
+from tests.pipeline.models.stand_ins import SMALL
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
 
-SMALL = WovenOptions(map_texels=16, encoder_channels=4)
 TWILL = load_fabric("cotton_twill")
 
 
@@ -28,7 +28,7 @@ def test_surface_and_parameters_are_read_at_the_right_place():
 @pytest.mark.parametrize("standard", [False, True])
 def test_cloth_begun_elsewhere_is_the_cloth_with_its_draft_rolled(standard):
     """One end and three picks of four, 4 and 12 texels of 16: the maps of the rolled drawdown, the same point seen."""
-    options = SMALL.model_copy(update={"standard": standard})
+    options = SMALL["woven"].model_copy(update={"standard": standard})
     cloth = read_cloth([TWILL], options)
     begun = cloth.begun(np.array([[1 / 4, 3 / 4]]))
     seen = standard_of(TWILL)[0] if standard else TWILL
@@ -52,9 +52,9 @@ def test_what_is_blended_lies_in_the_same_place():
     """
     plain = load_fabric("polyester_lining")
     exchanged = plain.model_copy(update={"warp": plain.weft, "weft": plain.warp})
-    alone = [read_cloth([fabric], SMALL) for fabric in (plain, exchanged)]
+    alone = [read_cloth([fabric], SMALL["woven"]) for fabric in (plain, exchanged)]
     assert alone[0].placement.exchange.item() != alone[1].placement.exchange.item()
-    together = read_cloth([plain, exchanged], SMALL, like=plain)
+    together = read_cloth([plain, exchanged], SMALL["woven"], like=plain)
     for part in together.placement:
         assert torch.equal(part[0], part[1])
     torch.testing.assert_close(together.maps[:1], alone[0].maps)

@@ -4,42 +4,46 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.models.network import Batch
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.encoder import read_cloth
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.models.woven.standard_position import SYMMETRIES
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
+from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.images import image_of
-from weaves.draft import Matrix
+from tests.pipeline.models.stand_ins import SMALL, batch_of
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
-SMALL = WovenOptions(map_texels=16, encoder_channels=4)
+WOVEN = SMALL["woven"]
 TWILL = load_fabric("cotton_twill")
 
 
-def queries(u, v, sigma, wi=(0.6, 0.0, 0.8), wo=(0.0, -0.28, 0.96)):
-    u, v, sigma = (np.asarray(column, np.float32) for column in np.broadcast_arrays(u, v, sigma))
-    directions = (np.tile(np.asarray(w, np.float32), (len(u), 1)) for w in (wi, wo))
-    return Queries.round(u, v, sigma, *directions)
-
-
-@pytest.mark.parametrize(("one_blob", "filters", "picture"), [("plain", 0, 0), ("local", 64 * 128, 64)])
-def test_decoder_stores_the_published_bytes(one_blob, filters, picture):
+@pytest.mark.parametrize(
+    ("changes", "more", "picture"),
+    [
+        ({"one_blob": "plain"}, 0, 0),
+        ({"one_blob": "periodic"}, 0, 0),
+        ({"one_blob": "local"}, 64 * 128, 64),
+        # The first layer alone changes: 3 numbers enter it in place of 24.
+        ({"one_blob": "none"}, -21 * 128, 0),
+        ({"one_blob": "periodic", "spatial_fusion": False}, 94 * 128 + 129 * (128 + 128 + 64) + 65 * 4 - 86_660, 0),
+    ],
+)
+def test_decoder_stores_the_published_bytes(changes, more, picture):
     """0.35 MB with the latent; a picture costs its filters and itself."""
-    network = WovenNetwork(WovenOptions(one_blob=one_blob))
-    assert network.architecture()["parameters"]["decoder"] == 86_660 + filters
-    assert Woven(network).bytes_stored(TWILL) == 4 * (86_660 + filters + 64 + picture)
+    network = WovenNetwork(WovenOptions(**changes))
+    assert network.architecture()["parameters"]["decoder"] == 86_660 + more
+    assert Woven(network).bytes_stored(TWILL) == 4 * (86_660 + more + 64 + picture)
 
 
 def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size():
     """The decoder is handed u, v as shares and log2 of the size over its range: sigma = .4 of 4 yarns is .1 repeat."""
-    network = WovenNetwork(SMALL.model_copy(update={"one_blob": "none", "standard": False}))
+    network = WovenNetwork(WOVEN.model_copy(update={"one_blob": "none", "standard": False}))
     handed = []
     network.decoder.register_forward_hook(lambda module, inputs, output: handed.append(inputs))
-    Woven(network).predict(TWILL, queries([5.0], [3.0], 0.4))
+    Woven(network).predict(TWILL, Queries.round([5.0], [3.0], [0.4], [[0.6, 0.0, 0.8]], [[0.0, -0.28, 0.96]]))
     size = math.log(0.1 / 0.005) / math.log(1.0 / 0.005)
     assert handed[0][1] is None
     assert handed[0][2].flatten().tolist() == pytest.approx([0.25, 0.75, size], abs=1e-6)
@@ -48,37 +52,31 @@ def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size():
 @pytest.mark.parametrize("one_blob", ["none", "plain", "periodic", "local"])
 def test_training_sees_what_rendering_sees(one_blob):
     """The loss against the network's own predictions is 0: training and inference place queries alike."""
-    options = SMALL.model_copy(update={"one_blob": one_blob, "roll": False})
+    options = WOVEN.model_copy(update={"one_blob": one_blob, "roll": False})
     network = WovenNetwork(options, [load_fabric("denim"), TWILL])
     network.start_at(torch.full((2, 4), 2.0))  # far from 0, where outputs would be clamped
     asked = draw_queries(QueryOptions(), TWILL.weave.repeat, 1, 0, 64)
-    answers = Woven(network).predict(TWILL, asked)
-    columns = (*asked, answers, np.zeros(64, np.float32))
-    batch = Batch(torch.tensor([1]), *(torch.from_numpy(column)[None] for column in columns))
+    batch = batch_of(asked, Woven(network).predict(TWILL, asked), 1)
     assert network.loss(batch, np.random.default_rng(0)).item() < 1e-10
 
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 def test_mirror_images_are_answered_alike(symmetry):
     """Standard position makes it exact, with any weights, for a cloth without symmetries of its own."""
-    method = Woven(WovenNetwork(SMALL))
-    cloth = TWILL.model_copy(update={"draft": Matrix(rows=("##.#.", ".##.#", "#...#", ".#.##"))})
+    method = Woven(WovenNetwork(WOVEN))
+    cloth = woven("cotton_twill", ("##.#.", ".##.#", "#...#", ".#.##"))
     asked = draw_queries(QueryOptions(), cloth.weave.repeat, 1, 0, 200)
     image, there, one = image_of(symmetry, cloth, asked)
     expected = one.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
     np.testing.assert_allclose(method.predict(image, there), expected, rtol=2e-3, atol=2e-5)
 
 
-def other_yarns(fabric, name):
-    other = load_fabric(name)
-    return fabric.model_copy(update={"name": name, "warp": other.warp, "weft": other.weft})
-
-
 @pytest.mark.parametrize("standard", [False, True])
 def test_between_two_fabrics_lie_both_at_its_ends(standard):
     """A 3/1 twill has one standard position whatever its yarns are, so that the second end is the second fabric too."""
-    method = Woven(WovenNetwork(SMALL.model_copy(update={"standard": standard})))
-    second = other_yarns(TWILL, "satin_8")
+    method = Woven(WovenNetwork(WOVEN.model_copy(update={"standard": standard})))
+    satin = load_fabric("satin_8")
+    second = TWILL.model_copy(update={"name": "other", "warp": satin.warp, "weft": satin.weft})
     asked = draw_queries(QueryOptions(), TWILL.weave.repeat, 1, 0, 200)
     one, other = method.predict(TWILL, asked), method.predict(second, asked)
     assert np.abs(one - other).max() > 1e-3
@@ -86,57 +84,24 @@ def test_between_two_fabrics_lie_both_at_its_ends(standard):
     for end, share, expected in ((second, 0.0, one), (second, 1.0, other), (TWILL, 0.3, one)):
         between = method.predict_between(TWILL, end, share, asked)
         np.testing.assert_allclose(between, expected, rtol=1e-4, atol=1e-5)
-
-
-def test_fabrics_of_other_repeats_cannot_be_blended():
-    method = Woven(WovenNetwork(SMALL))
     with pytest.raises(BadInput, match="the repeat of cotton_twill is needed, 4 x 4, to blend the two"):
-        method.predict_between(TWILL, load_fabric("satin_8"), 0.5, queries([0.5], [0.5], 0.1))
+        method.predict_between(TWILL, satin, 0.5, asked)
 
 
 def test_a_colour_edit_needs_no_encoding_and_another_yarn_does():
-    network = WovenNetwork(SMALL)
-    method, runs = Woven(network), []
-    network.encoder.register_forward_hook(lambda module, inputs, output: runs.append(1))
-    method.prepare(TWILL)
-    method.prepare(TWILL.model_copy(update={"warp": TWILL.warp.model_copy(update={"diffuse": (0.1, 0.2, 0.3)})}))
-    assert len(runs) == 1
-    method.prepare(TWILL.model_copy(update={"warp": TWILL.warp.model_copy(update={"roughness": 0.31})}))
-    assert len(runs) == 2
-
-
-def test_large_footprints_see_no_place():
-    """Far above one repeat, the `local` network answers the same wherever it is asked."""
-    answers = Woven(WovenNetwork(SMALL)).predict(TWILL, queries([0.1, 1.7, 3.2], [2.2, 0.4, 3.9], 50.0))
-    np.testing.assert_allclose(answers, np.broadcast_to(answers[:1], answers.shape), rtol=1e-5)
-
-
-def test_predictions_repeat_with_the_cloth():
-    method = Woven(WovenNetwork(SMALL))
-    ends, picks = TWILL.weave.repeat
-    here = method.predict(TWILL, queries([0.25, 1.5], [0.75, 2.25], 0.3))
-    there = method.predict(TWILL, queries([0.25 + 64 * ends, 1.5 - ends], [0.75 - 32 * picks, 2.25 + picks], 0.3))
-    np.testing.assert_allclose(there, here, atol=2e-6)
-
-
-def test_predictions_are_finite_and_not_negative_at_extremes():
-    method = Woven(WovenNetwork(SMALL))
-    grazing = (np.sin(np.radians(89.9)), 0.0, np.cos(np.radians(89.9)))
-    u, v, sigma = (a.ravel() for a in np.meshgrid([0.0, 4.0, 1e6, -1e6], [0.0, -1e-30, 1e6], [1e-4, 1.0, 1e4]))
-    for wi, wo in ((grazing, grazing), ((0, 0, 1), grazing), (grazing, (0, 0, 1))):
-        prediction = method.predict(TWILL, queries(u, v, sigma, wi, wo))
-        assert prediction.shape == (len(u), 4)
-        assert prediction.dtype == np.float32
-        assert np.isfinite(prediction).all()
-        assert (prediction >= 0).all()
+    method, runs = Woven(WovenNetwork(WOVEN)), []
+    method.network_of(TWILL).encoder.register_forward_hook(lambda module, inputs, output: runs.append(1))
+    for changes, encoded in (({}, 1), ({"diffuse": (0.1, 0.2, 0.3)}, 1), ({"roughness": 0.31}, 2)):
+        method.prepare(woven("cotton_twill", warp=changes))
+        assert len(runs) == encoded
 
 
 def test_start_at_sets_the_bias_to_the_mean_in_network_space():
-    network = WovenNetwork(SMALL)
+    network = WovenNetwork(WOVEN)
     before = network.decoder.last.weight.detach().clone()
     target = torch.tensor([[0.02, 0.01, 0.1, 0.2], [0.04, 0.03, 0.1, 0.4]])
     network.start_at(target)
-    k = SMALL.log_k
+    k = WOVEN.log_k
     expected = [(math.log1p(k * 0.02) + math.log1p(k * 0.04)) / 2, (math.log1p(k * 0.01) + math.log1p(k * 0.03)) / 2]
     assert network.decoder.last.bias.tolist() == pytest.approx([*expected, 0.1, 0.3], rel=1e-5)
     assert network.decoder.last.weight.abs().max() < 0.05 * before.abs().max()
@@ -144,15 +109,14 @@ def test_start_at_sets_the_bias_to_the_mean_in_network_space():
 
 def test_transmission_sees_widths_and_answers_transparency():
     """Cloths that differ in width alone have other latents; transparency stays in [0, 1]; off, it is 0."""
-    options = SMALL.model_copy(update={"transmission": True})
+    options = WOVEN.model_copy(update={"transmission": True})
     voile = load_fabric("voile")
-    narrow = voile.model_copy(update={"warp": voile.warp.model_copy(update={"width": 0.6})})
-    network = WovenNetwork(options)
-    cloth = read_cloth([voile, narrow], options)
+    method = Woven(WovenNetwork(options))
+    cloth = read_cloth([voile, woven("voile", warp={"width": 0.6})], options)
     assert cloth.parameters.shape == (2, 7)
     assert not torch.equal(cloth.parameters[0], cloth.parameters[1])
     asked = draw_queries(QueryOptions(behind=0.5), voile.weave.repeat, 1, 0, 64)
-    share = Woven(network).transparency(voile, asked)
+    share = method.transparency(voile, asked)
     assert share.shape == (64,) and ((share >= 0) & (share <= 1)).all()
-    assert Woven(network).predict(voile, asked).shape == (64, 4)
-    assert not Woven(WovenNetwork(SMALL)).transparency(voile, asked).any()
+    assert method.predict(voile, asked).shape == (64, 4)
+    assert not Woven(WovenNetwork(WOVEN)).transparency(voile, asked).any()

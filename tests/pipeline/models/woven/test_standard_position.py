@@ -6,6 +6,7 @@ from pipeline.models.woven.standard_position import SYMMETRIES, moved, placement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.images import image_of
 from tests.presets import PRESETS, slow
 from weaves.draft import Matrix
@@ -16,16 +17,20 @@ from weaves.surface import GAP, surface_at
 @pytest.fixture
 def fabric():
     """Return a fabric without any symmetry of its own: 5 ends, 4 picks, twisted yarns that differ."""
-    shantung = load_fabric("silk_shantung")
-    twists = {"warp": (shantung.warp, 25.0), "weft": (shantung.weft, -40.0)}
-    yarns = {family: yarn.model_copy(update={"twist": twist}) for family, (yarn, twist) in twists.items()}
-    draft = Matrix(rows=("##.#.", ".##.#", "#...#", ".#.##"))
-    return shantung.model_copy(update={"draft": draft, **yarns})
+    rows = ("##.#.", ".##.#", "#...#", ".#.##")
+    return woven("silk_shantung", rows, warp={"twist": 25.0}, weft={"twist": -40.0})
 
 
 def moved_vector(vector, symmetry):
     moved = vector * np.array([-1.0 if symmetry.mirror_x else 1.0, -1.0 if symmetry.mirror_y else 1.0, 1.0])
     return moved[..., [1, 0, 2]] if symmetry.exchange else moved
+
+
+def check_moved(here, there, symmetry, atol):
+    """Compare normals and yarns at the images of points with those at the points."""
+    np.testing.assert_allclose(there.normal, moved_vector(here.normal, symmetry), atol=atol)
+    exchanged = np.where(here.yarn == GAP, GAP, 1 - here.yarn)
+    np.testing.assert_array_equal(there.yarn, exchanged if symmetry.exchange else here.yarn)
 
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
@@ -40,11 +45,9 @@ def test_the_surface_moves_with_the_cloth(fabric, symmetry):
         there_x, there_y = there_y, there_x
     here, there = surface_at(fabric, x, y), surface_at(moved(fabric, symmetry), there_x, there_y)
     np.testing.assert_allclose(there.height, here.height, atol=1e-9)
-    np.testing.assert_allclose(there.normal, moved_vector(here.normal, symmetry), atol=1e-9)
+    check_moved(here, there, symmetry, 1e-9)
     along = np.abs(np.sum(there.tangent * moved_vector(here.tangent, symmetry), axis=-1))
     np.testing.assert_allclose(along, 1.0, atol=1e-9)
-    exchanged = np.where(here.yarn == GAP, GAP, 1 - here.yarn)
-    np.testing.assert_array_equal(there.yarn, exchanged if symmetry.exchange else here.yarn)
 
 
 @pytest.mark.parametrize("symmetry", [SYMMETRIES[1], slow(SYMMETRIES[2]), SYMMETRIES[4], slow(SYMMETRIES[7])])
@@ -66,12 +69,10 @@ def test_the_truth_moves_with_the_cloth(fabric, symmetry):
     assert np.abs(there.mean - expected).mean() < 0.05 * expected.mean()
 
 
-def test_the_first_symmetry_changes_nothing(fabric):
+def test_every_image_has_the_same_standard_position(fabric):
+    """All images differ, and the first symmetry changes nothing."""
     assert moved(fabric, SYMMETRIES[0]).optics() == fabric.optics()
     assert len({tuple(moved(fabric, symmetry).weave.rows()) for symmetry in SYMMETRIES}) == 8
-
-
-def test_every_image_has_the_same_standard_position(fabric):
     for symmetry in SYMMETRIES:
         for begin in [(0, 0), (3, 1)]:
             image = moved(fabric, symmetry)
@@ -94,6 +95,4 @@ def test_standard_position_is_one_of_the_fabric(name):
     ends, picks = seen.weave.repeat
     there = surface_at(seen, there_u[0].numpy() * ends, there_v[0].numpy() * picks)
     # `start` is float32: points move by 1e-7 of a repeat, and a point within that of an edge would change sides.
-    np.testing.assert_allclose(there.normal, moved_vector(here.normal, symmetry), atol=1e-4)
-    exchanged = np.where(here.yarn == GAP, GAP, 1 - here.yarn)
-    np.testing.assert_array_equal(there.yarn, exchanged if symmetry.exchange else here.yarn)
+    check_moved(here, there, symmetry, 1e-4)
