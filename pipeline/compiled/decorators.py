@@ -2,7 +2,8 @@
 
 numba notices a changed file but not a changed file that it calls into. So a kernel's cache folder is named after the
 content of its module and of all modules of `pipeline` and `reports` that this one imports, directly or not. The name
-depends on no path: copies of the tree share one cache (`NUMBA_CACHE_DIR`). No fast-math but where a kernel says so
+depends on no path: copies of the tree share one cache (`NUMBA_CACHE_DIR`). A process that began before one of these
+files was changed shares nothing: it may have imported the file as it was. No fast-math but where a kernel says so
 (`fast_kernel`).
 
 pipeline.compiled.reproducible sees to it that neither the process nor the order of first use changes a bit. Processes
@@ -16,6 +17,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -33,6 +35,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 _HOME = Path(__file__).parent
 _ROOT = _HOME.parents[1]
+_BEGAN = time.time()  # of this process, before it imports any module with kernels
 _IMPORT = re.compile(r"^[ \t]*from[ \t]+((?:pipeline|reports)[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|.+)", re.MULTILINE)
 
 
@@ -66,7 +69,8 @@ def _cache_folder(module: str, path: Path) -> Path:
     content = hashlib.sha256(path.read_bytes())
     for source in sorted(sources - {path}):
         content.update(source.read_bytes())
-    return _CACHE / f"{module}-{content.hexdigest()[:12]}"
+    changed = any(source.stat().st_mtime > _BEGAN for source in sources)
+    return _CACHE / f"{module}-{content.hexdigest()[:12]}{f'-{os.getpid()}' if changed else ''}"
 
 
 _CACHE = _cache_home()

@@ -176,6 +176,26 @@ def test_copies_of_the_tree_and_forks_share_kernels_that_run_their_own_copies(co
     assert not list(copies[0].rglob("*.nbc"))
 
 
+def test_a_process_in_which_a_file_changes_leaves_no_kernel_of_the_old_file(copies):
+    """The caller is imported later than the file that it calls, and after the change of it."""
+    truth = copies[0] / "pipeline" / "truth"
+    head = "from pipeline.compiled.decorators import kernel\n"
+    body = "@kernel\ndef {}():\n    return {}\n"
+    (truth / "called.py").write_text(head + body.format("called", 1))
+    (truth / "caller.py").write_text(
+        f"from pipeline.truth.called import called\n{head}{body.format('caller', 'called()')}"
+    )
+    edit = """
+from pathlib import Path
+from pipeline.truth import called
+
+path = Path(called.__file__)
+path.write_text(path.read_text().replace("1", "2"))
+"""
+    use = "from pipeline.truth.caller import caller\nprint(caller())"
+    assert [answers(start(copies[0], script)) for script in (edit + use, use)] == ["1\n", "2\n"]
+
+
 ARRAYS = """
 import numpy as np
 from pipeline.compiled.decorators import allocating_kernel, kernel
