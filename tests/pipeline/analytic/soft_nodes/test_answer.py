@@ -13,7 +13,7 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE, SPECULAR
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.truth.footprint.mixture import deviations
+from pipeline.truth.footprint.mixture import deviations, footprints
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from tests.pipeline.analytic.methods import woven
@@ -26,8 +26,7 @@ COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
 
 def bare(table, queries):
     """Return the components with nothing hidden; the area of gaps has no other."""
-    columns = (queries.u, queries.v, *deviations(queries), queries.wi, queries.wo, queries.curvature)
-    found, gaps = sum_queries(table, *columns)
+    found, gaps = sum_queries(table, footprints(queries), queries.wi, queries.wo, queries.curvature)
     assert not gaps.any()
     area = found[:, :, BARE_AREA].sum(axis=1, keepdims=True)
     return np.concatenate([found[:, :, BARE_SPECULAR], found[:, :, BARE_DIFFUSE] / math.pi], axis=1) / area
