@@ -21,7 +21,7 @@ from pipeline.analytic.importance.surface import tabulate_surface
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.sequences import independent_pair
 from pipeline.truth.scattering.slab import density, sigma
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 
 LEVEL = 1e-3  # chance that a right sampler fails the chi-square test anywhere
 ROWS, COLUMNS, NODES = 16, 32, 48  # cells in polar angle and azimuth, and quadrature nodes along each side of a cell

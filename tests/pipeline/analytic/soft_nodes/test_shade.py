@@ -25,7 +25,7 @@ from pipeline.analytic.soft_nodes.shade import (
 )
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, RADIUS, WARP
 from pipeline.truth.scattering import slab
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 
 DIRECTIONS = [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5)), ((0.2, 0.5), (0.2, -0.3))]
 

@@ -63,18 +63,18 @@ def test_the_horizon_map_errs_by_its_bias_only():
 
 
 @pytest.mark.parametrize("sigma", [(0.25, 0.8), slow((0.8, 8.0))])
-def test_soft_horizons_err_less(sigma):
-    """RMSE of a grey cloth's colour at k = 10, the root mean square over four seeds and three fabrics."""
-    colour, errors = np.array([0.3, 0.3, 0.5, 0.5]), {}
-    for name in ("denim", "cotton_twill", "basket"):
-        fabric = load_fabric(name)
-        queries = draw_queries(QueryOptions(sigma=sigma), fabric.weave.repeat, 1, 0, 400)
-        truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean @ colour
-        for visibility in ("horizon", "soft_horizon"):
-            (method,) = load_methods(PointSampledOptions(counts=[10], sequence="r2", visibility=visibility))
-            found = [method.predict(fabric, queries, seed) @ colour for seed in range(4)]
-            errors.setdefault(visibility, []).append(np.mean((np.array(found) - truth) ** 2) / truth.mean() ** 2)
-    assert np.mean(errors["soft_horizon"]) < 0.95 * np.mean(errors["horizon"])
+@pytest.mark.parametrize("name", ["denim", slow("cotton_twill"), slow("basket")])
+def test_soft_horizons_err_less(name, sigma):
+    """Squared error of a grey cloth's colour at k = 10, mean over four seeds; the truth errs by a hundredth of it."""
+    fabric, colour, errors = load_fabric(name), np.array([0.3, 0.3, 0.5, 0.5]), {}
+    queries = draw_queries(QueryOptions(sigma=sigma), fabric.weave.repeat, 1, 0, 400)
+    exact = estimate(fabric, queries, TruthOptions(relative_error=0.02), 1)
+    for visibility in ("horizon", "soft_horizon"):
+        (method,) = load_methods(PointSampledOptions(counts=[10], sequence="r2", visibility=visibility))
+        found = np.array([method.predict(fabric, queries, seed) for seed in range(4)])
+        errors[visibility] = np.mean(((found - exact.mean) @ colour) ** 2)
+    assert np.mean((exact.standard_error @ colour) ** 2) < 0.01 * errors["soft_horizon"]
+    assert errors["soft_horizon"] < 0.95 * errors["horizon"]
 
 
 def test_horizons_know_one_footprint():

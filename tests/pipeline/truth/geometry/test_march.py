@@ -9,6 +9,7 @@ from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import UNDER, surface_at
 from pipeline.truth.geometry.march import first_cell, level_ray, next_cell, span_on_top, wrap
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 
 FIELD = cloth_side(load_fabric("cotton_twill"), TruthOptions()).front
@@ -41,9 +42,7 @@ def test_a_ray_enters_the_cells_in_which_its_points_lie(turn):
 
 def test_the_way_over_the_top_yarn_is_where_the_top_yarn_shows():
     """Points just inside both ends lie on the top yarn; points just outside do not."""
-    fabric = load_fabric("cotton_twill")
-    yarns = {key: getattr(fabric, key).model_copy(update={"width": 0.6}) for key in ("warp", "weft")}
-    field = cloth_side(fabric.model_copy(update=yarns), TruthOptions()).front
+    field = cloth_side(woven("cotton_twill", width=0.6), TruthOptions()).front
     random, tested = np.random.default_rng(4), 0
     for _ in range(300):
         end, pick = random.integers(0, field.top.shape[1]), random.integers(0, field.top.shape[0])
