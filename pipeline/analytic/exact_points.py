@@ -18,21 +18,19 @@ def sample_points(cloth: ClothSide, queries: Queries, count: int, seed: int, r2:
     The points are independent, or with `r2` the first of that sequence, shifted at random once a query
     [Roberts2018R2].
     """
-    return _sample(cloth, columns_of(queries), count, np.uint64(seed), r2, 0, 4)
+    return np.ascontiguousarray(_sample(cloth, columns_of(queries), count, np.uint64(seed), r2)[:, :4])
 
 
 def sample_transparency(cloth: ClothSide, looks: Queries, count: int, seed: int, r2: bool = False) -> Float32:
     """Return the share of light from straight behind that passes at the same points, (N,)."""
-    return _sample(cloth, columns_of(looks), count, np.uint64(seed), r2, 4, 5)[:, 0]
+    return _sample(cloth, columns_of(looks), count, np.uint64(seed), r2)[:, 4]
 
 
 @allocating_kernel
-def _sample(
-    cloth: ClothSide, columns: WideQueries, count: int, seed: np.uint64, r2: bool, first_sum: int, end: int
-) -> Float32:
-    """Return the ratios of the sums from `first_sum` to `end` of N queries."""
+def _sample(cloth: ClothSide, columns: WideQueries, count: int, seed: np.uint64, r2: bool) -> Float32:
+    """Return components and transparency of N queries, (N, 5)."""
     rows = len(columns.u)
-    mean = np.zeros((rows, end - first_sum), np.float32)
+    mean = np.zeros((rows, AREA_SUM), np.float32)
     sums = np.zeros((1, POINT_SUMS))
     for row in range(rows):
         key = derive(seed, row)
@@ -43,6 +41,6 @@ def _sample(
             x, y, weight = place_point(columns, row, cloth, first, second)
             add_point(cloth, x, y, weight, query, sums, 0)
         if sums[0, AREA_SUM] > 0.0:
-            for c in range(first_sum, end):
-                mean[row, c - first_sum] = sums[0, c] / sums[0, AREA_SUM]
+            for c in range(AREA_SUM):
+                mean[row, c] = sums[0, c] / sums[0, AREA_SUM]
     return mean

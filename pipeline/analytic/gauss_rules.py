@@ -21,21 +21,17 @@ class Rule(NamedTuple):
         Positions within the cell; weights that sum to the length.
     borders : float64 (n + 1,)
         Borders of the nodes' boxes, which are as long as the weights.
-    shares : float64 (n + 1,)
-        The same as shares of the variable that the rule is Gauss's in, v across a yarn: from 0 to 1.
     """
 
     places: Float64
     weights: Float64
     borders: Float64
-    shares: Float64
 
 
 @lru_cache(maxsize=256)
 def gauss_rule(low: float, high: float, count: int, radius: float) -> Rule:
     """Return the rule of `count` nodes from `low` to `high`: Gauss's, in v where x = r sin v if `radius` is not 0."""
     s, weight = np.polynomial.legendre.leggauss(count)
-    shares = np.concatenate([[0.0], np.cumsum(weight) / 2.0])
     if radius:
         first, last = (math.asin(min(max((end - 0.5) / radius, -1.0), 1.0)) for end in (low, high))
         v = 0.5 * (first + last) + 0.5 * (last - first) * s
@@ -43,7 +39,7 @@ def gauss_rule(low: float, high: float, count: int, radius: float) -> Rule:
     else:
         places, weights = 0.5 * (low + high) + 0.5 * (high - low) * s, weight
     weights = weights * ((high - low) / weights.sum())
-    return Rule(places, weights, low + np.concatenate([[0.0], np.cumsum(weights)]), shares)
+    return Rule(places, weights, low + np.concatenate([[0.0], np.cumsum(weights)]))
 
 
 def grid_edges(low: float, high: float, count: int, radius: float) -> Float64:

@@ -151,18 +151,9 @@ def bend_of(curvature: np.float32) -> Bend:
 def bend_rows(
     mean: Float32, falls: Float32, low: int, high: int, turn: np.float32, bend: Bend, found: Float32
 ) -> None:  # fmt: skip
-    """Write the horizons of fixed nodes over a curved base, (B, BLOCK_NODES).
+    """Write the horizons of fixed nodes over a base of curvature `bend` along the direction, (B, BLOCK_NODES).
 
-    Parameters
-    ----------
-    mean, falls : float32 (azimuths, B, BLOCK_NODES), (curvatures, azimuths, B, BLOCK_NODES)
-        Mean horizons over a flat base, and their falls.
-    low, high, turn
-        Azimuths around the direction, and where between them it lies.
-    bend : Bend
-        Curvature along the direction.
-    found : float32 (B, BLOCK_NODES)
-        Written.
+    `mean` (azimuths, B, BLOCK_NODES) are horizons over a flat base, `falls` (curvatures, azimuths, ...) their falls.
     """
     first, last = mean[low], mean[high]
     first_low, last_low, first_high, last_high = (

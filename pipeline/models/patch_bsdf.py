@@ -25,7 +25,7 @@ from pipeline.models.fallback import Fallback
 from pipeline.models.named import named_method
 from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.shade import coloured
-from pipeline.truth.footprint.mixture import deviations
+from pipeline.truth.footprint.mixture import footprints
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -210,11 +210,10 @@ class PatchBSDF:
 
     def _find(self, cloth: LobeSurface, looks: Queries, result: Lobes) -> None:
         """Write the mixtures of looks from one side."""
-        columns = (looks.u, looks.v, *deviations(looks, _LEAST_DEVIATION))
-        footprints = tuple(np.ascontiguousarray(column, np.float32) for column in columns)
         scratch = np.empty((POINT_ROWS, len(self._places)), np.float32)
         wo = np.ascontiguousarray(looks.wo, np.float32)
-        find_rows(cloth, footprints, wo, self._places, self._widening, scratch, result)  # type: ignore[arg-type]
+        patches = footprints(looks, _LEAST_DEVIATION)
+        find_rows(cloth, patches, wo, self._places, self._widening, scratch, result)
 
 
 def _numbers(random: npt.ArrayLike, rows: int) -> Float64:

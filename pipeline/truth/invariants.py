@@ -139,12 +139,10 @@ def point_reciprocity(fabric: Fabric) -> list[CheckResult]:
         fibre = *point.tangent[k], (fabric.warp, fabric.weft)[point.yarn[k]].roughness
         cos_i, cos_o = float(wi[k] @ point.normal[k]), float(wo[k] @ point.normal[k])
         name, slab = ("reflection", reflection) if cos_i * cos_o > 0.0 else ("transmission", transmission)
+        ways = (wi[k], wo[k], (abs(cos_i), abs(cos_o))), (wo[k], wi[k], (abs(cos_o), abs(cos_i)))
         there, back = (
             slab(density(*(i + o), *fibre), sigma(*i, *fibre), sigma(*o, *fibre), *cosines, fabric.optical_thickness)
-            for i, o, cosines in (
-                (wi[k], wo[k], (abs(cos_i), abs(cos_o))),
-                (wo[k], wi[k], (abs(cos_o), abs(cos_i))),
-            )
+            for i, o, cosines in ways
         )
         apart[name] = max(apart[name], largest(quotient(there, back) - 1.0))
     return [exact(f"reciprocity of a point, {name}", value, 0.0, 0.0) for name, value in apart.items()]
@@ -204,11 +202,10 @@ def range_of_values(fabric: Fabric) -> list[CheckResult]:
             rows += len(queries.u)
             low, high = min(low, float(answers.transparency.min())), max(high, float(answers.transparency.max()))
     note = f"in {rows} answers: alpha .01 to 1, angles to 89.9°, footprints 1e-4 to 1e4, both sides, curved or flat"
+    outside, extent = max(0.0, -low, high - 1.0), f"{low:.3g} to {high:.3g}"
     return [
         exact("values negative or not finite", odd, 0.0, 0.0, note=note),
-        exact(
-            "transparency outside [0, 1]", max(0.0, -low, high - 1.0), 0.0, ROUNDING, note=f"{low:.3g} to {high:.3g}"
-        ),
+        exact("transparency outside [0, 1]", outside, 0.0, ROUNDING, note=extent),
     ]
 
 
@@ -236,16 +233,12 @@ def energy(fabric: Fabric) -> list[CheckResult]:
             diffuse.append(mean[:, 2:].sum(axis=1))
             specular.append(mean[:, :2].sum(axis=1))
         through = answers.transparency.astype(np.float64).reshape(RANDOMISATIONS, _STEPS).mean(axis=1)
+        shares = "reflected {:.3f}, transmitted {:.3f}, straight {:.3f}"
+        once = specular[0] + specular[1] + through, shares.format(*(x.mean() for x in (*specular, through)))
         parts = (
             ("white furnace, reflected, k_d = 1", diffuse[0], ""),
             ("white furnace, transmitted, k_dt = 1", diffuse[1], ""),
-            (
-                "light scattered once and straight through, k_s = 1",
-                specular[0] + specular[1] + through,
-                "reflected {:.3f}, transmitted {:.3f}, straight {:.3f}".format(
-                    *(x.mean() for x in (*specular, through))
-                ),
-            ),
+            ("light scattered once and straight through, k_s = 1", *once),
         )
         for name, total, note in parts:
             spread = total.std(ddof=1) / math.sqrt(RANDOMISATIONS)

@@ -140,31 +140,23 @@ def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
     """Return the fault of each query that has no answer: row -> (column, value, what is allowed)."""
     found: dict[int, tuple[str, object, str]] = {}
 
-    def note(rows: Any, name: str, column: Float32, allowed: str) -> None:
+    def note(rows: Any, name: str, allowed: str) -> None:
         for row in np.flatnonzero(rows).tolist():
-            found.setdefault(row, (name, column[row].tolist(), allowed))
+            found.setdefault(row, (name, getattr(queries, name)[row].tolist(), allowed))
 
     for name, column in zip(Queries._fields, queries, strict=True):
-        note(~np.isfinite(column).all(axis=tuple(range(1, column.ndim))), name, column, "must be finite")
+        note(~np.isfinite(column).all(axis=tuple(range(1, column.ndim))), name, "must be finite")
     for name in ("sigma", "sigma_minor"):
-        note(getattr(queries, name) <= 0, name, getattr(queries, name), "must be greater than 0")
+        note(getattr(queries, name) <= 0, name, "must be greater than 0")
     for name, directions in (("wi", queries.wi), ("wo", queries.wo)):
         with np.errstate(invalid="ignore", over="ignore"):
             length = np.linalg.norm(directions.astype(np.float64), axis=-1)
-            note(np.abs(length - 1.0) > _UNIT_TOLERANCE, name, directions, "must have unit length")
-        note(directions[:, 2] == 0, name, directions, "must not lie in the fabric plane")
-    note(
-        (queries.curvature < 0) | (queries.curvature > STEEPEST_CURVATURE),
-        "curvature",
-        queries.curvature,
-        f"must be from 0 to {STEEPEST_CURVATURE:g}: no cylinder may be thinner than the yarns on it",
-    )
-    note(
-        (queries.curvature > 0) & (queries.wo[:, 2] < 0),
-        "curvature",
-        queries.curvature,
-        "must be 0 where the viewer is behind the cloth",
-    )
+            note(np.abs(length - 1.0) > _UNIT_TOLERANCE, name, "must have unit length")
+        note(directions[:, 2] == 0, name, "must not lie in the fabric plane")
+    thick = f"must be from 0 to {STEEPEST_CURVATURE:g}: no cylinder may be thinner than the yarns on it"
+    note((queries.curvature < 0) | (queries.curvature > STEEPEST_CURVATURE), "curvature", thick)
+    curved_behind = (queries.curvature > 0) & (queries.wo[:, 2] < 0)
+    note(curved_behind, "curvature", "must be 0 where the viewer is behind the cloth")
     return found
 
 

@@ -35,7 +35,7 @@ from pipeline.analytic.horizon_points.shading import BATCH, fill_points, gather,
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_fast_kernel, kernel
 from pipeline.truth.cloth import cloth_side
-from pipeline.truth.footprint.mixture import deviations
+from pipeline.truth.footprint.mixture import Footprints, footprints
 from pipeline.truth.footprint.place import EVENLY
 from pipeline.truth.footprint.sequences import derive
 from pipeline.truth.options import TruthOptions
@@ -55,8 +55,6 @@ _MIX_1, _MIX_2 = np.uint32(0x7FEB352D), np.uint32(0x846CA68B)
 _S15, _S16, _S9 = np.uint32(15), np.uint32(16), np.uint32(9)
 _UNIT = np.float32(2.0**-23)
 
-Footprints = tuple[Float32, Float32, Float32, Float32, Float32]
-
 
 def tabulate(fabric: Fabric, grid: int, azimuths: int) -> HorizonMap:
     """Return the horizon map of a fabric's front: `grid` nodes a piece of yarn and side, `azimuths` directions."""
@@ -68,10 +66,8 @@ def sample_horizons(
     table: HorizonMap, queries: Queries, count: int, r2: bool, seed: int, soft: bool = False
 ) -> Float32:
     """Return the components from `count` points a query, (N, 4); queries are flat and lit from the front."""
-    u, v, wi, wo = (
-        np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, queries.wi, queries.wo)
-    )
-    return _sample(table, (u, v, *deviations(queries)), wi, wo, count, r2, soft, np.uint64(seed))
+    wi, wo = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo))
+    return _sample(table, footprints(queries), wi, wo, count, r2, soft, np.uint64(seed))
 
 
 class _Batch(NamedTuple):
@@ -85,10 +81,10 @@ class _Batch(NamedTuple):
 
 @allocating_kernel
 def _sample(
-    table: HorizonMap, footprints: Footprints, wi: Float32, wo: Float32, count: int, r2: bool, soft: bool,
+    table: HorizonMap, patches: Footprints, wi: Float32, wo: Float32, count: int, r2: bool, soft: bool,
     seed: np.uint64,
 ) -> Float32:  # fmt: skip
-    """Answer every row; `footprints` has the columns u and v, the deviations along x and y, and their correlation."""
+    """Answer every row."""
     result, at_once = np.zeros((len(wi), 4), np.float32), max(1, BATCH // count)
     batch = _Batch(
         np.zeros((SCRATCH_ROWS, at_once * count), np.float32),
@@ -97,7 +93,7 @@ def _sample(
         np.zeros((4, at_once), np.int32),
     )
     batch.points[WEIGHT], batch.points[STEEPNESS] = _1, _STEP
-    _sample_rows(table, footprints, wi, wo, count, r2, soft, seed, batch, result)
+    _sample_rows(table, patches, wi, wo, count, r2, soft, seed, batch, result)
     return result
 
 
@@ -105,7 +101,7 @@ def _sample(
 @kernel
 def _sample_rows(
     table: HorizonMap,
-    footprints: Footprints,
+    patches: Footprints,
     wi: Float32,
     wo: Float32,
     count: int,
@@ -116,7 +112,7 @@ def _sample_rows(
     result: Float32,
 ) -> None:
     """Write the components of every row."""
-    u, v, deviation_x, deviation_y, correlation = footprints
+    u, v, deviation_x, deviation_y, correlation = patches
     points, places, values, shared = batch
     rows, at_once = len(u), values.shape[1]
     ends, picks, nodes = table.repeat[0], table.repeat[1], table.grid * table.grid

@@ -29,6 +29,7 @@ from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel, kernel
 from pipeline.compiled.float32 import arcsine
 from pipeline.compiled.normal import normal_quantile
+from pipeline.truth.footprint.mixture import Footprints
 from pipeline.truth.footprint.sequences import r2_pair
 from pipeline.truth.geometry.heightfield import (
     ALPHA,
@@ -136,31 +137,16 @@ def point_places(count: int) -> Float32:
 @kernel
 def find_rows(
     cloth: LobeSurface,
-    footprints: tuple[Float32, Float32, Float32, Float32, Float32],
+    footprints: Footprints,
     wo: Float32,
     places: Float32,
     widening: np.float32,
     points: Float32,
     result: Lobes,
 ) -> None:
-    """Write the mixtures of N looks, the viewer in front.
+    """Write the mixtures of N looks, of P + 2 lobes each, the viewer in front.
 
-    Parameters
-    ----------
-    cloth : LobeSurface
-        The cloth.
-    footprints : five of float32 (N,)
-        Centre and deviations along the axes in yarn spacings, correlation of the axes.
-    wo : float32 (N, 3)
-        Directions to the viewer.
-    places : float32 (P, 4)
-        `point_places`.
-    widening : float32
-        Factor on the widening of lobes.
-    points : float32 (POINT_ROWS, P)
-        Scratch.
-    result : Lobes
-        Written; of P + 2 lobes.
+    `places` (P, 4) are `point_places`, `widening` a factor on the widening of lobes, `points` (POINT_ROWS, P) scratch.
     """
     u, v, deviation_x, deviation_y, correlation = footprints
     ends, picks = cloth.repeat[0], cloth.repeat[1]

@@ -104,16 +104,7 @@ _SHORTEST = np.float32(1e-14)  # least squared length of a half vector
 def draw_rows(lobes: Lobes, wo: Float32, random: Float64, wi: Float32, pdf: Float32, straight: Mask) -> None:
     """Write a unit wi for each look from three numbers in [0, 1), its density, and whether it is straight through.
 
-    Parameters
-    ----------
-    lobes : Lobes
-        Mixtures of N looks.
-    wo : float32 (N, 3)
-        Directions to the viewer.
-    random : float64 (N, 3)
-        The numbers.
-    wi, pdf, straight : float32 (N, 3), float32 (N,), bool (N,)
-        Written; in place of a density, what goes straight through has the probability of this.
+    In place of a density, what goes straight through has the probability of this.
     """
     for n in range(len(wo)):
         x, y, z, through = _draw(lobes.flakes[n], lobes.rest[n], wo[n], random[n, 0], random[n, 1], random[n, 2])

@@ -30,7 +30,7 @@ from pipeline.analytic.soft_nodes.shade import NODE_SUMS
 from pipeline.analytic.soft_nodes.wide import NARROW, sum_fixed
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.footprint.mixture import deviations, narrow_axis
+from pipeline.truth.footprint.mixture import Footprints, footprints, narrow_axis
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import directions_of
 
@@ -47,21 +47,13 @@ _0, _1 = np.float32(0.0), np.float32(1.0)
 
 def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32]:
     """Return what `sum_queries` returns for N queries, the viewer in front."""
-    columns = (queries.u, queries.v, *deviations(queries, SMALLEST), queries.wi, queries.wo, queries.curvature)
-    return sum_queries(table, *(np.ascontiguousarray(column, np.float32) for column in columns))
+    columns = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo, queries.curvature))
+    return sum_queries(table, footprints(queries, SMALLEST), *columns)
 
 
 @allocating_kernel
 def sum_queries(
-    table: SoftNodeTable,
-    u: Float32,
-    v: Float32,
-    deviation_x: Float32,
-    deviation_y: Float32,
-    correlation: Float32,
-    wi: Float32,
-    wo: Float32,
-    curvature: Float32,
+    table: SoftNodeTable, patches: Footprints, wi: Float32, wo: Float32, curvature: Float32
 ) -> tuple[Float32, Float32]:
     """Return the sums of N queries, the viewer in front.
 
@@ -71,8 +63,8 @@ def sum_queries(
     ----------
     table : SoftNodeTable
         The cloth.
-    u, v, deviation_x, deviation_y, correlation : float32 (N,)
-        Footprints: centre and deviations along the axes in yarn spacings, correlation of the axes.
+    patches : Footprints
+        In yarn spacings.
     wi, wo : float32 (N, 3)
         Directions.
     curvature : float32 (N,)
@@ -84,9 +76,8 @@ def sum_queries(
         The sums of each kind of yarn (`SoftNodeTable.kinds`), five with the light behind; the area seen through gaps.
     """
     kinds = table.kinds[0] + table.kinds[1]
-    result, gaps = np.zeros((len(u), kinds, NODE_SUMS), np.float32), np.zeros(len(u), np.float32)
-    footprints = (u, v, deviation_x, deviation_y, correlation)
-    _sum_rows(table, scratch_for(table, MOST_OF_FOOTPRINT), footprints, wi, wo, curvature, result, gaps)
+    result, gaps = np.zeros((len(wi), kinds, NODE_SUMS), np.float32), np.zeros(len(wi), np.float32)
+    _sum_rows(table, scratch_for(table, MOST_OF_FOOTPRINT), patches, wi, wo, curvature, result, gaps)
     return result, gaps
 
 
@@ -95,15 +86,15 @@ def sum_queries(
 def _sum_rows(
     table: SoftNodeTable,
     scratch: Scratch,
-    footprints: tuple[Float32, Float32, Float32, Float32, Float32],
+    patches: Footprints,
     wi: Float32,
     wo: Float32,
     curvature: Float32,
     result: Float32,
     gaps: Float32,
 ) -> None:
-    """Write sums and areas of all queries; `footprints` has the columns u to correlation."""
-    u, v, deviation_x, deviation_y, correlation = footprints
+    """Write sums and areas of all queries."""
+    u, v, deviation_x, deviation_y, correlation = patches
     ends, picks = table.repeat[0], table.repeat[1]
     widest = max(table.uniform, LONG)
     for n in range(len(u)):

@@ -186,24 +186,10 @@ def place_ellipse(
     cells: npt.NDArray[np.uint32],
     stops: Index,
 ) -> np.float32:
-    """Place the nodes of an ellipse; return the area that the viewer sees through gaps.
+    """Place the nodes of an ellipse around (x, y) within the repeat; return the area seen through gaps.
 
-    Parameters
-    ----------
-    table : SoftNodeTable
-        The cloth.
-    shape : Ellipse
-        The footprint.
-    x, y : float
-        Its centre, within the repeat.
-    viewer : GridHorizons
-        Horizons towards the viewer.
-    oz : float32
-        Rise of the viewer's direction.
-    nodes, cells : float32 (K, ROWS, most), uint32 (K, most)
-        Written, by kinds of yarn.
-    stops : int64 (K,)
-        Written: number of nodes of each kind.
+    `oz` is the rise of the viewer's direction. Writes `nodes` (K, ROWS, most) and `cells` (K, most) by kinds of yarn,
+    and in `stops` (K,) how many each kind has.
     """
     ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
     of_warp, of_weft, per_grid = table.kinds[0], table.kinds[1], AZIMUTHS * size * size

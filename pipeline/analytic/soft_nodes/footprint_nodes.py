@@ -119,18 +119,9 @@ class CoveredPart(NamedTuple):
 def place_nodes(
     table: SoftNodeTable, scratch: Scratch, p: int, first: int, at: Footprint, part: CoveredPart, kind: int
 ) -> None:  # fmt: skip
-    """Place nodes of a footprint in a part of a piece of yarn, after those of its kind that are placed.
+    """Place nodes of a footprint in the part of a piece of yarn that it covers, after those of its kind.
 
-    Parameters
-    ----------
-    table, scratch : SoftNodeTable, Scratch
-        The cloth; where nodes are written.
-    p, first : int
-        The piece, and the first cell of its grid.
-    at, part : Footprint, CoveredPart
-        The footprint, and what it covers of the piece.
-    kind : int
-        Kind of the yarn.
+    `p` and `first` are the piece and the first cell of its grid.
     """
     bounds, size, line, offsets = table.bounds[p], table.grid.shape[2], scratch.line, scratch.offsets
     family = table.pieces[p, FAMILY]
@@ -264,18 +255,10 @@ def gap_area(
     bounds: Float32, first: int, size: int, viewer: GridHorizons, sharpness: np.float32, oz: np.float32,
     at: Footprint, part: CoveredPart, most: int,
 ) -> np.float32:  # fmt: skip
-    """Return the area that the viewer sees through a part of a gap.
+    """Return the area that the viewer sees through the part of a gap that a footprint covers.
 
-    Parameters
-    ----------
-    bounds, first, size
-        The piece: its bounds, the first cell of its grid, cells along each axis.
-    viewer : GridHorizons
-        Horizons towards the viewer.
-    sharpness, oz : float32
-        1 over the width of the ramp; rise of the viewer's direction.
-    at, part, most
-        The footprint, what it covers of the gap, most nodes along each axis.
+    `bounds`, `first` and `size` are the gap's bounds, the first cell of its grid and its cells along each axis;
+    `sharpness` is 1 over the width of the ramp, `oz` the rise of the viewer's direction, `most` the most nodes an axis.
     """
     inverse_x, inverse_y, count = _1 / at.dx, _1 / at.dy, np.float32(size)
     columns, rows = (

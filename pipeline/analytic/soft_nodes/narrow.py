@@ -139,10 +139,9 @@ def _shade_curved(
     low_o, high_o = _offsets(table, look.low_o, look.high_o)
     nodes, cells, thickness = scratch.nodes[kind], scratch.cells[kind, :count], np.float32(table.thickness)
     horizons, order, yarn = scratch.curved_narrow, scratch.order[:count], table.yarn[family]
-    light, viewer = bend_of(look.bend_i), bend_of(look.bend_o)
     # Lights behind are hidden by the back, which counts as flat.
-    grid = scratch.grid if look.iz > _0 else scratch.behind_grid
-    light = light if look.iz > _0 else bend_of(_0)
+    grid, bend_i = (scratch.grid, look.bend_i) if look.iz > _0 else (scratch.behind_grid, _0)
+    light, viewer = bend_of(bend_i), bend_of(look.bend_o)
     bend_cells(grid, scratch.grid_falls, cells, low_i, high_i, look.turn_i, light, horizons[:count])
     bend_cells(
         scratch.grid, scratch.grid_falls, cells, low_o, high_o, look.turn_o, viewer, horizons[count : 2 * count]
@@ -172,16 +171,7 @@ def sum_round(
 ) -> np.float32:  # fmt: skip
     """Write the sums of a footprint along the axes (K, NODE_SUMS), and return the area seen through gaps.
 
-    Parameters
-    ----------
-    table, scratch : SoftNodeTable, Scratch
-        The cloth, and memory for its queries.
-    look : SoftQuery
-        The query.
-    dx, dy : float32
-        Deviations; for a rotated footprint those of one along the axes of the same area.
-    result : float32 (K, NODE_SUMS)
-        Written.
+    `dx` and `dy` are its deviations; for a rotated footprint those of one along the axes of the same area.
     """
     parts, gaps, seen = 1, _0, _0
     # One place that calls: two made every query slower by a sixth.

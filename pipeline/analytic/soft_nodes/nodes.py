@@ -239,10 +239,10 @@ def tabulate(
         lines_per_cell=sum(group.lines * len(group.cells) for group in groups) / (ends * picks),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
         cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
-        places_x=_filled([rule.places for rule in rules_x], edge=True).ravel(),
-        weights_x=_filled([rule.weights for rule in rules_x], edge=False).ravel(),
-        places_y=_filled([rule.places for rule in rules_y], edge=True).ravel(),
-        weights_y=_filled([rule.weights for rule in rules_y], edge=False).ravel(),
+        places_x=_filled([rule.places for rule in rules_x], edge=True),
+        weights_x=_filled([rule.weights for rule in rules_x], edge=False),
+        places_y=_filled([rule.places for rule in rules_y], edge=True),
+        weights_y=_filled([rule.weights for rule in rules_y], edge=False),
         waves=waves.periods,
         wave_size=waves.size,
         wave_nodes=_together(waves.nodes),
@@ -337,10 +337,8 @@ def _bounds(piece: CellPiece) -> tuple[float, ...]:
 
 def _filled(rows: list[Float64], edge: bool) -> Float32:
     """Return rows of COLUMNS numbers, the last one repeated if `edge`, else 0."""
-    found = np.zeros((len(rows), COLUMNS), np.float32)
-    for index, row in enumerate(rows):
-        found[index] = np.pad(row, (0, COLUMNS - len(row)), mode="edge" if edge else "constant")
-    return found
+    padded = [np.pad(row, (0, COLUMNS - len(row)), mode="edge" if edge else "constant") for row in rows]
+    return np.array(padded, np.float32).ravel()
 
 
 def _float_lengths(front: HeightField) -> Float32:

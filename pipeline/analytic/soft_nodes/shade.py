@@ -193,6 +193,27 @@ def shade_node(
 
 
 @inlined_fast_kernel
+def _add_node(
+    total: Ten,
+    d: YarnDirections,
+    at: NodeFrame,
+    along: np.float32,
+    across: np.float32,
+    seen: np.float32,
+    lit: np.float32,
+    weight: np.float32,
+    layer: YarnLayer,
+) -> Ten:
+    """Return the ten sums with a node's shares added; arguments as for `shade_node`."""
+    a, c, s, a0, c0, s0, open_c, open_s = shade_node(d, at, along, across, seen, lit, weight, layer)
+    doubt = lit * (_1 - lit) + seen * (_1 - seen)
+    return (
+        total[0] + a, total[1] + c, total[2] + s, total[3] + a0, total[4] + c0, total[5] + s0,
+        total[6] + c0 * doubt, total[7] + s0 * doubt, total[8] + open_c, total[9] + open_s,
+    )  # fmt: skip
+
+
+@inlined_fast_kernel
 def _node_behind(
     d: YarnDirections,
     at: NodeFrame,
@@ -270,27 +291,14 @@ def shade_fixed(
     """Return the sums over fixed nodes of one family."""
     layer = _layer(alpha, thickness, blend)
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
-    a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
+    total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
             seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
             lit = ramp(above(d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
-            node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
-                d, at, along, across, seen, lit, weight[b, k], layer
-            )
-            doubt = lit * (_1 - lit) + seen * (_1 - seen)
-            a += node_a
-            c += node_c
-            s += node_s
-            a0 += bare_a
-            c0 += bare_c
-            s0 += bare_s
-            dc += bare_c * doubt
-            ds += bare_s * doubt
-            oc += open_c
-            os += open_s
-    return a, c, s, a0, c0, s0, dc, ds, oc, os
+            total = _add_node(total, d, at, along, across, seen, lit, weight[b, k], layer)
+    return total
 
 
 @fast_kernel
@@ -345,26 +353,13 @@ def shade_footprint(
     layer = _layer(yarn[ALPHA], thickness, yarn[BLEND])
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
-    a, c, s, a0, c0, s0, dc, ds, oc, os = _0, _0, _0, _0, _0, _0, _0, _0, _0, _0
+    total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
     for k in range(len(cells)):
         lit = ramp(_over(light, cells[k], level_i, sharp))
         seen = _seen(_over(viewer, cells[k], level_o, sharp))
         at, along, across = _footprint_node(nodes, k, radius, fibre, hx, hy, hz)
-        node_a, node_c, node_s, bare_a, bare_c, bare_s, open_c, open_s = shade_node(
-            d, at, along, across, seen, lit, nodes[WEIGHT, k], layer
-        )
-        doubt = lit * (_1 - lit) + seen * (_1 - seen)
-        a += node_a
-        c += node_c
-        s += node_s
-        a0 += bare_a
-        c0 += bare_c
-        s0 += bare_s
-        dc += bare_c * doubt
-        ds += bare_s * doubt
-        oc += open_c
-        os += open_s
-    return a, c, s, a0, c0, s0, dc, ds, oc, os
+        total = _add_node(total, d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
+    return total
 
 
 @fast_kernel

@@ -36,6 +36,7 @@ from pipeline.truth.geometry.heightfield import ALPHA, BLEND, WEFT
 NARROW: Final = 0.25
 """Deviation, in yarn spacings, below which fixed nodes are too far apart: a footprint places its own."""
 
+_REACH = np.float32(REACH)
 _0, _HALF, _1, _2 = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
 
 
@@ -45,31 +46,17 @@ def axis_densities(
     weights: Float32,
     centre: np.float32,
     deviation: np.float32,
-    reach: np.float32,
     density: Float32,
     touched: Mask,
     found: npt.NDArray[np.uint32],
 ) -> int:
     """Write the Gaussian at the nodes of all rules, times their weights, in the cells of one axis; list those touched.
 
-    Parameters
-    ----------
-    places, weights : float32 (n,)
-        Rules within a cell, one after another: a single loop for the vector units.
-    centre, deviation, reach : float32
-        The footprint, in cells; where it is cut off, in deviations.
-    density : float32 (cells, n)
-        Written, for touched cells only.
-    touched, found : bool (cells,), uint32 (cells,)
-        Written: which cells are touched, and their list.
-
-    Returns
-    -------
-    int
-        Number of touched cells.
+    `places` and `weights` (n,) are rules within a cell, one after another: a single loop for the vector units. Writes
+    `density` (cells, n), `touched` (cells,) and the list of touched cells, `found`; returns their number.
     """
     cells = len(touched)
-    reach = reach * deviation
+    reach = _REACH * deviation
     inverse = _1 / deviation
     first, last = int(np.floor(centre - reach)), int(np.floor(centre + reach))
     count = 0
@@ -197,11 +184,11 @@ def _mix_densities(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, wide
     for point in range(line_points(float(rho), COARSE_LINE, scratch.line_places, scratch.line_shares)):
         columns = axis_densities(
             table.places_x, table.weights_x, np.float32(look.x + scratch.line_places[point] * line_x), across_x,
-            np.float32(REACH), scratch.density_x, scratch.touched_x, scratch.columns,
+            scratch.density_x, scratch.touched_x, scratch.columns,
         )  # fmt: skip
         rows = axis_densities(
             table.places_y, table.weights_y, np.float32(look.y + scratch.line_places[point] * line_y), across_y,
-            np.float32(REACH), scratch.density_y, scratch.touched_y, scratch.rows,
+            scratch.density_y, scratch.touched_y, scratch.rows,
         )  # fmt: skip
         product_weights(table, scratch, columns, rows, scratch.line_shares[point])
 
@@ -223,16 +210,7 @@ def _waves_pay(table: SoftNodeTable, look: SoftQuery, widest: float) -> bool:
 def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, widest: float, result: Float32) -> np.float32:
     """Write the sums of each kind of yarn (K, NODE_SUMS), and return the area seen through gaps.
 
-    Parameters
-    ----------
-    table, scratch : SoftNodeTable, Scratch
-        The cloth, and memory for its queries.
-    look : SoftQuery
-        The query.
-    widest : float
-        Deviation from which on an axis is even.
-    result : float32 (K, NODE_SUMS)
-        Written.
+    `widest` is the deviation from which on an axis is even.
     """
     shares = scratch.weight
     if look.narrowest >= table.uniform:

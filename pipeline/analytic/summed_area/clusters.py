@@ -8,6 +8,7 @@ of a block. Blocks are split one by one, that of most variance first, so that bo
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -112,18 +113,11 @@ def blocks_of(
     count : int
         Blocks of both families, at least 2.
     """
-    first: dict[int, int] = {}
-    features: list[Float64] = []
-    weights, families = [], []
-    times: dict[int, int] = {}
-    for source in found:
-        times[source.block] = times.get(source.block, 0) + 1
-    for block, patch in patches.items():
-        piece = patch.piece
-        if piece.family == GAP:
-            continue
-        grid = len(patch.u)
-        first[block] = sum(len(part) for part in features)
+    times = Counter(source.block for source in found)
+    yarns = {block: patch for block, patch in patches.items() if patch.piece.family != GAP}
+    features, weights, families = [], [], []
+    for block, patch in yarns.items():
+        piece, grid = patch.piece, len(patch.u)
         width = np.diff(grid_edges(*piece.across, grid, piece.radius)) * (piece.along[1] - piece.along[0]) / grid
         horizons = patch.horizon.reshape(-1, grid, _QUARTERS, grid // _QUARTERS).mean(axis=3).transpose(1, 0, 2)
         horizons = horizons.reshape(grid, -1)
@@ -132,8 +126,12 @@ def blocks_of(
         weights.append((patch.surface * width).sum(axis=1) * times[block])
         families.append(np.full(grid, piece.family))
     labels, of_family = _split(np.concatenate(features), np.concatenate(weights), np.concatenate(families), count)
-    blocks = {block: labels[start : start + len(patches[block].u)] for block, start in first.items()}
-    return blocks, (0, int((of_family == WARP).sum()), len(of_family))
+    stops = np.cumsum([len(patch.u) for patch in yarns.values()])
+    return dict(zip(yarns, np.split(labels, stops[:-1]), strict=True)), (
+        0,
+        int((of_family == WARP).sum()),
+        len(of_family),
+    )
 
 
 def _split(features: Float64, weights: Float64, families: Index, count: int) -> tuple[Index, Index]:

@@ -93,20 +93,9 @@ def over_horizon(z: np.float32, low: np.float32, width: np.float32, inverse: np.
 
 
 @inlined_fast_kernel
-def _evaluate(
-    area: np.float32,
-    v: np.float32,
-    u: np.float32,
-    spread_v: np.float32,
-    spread_u: np.float32,
-    low_i: np.float32,
-    width_i: np.float32,
-    low_o: np.float32,
-    width_o: np.float32,
-    d: YarnDirections,
-    own: Optics,
-) -> Eight:
+def _evaluate(sums: Nine, d: YarnDirections, own: Optics) -> Eight:
     """Return a cluster's sums as `shade_node` does, from its sums over the texels."""
+    area, v, u, spread_v, spread_u, low_i, width_i, low_o, width_o = sums
     inverse = _1 / max(area, _TINY)
     v, u = v * inverse, u * inverse
     over_i, over_o = over_horizon(d.iz, low_i, width_i, inverse), over_horizon(d.oz, low_o, width_o, inverse)
@@ -144,11 +133,12 @@ def _cluster(
     q = corner(surface, horizon, slots[1], k, weights[1], i, o)
     r = corner(surface, horizon, slots[2], k, weights[2], i, o)
     s = corner(surface, horizon, slots[3], k, weights[3], i, o)
-    return _evaluate(
+    sums = (
         p[0] + q[0] + r[0] + s[0], p[1] + q[1] + r[1] + s[1], p[2] + q[2] + r[2] + s[2], p[3] + q[3] + r[3] + s[3],
         p[4] + q[4] + r[4] + s[4], p[5] + q[5] + r[5] + s[5], p[6] + q[6] + r[6] + s[6], p[7] + q[7] + r[7] + s[7],
-        p[8] + q[8] + r[8] + s[8], d, own,
+        p[8] + q[8] + r[8] + s[8],
     )  # fmt: skip
+    return _evaluate(sums, d, own)
 
 
 @inlined_fast_kernel

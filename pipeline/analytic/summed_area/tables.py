@@ -14,6 +14,7 @@ one lacks. Levels lie a quarter of an octave apart, so that a footprint takes th
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -85,8 +86,8 @@ class Sums:
         levels: list[Level],
     ) -> None:
         self.repeat, self.patches, self.blocks, self.count, self.levels = repeat, patches, blocks, count, levels
-        memory: dict[tuple[int, int, tuple[float, ...]], tuple[Index, Float64]] = {}
-        self._places = [(source.block, *self._shares(source, memory)) for source in found]
+        self._near = cache(self._gaussians)
+        self._places = [(source.block, *self._shares(source)) for source in found]
         self._blurs = [self._blur(number) for number in range(1, len(levels) - 1)]
 
     def of(self, values: dict[int, Float64]) -> list[Float32]:
@@ -99,23 +100,19 @@ class Sums:
             images.append(np.matmul(of_y, np.matmul(images[before], of_x.T)))
         return [*images, images[-1].mean(axis=(2, 3))]
 
-    def _shares(
-        self, source: PlacedPatch, memory: dict[tuple[int, int, tuple[float, ...]], tuple[Index, Float64]]
-    ) -> tuple[Index, Float64, Index, Float64]:
+    def _shares(self, source: PlacedPatch) -> tuple[Index, Float64, Index, Float64]:
         """Return columns and rows of texels near a piece, and the share of its nodes under their Gaussians."""
-        piece = self.patches[source.block].piece
-        grid = self.patches[source.block].u.shape[0]
-        result: list[Index | Float64] = []
-        for axis, cell in ((0, source.end), (1, source.pick)):
-            edges = grid_edges(*piece.box[axis], grid, piece.radii[axis])
-            key = (axis, cell, (edges[0], edges[1], edges[-1]))
-            if key not in memory:
-                memory[key] = self._gaussians(edges + cell, self.repeat[1 - axis])
-            result += memory[key]
-        return tuple(result)  # type: ignore[return-value]
+        patch = self.patches[source.block]
+        of_x, of_y = (
+            self._near(tuple(cell + grid_edges(*extent, len(patch.u), radius)), size)
+            for cell, extent, radius, size in zip(
+                (source.end, source.pick), patch.piece.box, patch.piece.radii, self.repeat[::-1], strict=True
+            )
+        )
+        return *of_x, *of_y
 
-    def _gaussians(self, edges: Float64, size: int) -> tuple[Index, Float64]:
-        level = self.levels[0]
+    def _gaussians(self, borders: tuple[float, ...], size: int) -> tuple[Index, Float64]:
+        level, edges = self.levels[0], np.array(borders)
         centres = (np.arange(size * level.texels) + 0.5) / level.texels
         images = math.ceil(_REACH * level.stored / size) + 1
         share = np.zeros((len(centres), len(edges) - 1))

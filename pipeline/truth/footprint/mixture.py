@@ -79,6 +79,17 @@ def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Float32,
     return x, y, correlation
 
 
+Footprints = tuple[Float32, Float32, Float32, Float32, Float32]
+"""Centres in x and y, deviations along them, and their correlations, float32 (N,) each."""
+
+
+def footprints(queries: Queries, least: np.float32 = _NOTHING) -> Footprints:
+    """Return the footprints of N queries for kernels; see `deviations`."""
+    columns = (queries.u, queries.v, *deviations(queries, least))
+    u, v, x, y, correlation = (np.ascontiguousarray(column, np.float32) for column in columns)
+    return u, v, x, y, correlation
+
+
 @allocating_kernel
 def axes(major: Float64, minor: Float64, angle: Float64) -> Float64:
     """Return `along_axes` of N footprints, (3, N)."""

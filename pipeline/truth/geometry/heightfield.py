@@ -36,9 +36,9 @@ class HeightField(NamedTuple):
     ----------
     top : (picks, ends)
         Family on top: WARP or WEFT.
-    floats : (picks, ends, 2, 5)
+    floats : (picks, ends, 2, 4)
         For the yarn on top and the one beneath: cell centre minus float centre along the yarn, bend radius R, half
-        length L/2, R cos(u_max), and the factor of its specular colour.
+        length L/2, R cos(u_max).
     crown : (picks, ends)
         Greatest height that any surface of the cell reaches.
     highest, lowest : float
@@ -62,21 +62,11 @@ def height_field(fabric: Fabric) -> HeightField:
     """Tabulate a fabric for the kernels."""
     table = cells(fabric.weave)
     families = (fabric.warp, fabric.weft)
-    yarn = np.array(
-        [
-            (
-                0.5 * y.width,
-                2.0 / y.width,
-                math.sin(math.radians(y.twist)),
-                math.cos(math.radians(y.twist)),
-                y.roughness,
-                y.relief,
-                y.blend,
-                math.radians(y.bend),
-            )
-            for y in families
-        ]
-    )
+    yarn = np.zeros((2, 8))
+    for row, y in zip(yarn, families, strict=True):
+        row[[RADIUS, INVERSE_RADIUS, ALPHA, BETA, BLEND]] = 0.5 * y.width, 2.0 / y.width, y.roughness, y.relief, y.blend
+        twist, row[BEND] = math.radians(y.twist), math.radians(y.bend)
+        row[[SIN_TWIST, COS_TWIST]] = math.sin(twist), math.cos(twist)
     floats = np.zeros((*table.top.shape, 2, 4))
     crown = np.zeros(table.top.shape)
     for pick, end in np.ndindex(*table.top.shape):
@@ -85,12 +75,11 @@ def height_field(fabric: Fabric) -> HeightField:
             (UNDER, table.under_offset[pick, end], table.under_length[pick, end]),
         ):
             family = int(table.top[pick, end]) if side == TOP else 1 - int(table.top[pick, end])
-            row = _float_row(float(offset), float(length), families[family].width, families[family].bend)
-            floats[pick, end, side] = row
+            own = _float_row(float(offset), float(length), families[family].width, families[family].bend)
+            floats[pick, end, side] = own
             if side == TOP or families[1 - family].width < 1.0:
-                crown[pick, end] = max(
-                    float(crown[pick, end]), families[family].relief * _rise(side, row, yarn[family, RADIUS])
-                )
+                rise = families[family].relief * _rise(side, own, yarn[family, RADIUS])
+                crown[pick, end] = max(float(crown[pick, end]), rise)
     sag = floats[..., BEND_RADIUS] - floats[..., AXIS_DROP]
     lowest = -float(max(y.relief for y in families) * sag.max())
     return HeightField(

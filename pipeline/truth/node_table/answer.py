@@ -67,18 +67,14 @@ class Requested(NamedTuple):
     ----------
     relative, absolute : float
         Requested standard error: relative to the norm of the four components, and 1/sr.
-    table, refined : Factors
-        Calibration of answers by the table alone, and of refined ones.
-    table_behind, refined_behind : Factors
-        The same for light from behind.
+    front, behind : (Factors, Factors)
+        Calibration of answers by the table alone and of refined ones, for light from either side.
     """
 
     relative: float
     absolute: float
-    table: Factors
-    refined: Factors
-    table_behind: Factors
-    refined_behind: Factors
+    front: tuple[Factors, Factors]
+    behind: tuple[Factors, Factors]
 
 
 class _Room(NamedTuple):
@@ -164,9 +160,7 @@ def _answer_row(
     if conceal(share, share_error, mean, error):
         return
     target = max(requested.relative**2 * squared_norm(mean), requested.absolute**2)
-    plain, refined = requested.table, requested.refined
-    if columns.wi[row, 2] < 0.0:
-        plain, refined = requested.table_behind, requested.refined_behind
+    plain, refined = requested.behind if columns.wi[row, 2] < 0.0 else requested.front
     if _squared_error(mean, error, plain) <= target:
         return
     answers.stage[row] = REFINED
@@ -229,12 +223,8 @@ def sum_pieces(
     moved[:] = 0.0
     for p in range(len(table.pieces)):
         piece = table.pieces[p]
-        start, across, count, family = (
-            piece[FIRST_NODE],
-            piece[NODES_X],
-            piece[NODES_X] * piece[NODES_Y],
-            piece[PIECE_FAMILY],
-        )
+        start, across, family = piece[FIRST_NODE], piece[NODES_X], piece[PIECE_FAMILY]
+        count = across * piece[NODES_Y]
         stop = start + count
         if not any_weight(shares.weight[start:stop]):
             continue

@@ -93,7 +93,7 @@ class NodeTable:
         `index` and `seed` name the random numbers of refined nodes.
         """
         table = self.table(cloth, bool((columns.wi[:, 2] < 0.0).any()))
-        factors = (sides[stage] for sides in (FRONT_FACTORS, BEHIND_FACTORS) for stage in (self._stage, REFINED))
+        factors = ((side[self._stage], side[REFINED]) for side in (FRONT_FACTORS, BEHIND_FACTORS))
         requested = Requested(relative_error, absolute_error, *factors)
         answers = sum_rows(cloth, table, columns, index, requested, np.uint64(seed), self._line)
         return answers._replace(stage=np.where(answers.stage == REFINED, REFINED, self._stage))

@@ -69,10 +69,11 @@ def integrate_rows(
     picks, ends = cloth.front.top.shape
     everything = rectangles(cloth.front, np.ones((picks, ends), np.bool_))
     kinds, share = rectangles(cloth.front, different), picks * ends / different.sum()
-    x_pieces, y_pieces = np.zeros((32, 3)), np.zeros((32, 3))
+    across, along = np.zeros((32, 3)), np.zeros((32, 3))
     grid, states = np.zeros((64, 64, POINT_SUMS)), np.zeros((64, 64), np.int64)
     for row in range(rows):
         directions = query_directions(columns, row)
+        cosine = directions.viewer.z if cloth.choices.shadows else 0.0
         sigma_x, sigma_y = columns.sigma[row], columns.sigma_minor[row]
         if sigma_x != sigma_y and abs(math.cos(columns.angle[row])) < 0.5:
             sigma_x, sigma_y = sigma_y, sigma_x
@@ -80,7 +81,7 @@ def integrate_rows(
         y_axis = Axis(cloth.shape, columns.v[row], sigma_y, float(picks))
         even = cloth.shape == GAUSSIAN and sigma_x >= _EVEN * ends and sigma_y >= _EVEN * picks
         pieces = kinds if even else everything
-        parts = _all_parts(pieces, cloth.front.yarn, x_axis, y_axis, x_pieces, y_pieces)
+        parts = _all_parts(pieces, cloth.front.yarn, x_axis, y_axis, across, along)
         if even:
             parts[:, BOX_WEIGHT] *= share
             parts[:, MASS] *= share
@@ -108,15 +109,7 @@ def integrate_rows(
                     counts[row] += costs[p]
                     refined = True
             worst, size = _estimate_errors(
-                directions.viewer.z if cloth.choices.shadows else 0.0,
-                parts,
-                levels,
-                sums,
-                changes,
-                earlier,
-                means[row],
-                errors[row],
-                badness,
+                cosine, parts, levels, sums, changes, earlier, means[row], errors[row], badness
             )
             if size == 0.0:
                 # So many points without light: a share of 1 / count may have been missed.
@@ -133,18 +126,16 @@ def integrate_rows(
 
 
 @allocating_kernel
-def _all_parts(
-    pieces: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, x_pieces: Float64, y_pieces: Float64
-) -> Float64:
+def _all_parts(pieces: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, across: Float64, along: Float64) -> Float64:
     """Return the parts of all rectangles that the footprint reaches, (n, PART)."""
     nothing = np.zeros((0, PART))
     total = 0
     for p in range(len(pieces)):
-        total += cut_parts(pieces[p], yarn, x_axis, y_axis, x_pieces, y_pieces, nothing)
+        total += cut_parts(pieces[p], yarn, x_axis, y_axis, across, along, nothing)
     parts = np.zeros((total, PART))
     total = 0
     for p in range(len(pieces)):
-        total += cut_parts(pieces[p], yarn, x_axis, y_axis, x_pieces, y_pieces, parts[total:])
+        total += cut_parts(pieces[p], yarn, x_axis, y_axis, across, along, parts[total:])
     return parts
 
 

@@ -165,18 +165,16 @@ def _cut(axis: Axis, low: float, high: float, pieces: Float64) -> int:
 
 @kernel
 def cut_parts(
-    rectangle: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, x_pieces: Float64, y_pieces: Float64, parts: Float64
+    rectangle: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, across: Float64, along: Float64, parts: Float64
 ) -> int:
-    """Write the parts of a rectangle that the footprint reaches if `parts` has rows; return their number."""
-    across_x = rectangle[4] != WEFT
-    if across_x:
-        columns = _cut(x_axis, rectangle[0], rectangle[1], x_pieces)
-        rows = _cut(y_axis, rectangle[2], rectangle[3], y_pieces) if columns > 0 else 0
-        low, high, across, along = rectangle[0], rectangle[1], x_pieces, y_pieces
-    else:
-        columns = _cut(y_axis, rectangle[2], rectangle[3], x_pieces)
-        rows = _cut(x_axis, rectangle[0], rectangle[1], y_pieces) if columns > 0 else 0
-        low, high, across, along = rectangle[2], rectangle[3], x_pieces, y_pieces
+    """Write the parts of a rectangle that the footprint reaches if `parts` has rows; return their number.
+
+    `across` and `along` are scratch: what is cut along each axis of the yarn.
+    """
+    first, second, at = (y_axis, x_axis, 2) if rectangle[4] == WEFT else (x_axis, y_axis, 0)
+    low, high = rectangle[at], rectangle[at + 1]
+    columns = _cut(first, low, high, across)
+    rows = _cut(second, rectangle[2 - at], rectangle[3 - at], along) if columns > 0 else 0
     if len(parts) > 0:
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         for k in range(columns):

@@ -12,6 +12,7 @@ estimator (monte_carlo), placed in the repeat of weave and colours together.
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -85,19 +86,18 @@ def component_colours(
     rows = len(queries.u)
     found = ComponentColours(np.zeros((rows, 4, 3)), np.zeros((rows, 3)))
     behind, through = queries.wo[:, 2] < 0, queries.wi[:, 2] * queries.wo[:, 2] < 0
-    for side in (False, True):
-        for transmitted in (False, True):
-            index = np.flatnonzero((behind == side) & (through == transmitted))
-            if not index.size:
-                continue
-            threads = threads_of(fabric, transmitted)
-            if fabric.colours is None:
-                found.mean[index] = np.stack([threads.warp[0], threads.weft[0]], axis=1).reshape(4, 3)
-                continue
-            cloth, columns = cloth_side(fabric, options, side), columns_of(queries.take(index), side)
-            found.mean[index], found.standard_error[index] = _sample_colours(
-                cloth, columns, start + index, threads, options.limits, np.uint64(seed)
-            )
+    for side, transmitted in product((False, True), repeat=2):
+        index = np.flatnonzero((behind == side) & (through == transmitted))
+        if not index.size:
+            continue
+        threads = threads_of(fabric, transmitted)
+        if fabric.colours is None:
+            found.mean[index] = np.stack([threads.warp[0], threads.weft[0]], axis=1).reshape(4, 3)
+            continue
+        cloth, columns = cloth_side(fabric, options, side), columns_of(queries.take(index), side)
+        found.mean[index], found.standard_error[index] = _sample_colours(
+            cloth, columns, start + index, threads, options.limits, np.uint64(seed)
+        )
     return found
 
 

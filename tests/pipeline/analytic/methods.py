@@ -1,4 +1,4 @@
-"""All methods that learn nothing, as functions of a cloth and queries, and the cloths on which they are compared."""
+"""All methods that learn nothing, as functions of a cloth and queries."""
 
 from functools import lru_cache
 
@@ -11,15 +11,6 @@ from pipeline.analytic.soft_nodes import features, nodes
 from pipeline.analytic.summed_area import answer, tables
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
-from weaves.draft import Matrix
-from weaves.fabric import load_fabric
-
-
-def woven(name, rows=None, warp=(), weft=(), **changes):
-    """Return a preset with another draft and with other numbers of its yarns, `changes` of both families."""
-    fabric, own = load_fabric(name), {"warp": dict(warp), "weft": dict(weft)}
-    yarns = {family: getattr(fabric, family).model_copy(update=changes | own[family]) for family in own}
-    return fabric.model_copy(update=yarns | ({"draft": Matrix(rows=tuple(rows))} if rows else {}))
 
 
 @lru_cache(maxsize=64)
@@ -30,9 +21,15 @@ def soft_table(fabric, level=2, behind=False):
         return nodes.tabulate(fabric, level=level, behind=behind)
 
 
-_clusters, _horizons, _maps = (
-    lru_cache(maxsize=32)(module.tabulate) for module in (tables, sampler, prefiltered)
-)  # fmt: skip
+@lru_cache(maxsize=32)
+def _clusters(fabric, clusters):
+    """Return tables whose finest level is that of a cloth of many different cells: a quarter of the texels."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tables, "_finest", lambda cells: 8)
+        return tables.tabulate(fabric, clusters)
+
+
+_horizons, _maps = (lru_cache(maxsize=32)(module.tabulate) for module in (sampler, prefiltered))
 
 
 def soft_nodes(fabric, queries, level=2):

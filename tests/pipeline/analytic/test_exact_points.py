@@ -1,34 +1,22 @@
 """Point sampling with exact shadows: it converges to the truth, and stays finite at the extremes."""
 
-import math
+import itertools
 
 import numpy as np
-import pytest
 
 from pipeline.analytic.exact_points import sample_points, sample_transparency
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import direction, equal_queries, woven
 from weaves.fabric import load_fabric
 
 EXACT = TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-5, min_count=1 << 20, max_count=1 << 20)
 
 
-def _queries(wi, wo, sigma, rows=1, centre=(0.3, 0.7)):
-    """Return equal queries about directions of (polar angle, azimuth) in degrees."""
-    ones = np.ones(rows, np.float32)
-    directions = []
-    for theta, phi in (np.radians(wi), np.radians(wo)):
-        w = (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
-        directions.append(np.tile(np.float32(w), (rows, 1)))
-    return Queries.round(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
-
-
 def test_points_converge_to_the_truth():
     fabric = load_fabric("basket")
-    queries = _queries((30, 0), (45, 120), sigma=0.7)
+    queries = equal_queries(direction(30, 0), direction(45, 120), 0.7)
     exact = estimate(fabric, queries, EXACT, 1)
     np.testing.assert_allclose(
         sample_points(cloth_side(fabric, TruthOptions()), queries, 400_000, 1), exact.mean, rtol=0.03
@@ -37,7 +25,7 @@ def test_points_converge_to_the_truth():
 
 def test_transparency_converges_to_the_truth_and_changes_with_the_seed():
     fabric = load_fabric("gauze")
-    looks = _queries((45, 120), (45, 120), sigma=0.7)
+    looks = equal_queries(direction(45, 120), direction(45, 120), 0.7)
     exact = estimate(fabric, looks, EXACT, 1).transparency
     cloth = cloth_side(fabric, TruthOptions())
     assert 0.05 < exact[0] < 0.95
@@ -45,13 +33,11 @@ def test_transparency_converges_to_the_truth_and_changes_with_the_seed():
     assert sample_transparency(cloth, looks, 4, 1) != sample_transparency(cloth, looks, 4, 2)
 
 
-@pytest.mark.parametrize("sigma", [1e-4, 1e4])
-@pytest.mark.parametrize("theta", [0.0, 89.9])
-@pytest.mark.parametrize("roughness", [0.01, 1.0])
-def test_extremes_stay_finite_and_not_negative(sigma, theta, roughness):
-    cloth = cloth_side(woven("silk_charmeuse", roughness=roughness), TruthOptions())
-    for other in (0.0, 89.9):
-        queries = _queries((theta, 13), (other, 200), sigma, rows=4, centre=(1e6 + 0.3, -1e6))
-        values = sample_points(cloth, queries, 1, 0)
-        assert np.isfinite(values).all()
-        assert (values >= 0).all()
+def test_extremes_stay_finite_and_not_negative():
+    for sigma, theta, roughness in itertools.product((1e-4, 1e4), (0.0, 89.9), (0.01, 1.0)):
+        cloth = cloth_side(woven("silk_charmeuse", roughness=roughness), TruthOptions())
+        for other in (0.0, 89.9):
+            queries = equal_queries(direction(theta, 13), direction(other, 200), sigma, 4, (1e6 + 0.3, -1e6))
+            values = sample_points(cloth, queries, 1, 0)
+            assert np.isfinite(values).all()
+            assert (values >= 0).all()

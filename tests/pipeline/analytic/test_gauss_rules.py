@@ -17,9 +17,6 @@ def test_rules_integrate_and_their_boxes_tile(low, high, radius):
     assert found.weights.sum() == pytest.approx(high - low)
     assert (found.weights * (found.places - 0.5) ** 2).sum() == pytest.approx(exact, rel=1e-6)
     assert found.borders[0] == low and found.borders[-1] == pytest.approx(high)
-    assert found.shares[0] == 0.0 and found.shares[-1] == pytest.approx(1.0)
-    shares = np.arcsin((found.places - 0.5) / radius) / np.pi + 0.5 if radius else (found.places - low) / (high - low)
-    assert ((shares > found.shares[:-1]) & (shares < found.shares[1:])).all()
     assert ((found.places > found.borders[:-1]) & (found.places < found.borders[1:])).all()
 
 
@@ -74,7 +71,7 @@ def test_rules_converge_faster_than_any_power(radius):
 @pytest.mark.parametrize("radius", [0.0, 0.5])
 def test_a_mirrored_extent_has_the_mirrored_rule(radius):
     own, other = gauss_rule(0.1, 0.7, 5, radius), gauss_rule(0.3, 0.9, 5, radius)
-    for values, mirrored in ((own.places, other.places), (own.borders, other.borders), (own.shares, other.shares)):
+    for values, mirrored in ((own.places, other.places), (own.borders, other.borders)):
         np.testing.assert_allclose(1.0 - values[::-1], mirrored, atol=1e-14)
     np.testing.assert_allclose(own.weights[::-1], other.weights, atol=1e-14)
 

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.analytic.prefiltered import CHANNELS, LEAN, NONE, TOKSVIG, answer, tabulate
 from pipeline.truth.query import Queries
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 
 PER_YARN = 16

@@ -101,16 +101,16 @@ def test_no_azimuth_is_an_azimuth_too():
     assert 0 <= low < AZIMUTHS and 0.0 <= turn <= 1.0
 
 
-@pytest.mark.parametrize("curvature", [0.0, 0.01, 0.05, 0.1, 0.25, 0.7, 1.0])
-def test_a_fall_of_the_largest_share_is_a_line_in_the_curvature(curvature):
+def test_a_fall_of_the_largest_share_is_a_line_in_the_curvature():
     """With shares of 1 the sine falls by FALL times the curvature, between tabulated curvatures too."""
-    bend = bend_of(np.float32(curvature))
-    assert 0 <= bend.low <= bend.high < len(CURVATURES)
-    assert bend.of_low + bend.of_high == pytest.approx(FALL * curvature, rel=1e-6)
-    if curvature in CURVATURES:
-        assert max(bend.of_low, bend.of_high) == pytest.approx(FALL * curvature, rel=1e-6)
-        own = bend.high if bend.of_high > 0 else bend.low
-        assert CURVATURES[own] == curvature
+    for curvature in (0.0, 0.01, 0.05, 0.1, 0.25, 0.7, 1.0):
+        bend = bend_of(np.float32(curvature))
+        assert 0 <= bend.low <= bend.high < len(CURVATURES)
+        assert bend.of_low + bend.of_high == pytest.approx(FALL * curvature, rel=1e-6)
+        if curvature in CURVATURES:
+            assert max(bend.of_low, bend.of_high) == pytest.approx(FALL * curvature, rel=1e-6)
+            own = bend.high if bend.of_high > 0 else bend.low
+            assert CURVATURES[own] == curvature
 
 
 def test_fixed_and_placed_nodes_have_the_same_horizon_over_curved_cloth():

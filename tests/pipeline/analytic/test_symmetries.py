@@ -12,47 +12,15 @@ from tests.pipeline.analytic.methods import (
     soft_nodes,
     soft_nodes_behind,
     summed_area,
-    woven,
 )
-from weaves.draft import Draft
+from tests.pipeline.truth.cloths import LOPSIDED, OVER, exchanged_axes, redrawn, reversed_axes, woven
 
 MEAN, WORST = 2e-4, 0.05
 """Of the largest answer: a node on the border of two cells of a grid may read either, which moves few answers."""
 
-LOPSIDED = woven("denim", ("#.#", "##.", ".##"), {"width": 0.8, "twist": 20.0}, {"bend": 35.0, "relief": 1.2})
-"""Without symmetries of its own: yarns unlike, with gaps."""
-
-ENDS, PICKS = LOPSIDED.weave.repeat
-
 
 def asked(**options):
-    return draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0, **options), (ENDS, PICKS), 3, 0, 120)
-
-
-def redrawn(over, swap=False, mirrored=False):
-    """Return the cloth with another draft, its families exchanged if `swap`, its twists reversed if `mirrored`."""
-    sign = -1.0 if mirrored else 1.0
-    warp, weft = (yarn.model_copy(update={"twist": sign * yarn.twist}) for yarn in (LOPSIDED.warp, LOPSIDED.weft))
-    rows = tuple(Draft(over).rows())
-    yarns = {"warp": weft, "weft": warp} if swap else {"warp": warp, "weft": weft}
-    return LOPSIDED.model_copy(update=yarns | {"draft": LOPSIDED.draft.model_copy(update={"rows": rows})})
-
-
-def turn(queries, x, y):
-    """Return queries with x, y or both reversed."""
-    signs = np.float32([x, y, 1.0])
-    u = queries.u if x > 0 else ENDS - queries.u
-    v = queries.v if y > 0 else PICKS - queries.v
-    return queries._replace(u=u, v=v, wi=queries.wi * signs, wo=queries.wo * signs, angle=x * y * queries.angle)
-
-
-def exchange(queries):
-    """Return queries with x and y exchanged."""
-    order = [1, 0, 2]
-    return queries._replace(
-        u=queries.v, v=queries.u, wi=queries.wi[:, order], wo=queries.wo[:, order],
-        angle=np.float32(np.pi / 2) - queries.angle,
-    )  # fmt: skip
+    return draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0, **options), LOPSIDED.weave.repeat, 3, 0, 120)
 
 
 def assert_equal(one, other, worst=WORST):
@@ -61,7 +29,6 @@ def assert_equal(one, other, worst=WORST):
     assert difference.mean() < MEAN
 
 
-OVER = LOPSIDED.weave.warp_over
 QUERIES = asked(stretch=4.0)
 
 
@@ -69,16 +36,17 @@ QUERIES = asked(stretch=4.0)
 def test_a_cloth_turned_by_half_a_turn_and_a_mirrored_one(method):
     """A mirror reverses the sense of the twists, half a turn does not."""
     own = method(LOPSIDED, QUERIES)
-    assert_equal(own, method(redrawn(OVER[::-1, ::-1]), turn(QUERIES, -1, -1)))
-    assert_equal(own, method(redrawn(OVER[:, ::-1], mirrored=True), turn(QUERIES, -1, 1)))
+    assert_equal(own, method(redrawn(OVER[::-1, ::-1]), reversed_axes(QUERIES, -1, -1)))
+    mirrored = reversed_axes(QUERIES, -1, 1)
+    assert_equal(own, method(redrawn(OVER[:, ::-1], mirrored=True), mirrored))
     # The twist is seen: without reversal the mirrored cloth answers otherwise.
-    assert np.abs(own - method(redrawn(OVER[:, ::-1]), turn(QUERIES, -1, 1))).max() > 0.01 * own.max()
+    assert np.abs(own - method(redrawn(OVER[:, ::-1]), mirrored)).max() > 0.01 * own.max()
 
 
 @pytest.mark.parametrize("method", PLACED)
 def test_warp_and_weft_change_places(method):
     """The transposed draft, yarns exchanged: a mirror in the diagonal."""
-    there = method(redrawn(~OVER.T, swap=True, mirrored=True), exchange(QUERIES))
+    there = method(redrawn(~OVER.T, swap=True, mirrored=True), exchanged_axes(QUERIES))
     order = [1, 0, 3, 2, *range(4, there.shape[1])]
     assert_equal(method(LOPSIDED, QUERIES), there[:, order])
 
@@ -93,6 +61,26 @@ def test_a_repeat_may_begin_anywhere_and_be_drawn_twice(method):
     assert_equal(own, method(redrawn(rolled), moved))
     # Twice the repeat: the longest period is the same, waves and means over all cells are not others.
     assert_equal(own, method(redrawn(np.tile(OVER, (1, 2))), queries))
+
+
+@pytest.mark.parametrize("method", [*ALL, soft_nodes_behind])
+def test_translation_by_repeats_changes_nothing(method):
+    """Places are reduced in double precision; what is random or sampled depends on the place in the repeat alone."""
+    queries = asked(stretch=4.0)
+    near = queries._replace(u=np.round(queries.u * 64) / 64, v=np.round(queries.v * 64) / 64)
+    ends, picks = np.float32(LOPSIDED.weave.repeat)
+    far = near._replace(u=near.u + np.float32(1024) * ends, v=near.v - np.float32(2048) * picks)
+    own = method(LOPSIDED, near)
+    np.testing.assert_allclose(method(LOPSIDED, far), own, rtol=1e-4, atol=1e-5 * own.max())
+    assert np.abs(own - method(LOPSIDED, near._replace(u=near.u + np.float32(1)))).max() > 0.05 * own.max()
+
+
+@pytest.mark.parametrize("method", PLACED)
+def test_a_footprint_far_larger_than_the_repeat_has_no_place(method):
+    queries = asked().take(slice(0, 1)).take(np.zeros(5, np.int64))._replace(sigma=np.full(5, 50.0, np.float32))
+    queries = queries._replace(sigma_minor=queries.sigma, u=np.linspace(0, 3, 5, dtype=np.float32))
+    found = method(LOPSIDED, queries)
+    np.testing.assert_allclose(found, found[:1].repeat(5, axis=0), rtol=1e-5)
 
 
 @pytest.mark.parametrize("method", [soft_nodes, soft_nodes_behind, summed_area, horizon_points])
@@ -136,8 +124,5 @@ def test_all_components_change_by_one_factor_if_light_and_viewer_do(method):
 def test_the_back_of_a_plain_weave_turned_over_is_its_front(method):
     """Turned about y, each float beneath lies on top; light from behind meets the same horizons on its way."""
     plain = woven("voile", twist=25.0)
-    ends, _ = plain.weave.repeat
     queries = draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0), plain.weave.repeat, 5, 0, 120)
-    signs = np.float32([-1.0, 1.0, 1.0])
-    over = queries._replace(u=ends - queries.u, wi=queries.wi * signs, wo=queries.wo * signs)
-    assert_equal(method(plain, queries), method(plain.back(), over))
+    assert_equal(method(plain, queries), method(plain.back(), reversed_axes(queries, -1, 1, plain.weave.repeat)))

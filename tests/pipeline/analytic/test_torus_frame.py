@@ -20,7 +20,7 @@ from pipeline.truth.geometry.heightfield import (
     surface_at,
 )
 from pipeline.truth.scattering import slab
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 
 
 @pytest.fixture(scope="module")

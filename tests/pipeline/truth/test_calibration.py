@@ -1,5 +1,7 @@
 """The calibration itself; reports/truth/calibration.py compares its errors with true ones."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -11,18 +13,17 @@ from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
 
-@pytest.mark.parametrize("stage", list(FRONT_FACTORS))
-@pytest.mark.parametrize("behind", [False, True])
-def test_errors_are_factors_of_the_reported_ones(stage, behind):
-    mean, reported = np.array([[0.3, 0.0, 0.4, 0.0, 0.2]]), np.array([[0.01, 0.0, 0.02, 0.03, 0.04]])
-    error, bound = calibrate(Raw(mean, reported, np.array([64]), np.array([stage])), np.array([behind]))
-    own = (BEHIND_FACTORS if behind else FRONT_FACTORS)[stage]
-    for factors, columns, size in ((own, slice(4), 0.5), (TRANSPARENCY_FACTORS[stage], slice(4, 5), 1.0)):
-        scaled = factors.reported * reported[:, columns]
-        limited = scaled / (1.0 + scaled / (factors.largest * size))
-        expected = np.sqrt(limited**2 + (factors.missed * size) ** 2)
-        np.testing.assert_allclose(error[:, columns], expected, rtol=1e-12)
-        np.testing.assert_allclose(bound[:, columns], factors.cover * expected, rtol=1e-12)
+def test_errors_are_factors_of_the_reported_ones():
+    for stage, behind in itertools.product(FRONT_FACTORS, (False, True)):
+        mean, reported = np.array([[0.3, 0.0, 0.4, 0.0, 0.2]]), np.array([[0.01, 0.0, 0.02, 0.03, 0.04]])
+        error, bound = calibrate(Raw(mean, reported, np.array([64]), np.array([stage])), np.array([behind]))
+        own = (BEHIND_FACTORS if behind else FRONT_FACTORS)[stage]
+        for factors, columns, size in ((own, slice(4), 0.5), (TRANSPARENCY_FACTORS[stage], slice(4, 5), 1.0)):
+            scaled = factors.reported * reported[:, columns]
+            limited = scaled / (1.0 + scaled / (factors.largest * size))
+            expected = np.sqrt(limited**2 + (factors.missed * size) ** 2)
+            np.testing.assert_allclose(error[:, columns], expected, rtol=1e-12)
+            np.testing.assert_allclose(bound[:, columns], factors.cover * expected, rtol=1e-12)
 
 
 def test_a_hidden_patch_has_no_error():

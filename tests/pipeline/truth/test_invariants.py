@@ -9,6 +9,7 @@ from scipy import stats
 from pipeline.truth import invariants
 from pipeline.truth.estimator import estimate
 from pipeline.truth.invariants import SIGNIFICANCE, exact, quotient, worst
+from tests.pipeline.truth.cloths import woven
 from tests.presets import PRESETS
 from weaves.fabric import load_fabric
 
@@ -37,8 +38,7 @@ def test_a_preset_keeps_the_invariants_at_few_points(brief, test):
 
 @pytest.mark.slow
 def test_narrow_yarns_let_light_through_and_keep_the_invariants(brief):
-    yarns = {name: getattr(FABRIC, name).model_copy(update={"width": 0.5}) for name in ("warp", "weft")}
-    fabric = FABRIC.model_copy(update=yarns)
+    fabric = woven("polyester_lining", width=0.5)
     assert not [name for test in invariants.INVARIANTS for name in broken(test, fabric)]
 
 

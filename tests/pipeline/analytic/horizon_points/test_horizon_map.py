@@ -8,7 +8,8 @@ from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes.nodes import LEVELS
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.analytic.methods import soft_table, woven
+from tests.pipeline.analytic.methods import soft_table
+from tests.pipeline.truth.cloths import woven
 
 
 def tangent_sine(v, x, beta):

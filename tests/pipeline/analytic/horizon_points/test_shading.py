@@ -21,7 +21,7 @@ from pipeline.analytic.horizon_points.horizon_map import (
 )
 from pipeline.analytic.horizon_points.shading import fill_points, query_rows, shade, uncover
 from pipeline.truth.geometry.heightfield import height_field
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 
 COUNT = 1500
 

@@ -26,32 +26,52 @@ from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.slab import density, sigma
+from tests.pipeline.truth.cloths import LOPSIDED, OVER, redrawn, reversed_axes
 from weaves.fabric import load_fabric
 
 COUNT = 400
 
 
-def points_of(name):
-    """Return a fabric, its front, and queries about points, directions over the sphere, viewers in front."""
-    fabric, rng = load_fabric(name), np.random.default_rng(4)
-    front = cloth_side(fabric, TruthOptions()).front
-    picks, ends = front.top.shape
+def points_of(fabric):
+    """Return queries about points of a fabric, directions over the sphere, viewers in front."""
+    rng, (ends, picks) = np.random.default_rng(4), fabric.weave.repeat
     wi, wo = rng.standard_normal((2, COUNT, 3))
     wo[:, 2] = np.abs(wo[:, 2]) + 0.3
     u, v, tiny = rng.random(COUNT) * ends, rng.random(COUNT) * picks, np.full(COUNT, 1e-3)
     units = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
-    return fabric, front, Queries.round(u, v, tiny, *units)
+    return Queries.round(u, v, tiny, *units)
 
 
-@pytest.mark.parametrize("name", ["denim", "silk_charmeuse", "voile"])
-def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
-    """Tangents to 1e-3, gaps and densities; points within a deviation of an edge may lie beyond it."""
-    fabric, front, queries = points_of(name)
+def lobes_of(fabric, queries):
+    """Return the lobes of points, and the densities of their wi."""
     lobes = Lobes(np.empty((COUNT, FLAKE_ROWS, 3), np.float32), np.empty((COUNT, STRAIGHT + 1), np.float32))
     footprints = (queries.u, queries.v, queries.sigma, queries.sigma, np.zeros_like(queries.sigma))
     scratch, pdf = np.empty((POINT_ROWS, 1), np.float32), np.empty(COUNT, np.float32)
     find_rows(tabulate_surface(fabric), footprints, queries.wo, point_places(1), np.float32(2.0), scratch, lobes)
     density_rows(lobes, queries.wi, queries.wo, pdf)
+    return lobes, pdf
+
+
+@pytest.mark.parametrize(("x", "y"), [(-1, -1), (-1, 1), (1, -1)])
+def test_a_cloth_turned_or_mirrored_has_its_lobes_turned_or_mirrored(x, y):
+    """A mirror reverses the twists. Points within a deviation of an edge, or of a cell of a grid, may lie beyond it."""
+    queries = points_of(LOPSIDED)
+    own, there = (
+        lobes_of(cloth, asked)[1].astype(np.float64)
+        for cloth, asked in (
+            (LOPSIDED, queries), (redrawn(OVER[::y, ::x], mirrored=x * y < 0), reversed_axes(queries, x, y))
+        )
+    )  # fmt: skip
+    assert np.quantile(np.abs(there / own - 1.0), 0.95) < 1e-2
+    assert np.quantile(np.abs(lobes_of(LOPSIDED, reversed_axes(queries, x, y))[1] / own - 1.0), 0.5) > 0.05
+
+
+@pytest.mark.parametrize("name", ["denim", "silk_charmeuse", "voile"])
+def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
+    """Tangents to 1e-3, gaps and densities; points within a deviation of an edge may lie beyond it."""
+    fabric = load_fabric(name)
+    front, queries = cloth_side(fabric, TruthOptions()).front, points_of(fabric)
+    lobes, pdf = lobes_of(fabric, queries)
     right, seen_alike, checked = 0, 0, 0
     for n in range(COUNT):
         x, y, wo = float(queries.u[n]), float(queries.v[n]), queries.wo[n].astype(float)

@@ -13,10 +13,10 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE, SPECULAR
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.truth.footprint.mixture import deviations
+from pipeline.truth.footprint.mixture import deviations, footprints
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 from tests.presets import slow
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
@@ -26,8 +26,7 @@ COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
 
 def bare(table, queries):
     """Return the components with nothing hidden; the area of gaps has no other."""
-    columns = (queries.u, queries.v, *deviations(queries), queries.wi, queries.wo, queries.curvature)
-    found, gaps = sum_queries(table, *columns)
+    found, gaps = sum_queries(table, footprints(queries), queries.wi, queries.wo, queries.curvature)
     assert not gaps.any()
     area = found[:, :, BARE_AREA].sum(axis=1, keepdims=True)
     return np.concatenate([found[:, :, BARE_SPECULAR], found[:, :, BARE_DIFFUSE] / math.pi], axis=1) / area
@@ -130,15 +129,6 @@ def test_footprints_at_an_angle(name, bound):
     wrong = relative_error(read_queries(table, queries)[1], truth)
     assert wrong < bound
     assert relative_error(read_queries(table, rounded)[1], truth) > 1.5 * wrong
-
-
-def test_translation_by_repeats_changes_nothing():
-    fabric = load_fabric("denim")
-    table = tabulate(fabric)
-    queries = draw_queries(QueryOptions(sigma=(0.06, 2.0)), fabric.weave.repeat, 4, 0, 100)
-    queries = queries._replace(u=np.round(queries.u * 64) / 64, v=np.round(queries.v * 64) / 64)
-    far = queries._replace(u=queries.u + np.float32(4096), v=queries.v - np.float32(4096))
-    np.testing.assert_array_equal(read_queries(table, far)[0], read_queries(table, queries)[0])
 
 
 @pytest.mark.parametrize("width", [1.0, slow(0.7), slow(0.1)])

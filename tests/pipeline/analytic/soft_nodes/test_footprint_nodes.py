@@ -9,7 +9,8 @@ from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, CURVE, FAMILY, SHIFT
 from pipeline.analytic.soft_nodes.scratch import scratch_for
 from pipeline.analytic.soft_nodes.shade import ALONG, COS, HALF_ALONG, SIN, WEIGHT, GridHorizons
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, WARP, WEFT
-from tests.pipeline.analytic.methods import soft_table, woven
+from tests.pipeline.analytic.methods import soft_table
+from tests.pipeline.truth.cloths import woven
 
 TABLE = soft_table(woven("denim", ("##.", ".##", "#.#"), width=0.8))
 OPEN = GridHorizons(TABLE.grid.ravel() * np.uint8(0), np.uint32(0), np.uint32(0), np.float32(0.0))

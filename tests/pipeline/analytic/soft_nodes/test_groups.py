@@ -9,7 +9,7 @@ from pipeline.analytic.gauss_rules import gauss_rule
 from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL, gather, piece_rows
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, height_field, surface_at
 from pipeline.truth.geometry.pieces import cell_pieces
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 

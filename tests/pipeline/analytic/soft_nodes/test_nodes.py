@@ -3,7 +3,7 @@ import pytest
 
 from pipeline.analytic.soft_nodes.nodes import AZIMUTHS, BLOCK_NODES, LEVELS, tabulate
 from pipeline.compiled.arrays import nbytes
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 
 

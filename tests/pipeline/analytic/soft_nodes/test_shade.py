@@ -25,7 +25,7 @@ from pipeline.analytic.soft_nodes.shade import (
 )
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, RADIUS, WARP
 from pipeline.truth.scattering import slab
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 
 DIRECTIONS = [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5)), ((0.2, 0.5), (0.2, -0.3))]
 
@@ -56,8 +56,8 @@ def table(fabric):
 def test_fixed_nodes(table, pair):
     """Area, diffuse and specular with nothing hidden, from the normals and tangents that the table holds."""
     wi, wo = (unit(*w) for w in pair)
-    rows = [np.array([x], np.float32) for x in (0.3, 0.7, 1e3, 1e3, 0.0)]
-    found, _ = sum_queries(table, *rows, wi[None], wo[None], np.zeros(1, np.float32))
+    wide = tuple(np.array([x], np.float32) for x in (0.3, 0.7, 1e3, 1e3, 0.0))
+    found, _ = sum_queries(table, wide, wi[None], wo[None], np.zeros(1, np.float32))
     for family in (0, 1):
         blocks = slice(table.starts[family], table.starts[family + 1])
         nodes = table.nodes[blocks].transpose(1, 0, 2).reshape(13, -1).astype(np.float64)

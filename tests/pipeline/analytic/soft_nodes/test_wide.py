@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.footprint_nodes import REACH
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.scratch import SoftQuery, scratch_for
 from pipeline.analytic.soft_nodes.wide import axis_densities, product_weights, wave_weights, waves_kept
@@ -25,7 +24,7 @@ def by_products(table, x, y, deviation_x, deviation_y, correlation=0.0):
     of_y = table.places_y, table.weights_y, scratch.density_y, scratch.touched_y, scratch.rows
     for place, share in zip(places, shares, strict=True):
         columns, rows = (
-            axis_densities(*rules, np.float32(centre), np.float32(deviation), np.float32(REACH), *written)
+            axis_densities(*rules, np.float32(centre), np.float32(deviation), *written)
             for (*rules, density, touched, found), centre, deviation in (
                 (of_x, x + place * shift_x, deviation_x),
                 (of_y, y + place * shift_y, deviation_y),

@@ -10,7 +10,6 @@ from pipeline.analytic.summed_area.tables import tabulate
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
 COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
@@ -37,13 +36,6 @@ def asked(sigma):
 NARROW, MIDDLE, WIDE = (0.1, 0.4), (0.25, 0.8), (0.8, 8.0)
 
 
-@pytest.mark.parametrize(("sigma", "bound"), [(MIDDLE, 0.05), (WIDE, 0.035)])
-def test_errors_are_a_few_per_cent(denim, sigma, bound):
-    """RMSE of the colour over its mean, twice that of random cloths (reports/LOG.md)."""
-    queries, truth = asked(sigma)
-    assert rmse(answer(denim[1], queries), truth) < bound
-
-
 def test_more_clusters_err_less(denim):
     fabric, tables = denim
     queries, truth = asked(WIDE)
@@ -60,17 +52,6 @@ def test_narrow_footprints_converge_with_the_texels_of_the_finest_level(monkeypa
     assert -np.polyfit(np.log(texels), np.log(errors), 1)[0] > 1.0, errors
 
 
-def test_the_repeat_repeats(denim):
-    """Places are reduced in double precision: far away the answer is the same."""
-    fabric, tables = denim
-    ends, picks = fabric.weave.repeat
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 4, 0, 200)
-    whole = np.floor(64.0 * queries.u) / 64.0, np.floor(64.0 * queries.v) / 64.0
-    near = queries._replace(u=whole[0].astype(np.float32), v=whole[1].astype(np.float32))
-    far = near._replace(u=near.u + np.float32(1024 * ends), v=near.v - np.float32(512 * picks))
-    np.testing.assert_allclose(answer(tables, far), answer(tables, near), rtol=1e-5, atol=1e-7)
-
-
 def test_footprints_of_any_size_have_finite_answers(denim):
     fabric, tables = denim
     queries = draw_queries(QueryOptions(max_angle=89.9), fabric.weave.repeat, 5, 0, 400)
@@ -78,14 +59,6 @@ def test_footprints_of_any_size_have_finite_answers(denim):
         sizes = np.full(len(queries.u), size, np.float32)
         found = answer(tables, queries._replace(sigma=sizes, sigma_minor=sizes))
         assert np.isfinite(found).all() and (found >= 0.0).all() and found.any()
-
-
-def test_a_footprint_far_larger_than_the_repeat_has_no_place(denim):
-    _, tables = denim
-    up, none = np.tile([[0.6, 0.0, 0.8]], (5, 1)), np.zeros(5)
-    queries = Queries.round(np.linspace(0, 3, 5), np.linspace(0, 3, 5), none + 50.0, up, up)
-    found = answer(tables, queries)
-    np.testing.assert_array_equal(found, found[:1].repeat(5, axis=0))
 
 
 def test_round_ones_stand_for_a_long_footprint():

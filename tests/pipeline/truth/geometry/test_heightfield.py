@@ -5,22 +5,17 @@ import pytest
 
 from pipeline.truth.geometry.heightfield import TOP, UNDER, height_field, surface_at
 from pipeline.truth.geometry.march import Cell, height_along, level_ray
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 from weaves.surface import GAP
 from weaves.surface import surface_at as oracle
 
-
-def _with(fabric, **changes):
-    yarns = {name: getattr(fabric, name).model_copy(update=changes) for name in ("warp", "weft")}
-    return fabric.model_copy(update=yarns)
-
-
 FABRICS = {
     "denim": load_fabric("denim"),
-    "narrow charmeuse": _with(load_fabric("silk_charmeuse"), width=0.7, twist=20.0),
-    "flattened basket": _with(load_fabric("basket"), relief=0.4, twist=-40.0, width=0.9),
-    "straight": _with(load_fabric("polyester_lining"), bend=0.0),
-    "steep narrow": _with(load_fabric("polyester_lining"), bend=70.0, width=0.8),
+    "narrow charmeuse": woven("silk_charmeuse", width=0.7, twist=20.0),
+    "flattened basket": woven("basket", relief=0.4, twist=-40.0, width=0.9),
+    "straight": woven("polyester_lining", bend=0.0),
+    "steep narrow": woven("polyester_lining", bend=70.0, width=0.8),
 }
 
 

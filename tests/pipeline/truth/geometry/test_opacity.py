@@ -11,20 +11,14 @@ from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.opacity import grazing_cosine, hits, opacity
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from weaves.draft import Matrix
+from tests.pipeline.truth.cloths import woven
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.surface import GAP, surface_at
 
 STEP = 0.0025
-CORDUROY = load_fabric("denim").model_copy(update={"draft": Matrix(rows=("#",))})
+CORDUROY = woven("denim", ("#",))
 """Warps alone: straight half cylinders of radius 1/2 side by side, for closed forms."""
-
-
-def _both(fabric, **changes):
-    return fabric.model_copy(
-        update={family: getattr(fabric, family).model_copy(update=changes) for family in ("warp", "weft")}
-    )
 
 
 def _wo(cosines, azimuth=0.0):
@@ -120,7 +114,7 @@ def test_closed_forms_along_half_cylinders():
 
 def test_relief_scales_heights():
     """A relief beta makes depths beta times smaller; beta = .01 is all but the smooth cylinder, met at any cosine."""
-    flat = _both(CORDUROY, relief=0.01)
+    flat = woven("denim", ("#",), relief=0.01)
     q = math.sqrt(2 * 0.1 * 0.01 * (0.5 - math.sqrt(0.25 - 0.09)))
     np.testing.assert_allclose(grazing_cosine(flat, 0.2, 0.0, math.pi / 2, 0.1), q / math.sqrt(1 + q * q), rtol=1e-6)
     assert opacity(flat, _queries(_wo([0.04, 0.3]), 0.1), TruthOptions(), 0)[0].tolist() == [1.0, 1.0]
@@ -172,7 +166,7 @@ def test_limits_known_without_sampling():
 
 
 def test_a_gap_is_open_from_above():
-    fabric = _both(load_fabric("denim"), width=0.8)
+    fabric = woven("denim", width=0.8)
     mean, error = opacity(fabric, _queries(_wo([1.0]), 0.3), TruthOptions(relative_error=1e-3), 1)
     assert abs(mean[0] - 0.96) < 4 * error[0]
 
@@ -187,7 +181,7 @@ def test_gaps_let_rays_through(width, curvature, depth):
     it comes up again, and some rays do so through another gap or the same one. Both take yarns for solid from their
     surface to the plane. Strips beside a narrow yarn are searched at points: .6 % of the rays may differ.
     """
-    fabric = _both(load_fabric("denim"), width=width)
+    fabric = woven("denim", width=width)
     model = cloth_side(fabric, TruthOptions())
     highest, lowest = model.front.highest, -model.back.highest
     slope = math.sqrt(2 * curvature * (highest + depth)) if curvature else depth

@@ -9,20 +9,13 @@ from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import height_field, surface_at
 from pipeline.truth.geometry.pieces import cell_pieces, different_cells, first_cells, longest_period, orbits
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
-
-
-def narrow(name, warp, weft):
-    fabric = load_fabric(name)
-    widths = (("warp", warp), ("weft", weft))
-    return fabric.model_copy(
-        update={key: getattr(fabric, key).model_copy(update={"width": width}) for key, width in widths}
-    )
 
 
 @pytest.mark.parametrize(("warp", "weft"), [(1.0, 1.0), (0.7, 1.0), (1.0, 0.6), (0.8, 0.3)])
 def test_every_point_of_a_cell_lies_in_one_piece(warp, weft):
-    field = height_field(narrow("cotton_twill", warp, weft))
+    field = height_field(woven("cotton_twill", None, {"width": warp}, {"width": weft}))
     x, y = np.random.default_rng(1).random((2, 300))
     for pick, end in ((0, 0), (1, 0), (2, 3)):
         inside = np.zeros(300, int)
@@ -34,7 +27,7 @@ def test_every_point_of_a_cell_lies_in_one_piece(warp, weft):
 
 @pytest.mark.parametrize(("warp", "weft"), [(1.0, 0.6), (0.8, 0.3)])
 def test_a_piece_shows_the_yarn_that_is_seen_there(warp, weft):
-    field = height_field(narrow("cotton_twill", warp, weft))
+    field = height_field(woven("cotton_twill", None, {"width": warp}, {"width": weft}))
     for pick, end in ((0, 0), (1, 0), (2, 3)):
         for piece in cell_pieces(field, pick, end):
             x, y = (0.3 * low + 0.7 * high for low, high in piece.box)

@@ -8,6 +8,7 @@ import pytest
 from pipeline.truth.geometry.heightfield import height_field, surface_at
 from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.visibility import visible
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 from weaves.surface import GAP
 from weaves.surface import surface_at as oracle
@@ -33,10 +34,7 @@ def _marched(fabric, x, y, z, w):
 @pytest.mark.parametrize(("name", "width"), [("denim", 1.0), ("silk_charmeuse", 1.0), ("basket", 0.8)])
 @pytest.mark.parametrize("degrees", [25.0, 55.0, 75.0])
 def test_visibility_matches_a_march(name, width, degrees):
-    fabric = load_fabric(name)
-    fabric = fabric.model_copy(
-        update={family: getattr(fabric, family).model_copy(update={"width": width}) for family in ("warp", "weft")}
-    )
+    fabric = woven(name, width=width)
     field = height_field(fabric)
     ends, picks = fabric.weave.repeat
     generator = np.random.default_rng(int(degrees))

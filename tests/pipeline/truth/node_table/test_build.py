@@ -17,7 +17,7 @@ from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.node_table.build import PIECE_FAMILY, tabulate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
+from tests.pipeline.truth.cloths import woven
 from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -25,12 +25,6 @@ from weaves.fabric import load_fabric
 CONVERGED = TruthOptions(
     estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=1 << 15, max_count=1 << 15
 )
-
-
-def _narrow(name, width):
-    fabric = load_fabric(name)
-    yarns = {key: getattr(fabric, key).model_copy(update={"width": width}) for key in ("warp", "weft")}
-    return fabric.model_copy(update=yarns)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +41,7 @@ def test_translations_leave_one_cell_of_each_orbit(name, cells):
 
 
 def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
-    model = cloth_side(_narrow("polyester_lining", 0.7), TruthOptions())
+    model = cloth_side(woven("polyester_lining", width=0.7), TruthOptions())
     table = tabulate(model.front, model.back, False, nodes=16, azimuths=4)
     areas = dict.fromkeys(range(3), 0.0)
     for number, piece in enumerate(table.pieces):
@@ -83,8 +77,8 @@ def test_horizons_part_what_is_visible_from_what_is_not(name):
         (load_fabric("polyester_lining"), False),
         (load_fabric("denim"), True),
         (load_fabric("satin_8"), False),
-        (_narrow("cotton_twill", 0.8), False),
-        (_narrow("polyester_lining", 0.8), True),
+        (woven("cotton_twill", width=0.8), False),
+        (woven("polyester_lining", width=0.8), True),
     ],
     ids=["plain", "twill_behind", "satin", "narrow_twill", "narrow_plain_behind"],
 )
@@ -107,15 +101,6 @@ def test_answers_match_converged_ones(fabric, behind, footprint):
     assert np.median(np.abs(answers.transparency - exact.transparency)) < 1e-3
 
 
-def test_rows_do_not_depend_on_each_other():
-    fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 60)
-    whole = estimate(fabric, queries, TruthOptions(), 7)
-    part = estimate(fabric, queries.take(slice(20, 40)), TruthOptions(), 7, start=20)
-    np.testing.assert_array_equal(part.mean, whole.mean[20:40])
-    np.testing.assert_array_equal(part.standard_error, whole.standard_error[20:40])
-
-
 def test_the_table_says_what_it_does_not_know():
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 4)
@@ -123,17 +108,6 @@ def test_the_table_says_what_it_does_not_know():
     with pytest.raises(BadInput, match=r"node_table \(row 2\).*take auto"):
         estimate(fabric, curved, TruthOptions(estimator="node_table"), 0)
     assert np.isfinite(estimate(fabric, curved, TruthOptions(), 0).mean).all()
-
-
-def test_a_viewer_behind_sees_the_back():
-    fabric = load_fabric("denim")
-    front = draw_queries(QueryOptions(sigma=(0.5, 4.0)), fabric.weave.repeat, 8, 0, 30)
-    flip = np.float32([1, 1, -1])
-    behind = Queries.round(front.u, front.v, front.sigma, front.wi * flip, front.wo * flip)
-    options = TruthOptions(estimator="node_table")
-    np.testing.assert_allclose(
-        estimate(fabric, behind, options, 0).mean, estimate(fabric.back(), front, options, 0).mean, rtol=1e-5, atol=1e-7
-    )
 
 
 FENCED = """

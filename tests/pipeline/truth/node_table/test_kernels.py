@@ -20,7 +20,7 @@ from pipeline.truth.node_table.kernels import (
     weigh,
 )
 from pipeline.truth.scattering import slab
-from weaves.fabric import load_fabric
+from tests.pipeline.truth.cloths import woven
 
 WI = [(0.3, -0.4), (-0.7, 0.3), (0.05, 0.02)]
 WO = [(0.1, 0.6), (-0.6, 0.5), (-0.1, 0.3)]
@@ -48,10 +48,7 @@ def layer(field, family):
 
 @pytest.fixture(scope="module")
 def cloth():
-    fabric = load_fabric("denim")
-    changes = {"relief": 1.2, "twist": 30.0}
-    yarns = {key: getattr(fabric, key).model_copy(update=changes) for key in ("warp", "weft")}
-    field = height_field(fabric.model_copy(update={**yarns, "optical_thickness": 0.4}))
+    field = height_field(woven("denim", relief=1.2, twist=30.0).model_copy(update={"optical_thickness": 0.4}))
     return field, tabulate(field, field, True, 32, 128)
 
 

@@ -9,34 +9,15 @@ from scipy import stats
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
-from pipeline.truth.footprint.place import BOX_SIDE
 from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows, quadrature_rows
 from pipeline.truth.quadrature.rules import rectangles
-from pipeline.truth.query import Queries
+from tests.pipeline.truth.cloths import direction, equal_queries, woven
 from weaves.fabric import load_fabric
 
 CUT, NEVER = 2, 9  # level from which on lines are cut; the second is never reached
 FINE = TruthOptions(estimator="quadrature", relative_error=3e-4, absolute_error=0.0, max_count=1 << 15)
-
-
-def _direction(theta, phi):
-    theta, phi = math.radians(theta), math.radians(phi)
-    return (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
-
-
-def _queries(wi, wo, sigma=2.0, rows=1, centre=(0.3, 0.7)):
-    ones = np.ones(rows, np.float32)
-    directions = (np.tile(np.asarray(w, np.float32), (rows, 1)) for w in (wi, wo))
-    return Queries.round(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
-
-
-def _both(name, **changes):
-    fabric = load_fabric(name)
-    return fabric.model_copy(
-        update={family: getattr(fabric, family).model_copy(update=changes) for family in ("warp", "weft")}
-    )
 
 
 def _answer(fabric, queries, options):
@@ -48,7 +29,7 @@ def _answer(fabric, queries, options):
 @pytest.mark.parametrize("name", ["polyester_lining", "satin_8", "herringbone", "silk_shantung", "basket"])
 @pytest.mark.parametrize("width", [1.0, 0.7])
 def test_the_rectangles_cover_the_repeat_once(name, width):
-    fabric = _both(name, width=width)
+    fabric = woven(name, width=width)
     model = cloth_side(fabric, TruthOptions())
     ends, picks = fabric.weave.repeat
     found = rectangles(model.front, np.ones((picks, ends), np.bool_))
@@ -65,11 +46,11 @@ def test_the_rectangles_cover_the_repeat_once(name, width):
 
 def _specular_errors(roughness, split):
     """Return rms errors of the specular part with 4, 8, 16 nodes an axis; plain weave, one repeat, no shadows."""
-    fabric = _both("polyester_lining", roughness=roughness)
+    fabric = woven("polyester_lining", roughness=roughness)
     pairs = [((30, 30), (30, 210)), ((40, 10), (35, 100)), ((20, 70), (45, 300)), ((10, 0), (25, 160))]
     model = cloth_side(fabric, TruthOptions(shadows=False))
-    wi, wo = (np.array([_direction(*pair[k]) for pair in pairs], np.float32) for k in (0, 1))
-    columns = columns_of(_queries((0, 0, 1), (0, 0, 1), rows=4)._replace(wi=wi, wo=wo))
+    wi, wo = (np.array([direction(*pair[k]) for pair in pairs], np.float32) for k in (0, 1))
+    columns = columns_of(equal_queries((0, 0, 1), (0, 0, 1), rows=4)._replace(wi=wi, wo=wo))
     limits = Limits(1e-15, 0.0, 32, 1 << 30)
     different = first_cells(model.front)
     exact = integrate_rows(model, columns, different, limits, CUT, 4, 5)[0][:, :2]
@@ -95,19 +76,19 @@ def test_convergence_is_spectral_without_shadows(roughness, bounds):
 
 
 def _cases():
-    aslant = _direction(50, 30), _direction(40, 140)
+    aslant = direction(50, 30), direction(40, 140)
     behind = (*aslant[0][:2], -aslant[0][2])
-    yield "plain", "polyester_lining", {}, {}, _queries(*aslant, sigma=0.6)
-    yield "twill", "cotton_twill", {}, {}, _queries(*aslant, sigma=0.2)
-    yield "satin", "silk_charmeuse", {}, {}, _queries(*aslant, sigma=8.0)
-    yield "gaps", "cotton_twill", {"width": 0.6}, {}, _queries(*aslant, sigma=0.5)
-    yield "transmission", "polyester_lining", {"width": 0.8}, {}, _queries(behind, aslant[1], sigma=0.7)
-    yield "from behind", "cotton_twill", {}, {}, _queries(aslant[0], (*aslant[1][:2], -aslant[1][2]), sigma=0.7)
-    curved = _queries(_direction(70, 20), _direction(60, 190), sigma=0.8)
+    yield "plain", "polyester_lining", {}, {}, equal_queries(*aslant, sigma=0.6)
+    yield "twill", "cotton_twill", {}, {}, equal_queries(*aslant, sigma=0.2)
+    yield "satin", "silk_charmeuse", {}, {}, equal_queries(*aslant, sigma=8.0)
+    yield "gaps", "cotton_twill", {"width": 0.6}, {}, equal_queries(*aslant, sigma=0.5)
+    yield "transmission", "polyester_lining", {"width": 0.8}, {}, equal_queries(behind, aslant[1], sigma=0.7)
+    yield "from behind", "cotton_twill", {}, {}, equal_queries(aslant[0], (*aslant[1][:2], -aslant[1][2]), sigma=0.7)
+    curved = equal_queries(direction(70, 20), direction(60, 190), sigma=0.8)
     yield "curved", "wool_gabardine", {}, {}, curved._replace(curvature=np.full(1, 0.3, np.float32))
-    yield "box", "polyester_lining", {}, {"footprint": "box"}, _queries(*aslant, sigma=0.4)
-    yield "wide box", "polyester_lining", {}, {"footprint": "box"}, _queries(*aslant, sigma=0.9)
-    thin = _queries(*aslant, sigma=1.1)._replace(sigma_minor=np.full(1, 0.15, np.float32))
+    yield "box", "polyester_lining", {}, {"footprint": "box"}, equal_queries(*aslant, sigma=0.4)
+    yield "wide box", "polyester_lining", {}, {"footprint": "box"}, equal_queries(*aslant, sigma=0.9)
+    thin = equal_queries(*aslant, sigma=1.1)._replace(sigma_minor=np.full(1, 0.15, np.float32))
     yield "along", "cotton_twill", {}, {}, thin
     yield "across", "cotton_twill", {}, {}, thin._replace(angle=np.full(1, math.pi / 2, np.float32))
     yield "aslant", "cotton_twill", {}, {}, thin._replace(angle=np.full(1, 0.5, np.float32))
@@ -117,7 +98,7 @@ def _cases():
 def test_it_agrees_with_sampled_estimates(case):
     """Against 2^17 points; Student's t with 15 degrees of freedom at a level of 1e-4, next to the bound stated."""
     _, name, changes, options, queries = case
-    fabric = _both(name, **changes)
+    fabric = woven(name, **changes)
     own = estimate(fabric, queries, FINE.model_copy(update=options), 1)
     sampling = {"estimator": "owen", "relative_error": 1e-9, "absolute_error": 0.0, **options}
     many = TruthOptions(**sampling, min_count=1 << 17, max_count=1 << 17)
@@ -148,7 +129,7 @@ def test_cutting_lines_at_shadow_edges_pays():
 def _coverage(rows):
     covered, total = 0, 0
     for name, changes in (("polyester_lining", {}), ("satin_8", {}), ("cotton_twill", {"width": 0.7})):
-        fabric = _both(name, **changes)
+        fabric = woven(name, **changes)
         queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, 17, 0, rows)
         model = cloth_side(fabric, TruthOptions())
         limits = Limits(1e-12, 0.0, 32, 1 << 30)
@@ -169,58 +150,17 @@ def test_stated_bounds_cover_the_true_error():
 
 
 @pytest.mark.slow
-def test_stated_bounds_cover_the_true_error_of_many_queries():
+def test_stated_bounds_cover_the_true_error_of_manyequal_queries():
     assert _coverage(100) >= 0.95
-
-
-def test_it_is_deterministic_and_knows_no_seed():
-    fabric = load_fabric("basket")
-    queries = draw_queries(QueryOptions(sigma=(0.05, 2.0)), fabric.weave.repeat, 3, 0, 6)
-    options = TruthOptions(estimator="quadrature")
-    whole = estimate(fabric, queries, options, 7)
-    part = estimate(fabric, queries.take(slice(2, 4)), options, 8)
-    np.testing.assert_array_equal(part.mean, whole.mean[2:4])
-    np.testing.assert_array_equal(part.standard_error, whole.standard_error[2:4])
-    np.testing.assert_array_equal(part.count, whole.count[2:4])
-
-
-def test_translation_by_a_repeat_changes_nothing():
-    fabric = load_fabric("denim")
-    near = _queries(_direction(40, 10), _direction(35, 170), sigma=0.25, centre=(0.5, 0.25))
-    far = near._replace(u=near.u + 4096.0, v=near.v - 4096.0)
-    options = TruthOptions(estimator="quadrature")
-    np.testing.assert_allclose(
-        estimate(fabric, far, options, 1).mean, estimate(fabric, near, options, 1).mean, rtol=1e-6
-    )
-
-
-def test_the_projected_normaliser_is_reciprocal():
-    fabric = load_fabric("polyester_lining")
-    a, b = _direction(50, 80), _direction(30, 200)
-    options = FINE.model_copy(update={"normaliser": "projected"})
-    one, other = (estimate(fabric, _queries(*pair, sigma=8.0), options, 1) for pair in ((a, b), (b, a)))
-    # f_P contains the incident cosine.
-    forth, back = one.mean[0, :2] / a[2], other.mean[0, :2] / b[2]
-    np.testing.assert_allclose(forth, back, atol=one.bound.max() / a[2] + other.bound.max() / b[2])
-    np.testing.assert_allclose(forth, back, rtol=3e-3)
-
-
-def test_a_box_of_whole_repeats_and_a_wide_gaussian_are_the_repeat_average():
-    fabric = load_fabric("polyester_lining")
-    pair = _direction(50, 80), _direction(30, 200)
-    wide = estimate(fabric, _queries(*pair, sigma=40.0), FINE, 1)
-    box = FINE.model_copy(update={"footprint": "box"})
-    whole = estimate(fabric, _queries(*pair, sigma=3 * 2.0 / BOX_SIDE, centre=(1.3, 0.9)), box, 1)
-    np.testing.assert_allclose(whole.mean, wide.mean, rtol=1e-3)
 
 
 @pytest.mark.parametrize("sigma", [1e-4, 1e4])
 @pytest.mark.parametrize("footprint", ["gaussian", "box"])
 def test_extremes_stay_finite_and_not_negative(sigma, footprint):
-    fabric = _both("silk_charmeuse", roughness=0.01)
+    fabric = woven("silk_charmeuse", roughness=0.01)
     options = TruthOptions(estimator="quadrature", footprint=footprint, max_count=512)
     for theta in (0.0, 89.9):
-        queries = _queries(_direction(theta, 13), _direction(60.0, 200), sigma, rows=2, centre=(1e6 + 0.3, -1e6))
+        queries = equal_queries(direction(theta, 13), direction(60.0, 200), sigma, rows=2, centre=(1e6 + 0.3, -1e6))
         answers = estimate(fabric, queries, options, 1)
         for values in answers:
             assert np.isfinite(values).all()

@@ -8,15 +8,11 @@ import pytest
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
-from weaves.fabric import Fabric, load_fabric
+from tests.pipeline.truth.cloths import PALETTE, coloured
+from weaves.fabric import load_fabric
 from weaves.surface import surface_at
 
 EXACT = TruthOptions(relative_error=0.002, max_count=65536)
-PALETTE = {"red": {"diffuse": [0.9, 0.1, 0.2], "specular": [0.4, 0.2, 0.1]}, "blue": {"diffuse": [0.1, 0.2, 0.8]}}
-
-
-def coloured(name, **order):
-    return Fabric.model_validate(load_fabric(name).model_dump() | {"colours": {"palette": PALETTE} | order})
 
 
 def queries(u, v, sigma, wi, wo=(0.0, 0.0, 1.0), minor=None, angle=0.0):
