@@ -190,10 +190,10 @@ from pathlib import Path
 from pipeline.truth import called
 
 path = Path(called.__file__)
-path.write_text(path.read_text().replace("1", "2"))
+path.write_text(path.read_text().replace("1", "22"))
 """
     use = "from pipeline.truth.caller import caller\nprint(caller())"
-    assert [answers(start(copies[0], script)) for script in (edit + use, use)] == ["1\n", "2\n"]
+    assert [answers(start(copies[0], script)) for script in (edit + use, use)] == ["1\n", "22\n"]
 
 
 ARRAYS = """

@@ -10,7 +10,7 @@ from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.analytic.methods import woven
+from tests.pipeline.truth.cloths import woven
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 

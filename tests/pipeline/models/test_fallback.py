@@ -12,9 +12,9 @@ from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.against_truth import colour_error
 from tests.pipeline.models.stand_ins import SMALL, FakeMethod
+from tests.pipeline.truth.cloths import woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 

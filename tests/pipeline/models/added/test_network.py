@@ -8,8 +8,8 @@ from pipeline.models.added.guarded import MethodFailed
 from pipeline.models.added.network import build_added, restore_added
 from pipeline.models.network import Batch
 from pipeline.truth.query import Queries
-from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.stand_ins import card_of, written
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 
 CLOTHS = load_fabric("denim"), load_fabric("cotton_twill")

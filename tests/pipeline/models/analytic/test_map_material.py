@@ -6,8 +6,8 @@ from pipeline.models.analytic.map_material import MapMaterialOptions
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
-from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.against_truth import colour_error, truth_of
+from tests.pipeline.truth.cloths import woven
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 

@@ -13,8 +13,8 @@ from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.query import Queries
-from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.stand_ins import SMALL, batch_of, descend, untrained
+from tests.pipeline.truth.cloths import woven
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 

@@ -7,8 +7,8 @@ from pipeline.analytic.soft_nodes.features import EXCHANGED, EXCHANGED_SIGN, rea
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.woven.standard_position import SYMMETRIES, moved
 from pipeline.shards.queries import QueryOptions, draw_queries
-from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.images import image_of
+from tests.pipeline.truth.cloths import woven
 from tests.presets import slow
 
 SIZES = {"narrow": (0.05, 0.24), "middle": (0.25, 1.0), "wide": (3.0, 8.0)}

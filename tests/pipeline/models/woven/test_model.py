@@ -10,9 +10,9 @@ from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.models.woven.standard_position import SYMMETRIES
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
-from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.images import image_of
 from tests.pipeline.models.stand_ins import SMALL, batch_of
+from tests.pipeline.truth.cloths import woven
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 

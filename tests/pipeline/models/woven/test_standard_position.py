@@ -6,8 +6,8 @@ from pipeline.models.woven.standard_position import SYMMETRIES, moved, placement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.analytic.methods import woven
 from tests.pipeline.models.images import image_of
+from tests.pipeline.truth.cloths import woven
 from tests.presets import PRESETS, slow
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
