@@ -345,5 +345,5 @@ def table_files(cloth: ClothTables) -> dict[str, bytes]:
 def _png(rows: npt.NDArray[np.uint8]) -> bytes:
     """Return rows of bytes as a picture; the lowest row of the texture comes first."""
     buffer = io.BytesIO()
-    Image.fromarray(rows).save(buffer, format="PNG", compress_level=4)
+    Image.fromarray(rows).save(buffer, format="PNG", compress_level=9)
     return buffer.getvalue()
