@@ -99,7 +99,7 @@ class Board:
         """Count a task to do, also one that was done before and is made again."""
         self.planned[task.stage] += 1
         self.all_work[task.stage] += task.cost
-        self.work[task.stage] += 0.0
+        self.work.setdefault(task.stage, 0.0)
         self._left[task.id] = task
 
     def start(self, workers: int, dashboard: str | None) -> None:

@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar, cast
 
 import numba
@@ -69,8 +70,15 @@ def _cache_folder(module: str, path: Path) -> Path:
     content = hashlib.sha256(path.read_bytes())
     for source in sorted(sources - {path}):
         content.update(source.read_bytes())
-    changed = any(source.stat().st_mtime > _BEGAN for source in sources)
-    return _CACHE / f"{module}-{content.hexdigest()[:12]}{f'-{os.getpid()}' if changed else ''}"
+    now = time.time()  # clocks that are off date files in the future
+    changed = any(_BEGAN < source.stat().st_mtime <= now for source in sources)
+    return (Path(_own_cache().name) if changed else _CACHE) / f"{module}-{content.hexdigest()[:12]}"
+
+
+@cache
+def _own_cache() -> TemporaryDirectory[str]:
+    """Return a folder for kernels of this process alone, which is removed when it ends."""
+    return TemporaryDirectory(prefix="twillight-kernels-")
 
 
 _CACHE = _cache_home()

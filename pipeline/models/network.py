@@ -262,7 +262,7 @@ class NetworkMethod(Generic[Net]):
 def restored(
     options: Options, trained: Trained, make: Callable[[tuple[int, int]], Learnt]
 ) -> tuple[dict[str, Learnt], Domain | None]:
-    """Return what a `NetworkMethod` is made of: trained networks, and their joint domain; RuntimeError if they misfit.
+    """Return what a `NetworkMethod` is made of: networks and their joint domain; RuntimeError if weights do not fit.
 
     `make` returns an untrained network; a network of one material is made for the repeat (ends, picks) of its fabric.
     """

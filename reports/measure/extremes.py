@@ -46,7 +46,6 @@ LUSTROUS: Final = 0.01
 FAR: Final = 1e6
 """Distance of the far queries, in yarn spacings; single precision still holds sixteenths of a yarn there."""
 
-
 SHINY: Final = f", alpha = {LUSTROUS:g}"
 """Ending of the names of lustrous fabrics."""
 

@@ -103,7 +103,7 @@ def _free_place(
     panel : float64 (4,)
         Box that the label may not leave.
     curves : float64 (M, 2)
-        Float64 along curves.
+        Points along curves.
     """
     # Turns alternate left and right of the first direction.
     turns = np.array([(-1) ** turn * -(-turn // 2) for turn in range(_DIRECTIONS)])

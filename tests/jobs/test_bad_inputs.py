@@ -161,6 +161,8 @@ SINGLE = [
         ("recipe", "dataset.seen", f'["{name}"]')
         for name in ('denim", "denim', "../../../etc/passwd", "x\\u0000.toml", "a" * 300 + ".toml")
     ),
+    *(("recipe", f"bench.{key}", bad) for key, bad in (("timing_repeats", "19"), ("sphere_size", "[0, 8]"))),
+    *(("recipe", f"bench.{key}", bad) for key, bad in (("views", "[]"), ("frames", "2"))),
     *(("recipe", "name", f'"{name}"') for name in ("../x", "x" * 61)),
     *(("recipe", "bench.scenes.names", f'["{name}"]') for name in ("pipe.xml", "a" * 300 + ".xml")),
     *(("described scene", "source", f'"{name}"') for name in ("pipe.xml", "a" * 5000, "a\\u0000.xml")),

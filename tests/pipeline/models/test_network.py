@@ -27,6 +27,8 @@ def test_restored_weights_answer_alike_also_at_extremes(model):
     """
     options = SMALL[model]
     network = untrained(options, DENIM)
+    if model == "selvage":  # its last layer begins at zero: it would be soft nodes
+        torch.nn.init.normal_(network.last.weight, generator=torch.Generator().manual_seed(3))
     (method,) = restore_methods(options, [(card_of(DENIM), network.state_dict())])
     fabric = DENIM if options.of_one_material else BASKET
     assert method.covers(fabric) and method.covers(fabric.model_copy(update={"name": "other"}))

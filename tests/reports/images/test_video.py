@@ -23,3 +23,17 @@ def test_a_film_has_its_frames_and_their_colours(tmp_path):
         assert frame.shape == (24, 32, 3)
         np.testing.assert_allclose(frame.astype(int), gradient(index).astype(int), atol=2)
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+
+
+def test_a_film_that_fails_leaves_the_one_before(tmp_path):
+    pytest.importorskip("av")
+
+    def frames():
+        yield gradient(0)
+        raise KeyboardInterrupt
+
+    (tmp_path / "a.mp4").write_bytes(b"before")
+    with pytest.raises(KeyboardInterrupt):
+        write_film(tmp_path / "a.mp4", frames(), (32, 24), 24)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
+    assert (tmp_path / "a.mp4").read_bytes() == b"before"

@@ -10,6 +10,7 @@ from pipeline.analytic.summed_area.tables import tabulate
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
 COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
@@ -59,6 +60,14 @@ def test_footprints_of_any_size_have_finite_answers(denim):
         sizes = np.full(len(queries.u), size, np.float32)
         found = answer(tables, queries._replace(sigma=sizes, sigma_minor=sizes))
         assert np.isfinite(found).all() and (found >= 0.0).all() and found.any()
+
+
+def test_a_footprint_far_larger_than_the_repeat_has_no_place(denim):
+    _, tables = denim
+    up, none = np.tile([[0.6, 0.0, 0.8]], (5, 1)), np.zeros(5)
+    queries = Queries.round(np.linspace(0, 3, 5), np.linspace(0, 3, 5), none + 50.0, up, up)
+    found = answer(tables, queries)
+    np.testing.assert_array_equal(found, found[:1].repeat(5, axis=0))
 
 
 def test_round_ones_stand_for_a_long_footprint():

@@ -150,7 +150,7 @@ def test_stated_bounds_cover_the_true_error():
 
 
 @pytest.mark.slow
-def test_stated_bounds_cover_the_true_error_of_manyequal_queries():
+def test_stated_bounds_cover_the_true_error_of_many_queries():
     assert _coverage(100) >= 0.95
 
 
