@@ -21,7 +21,7 @@ MOST_SHARDS: Final = 250_000
 """Most shards of a data set, each a task: 2 * 10^9 rows by default. The manifest then has 60 MB."""
 
 _PLAIN = TruthOptions()
-_LEARNT = ("frame", "normaliser", "shadows")  # physics that not every model can learn
+_LEARNT = ("frame", "normaliser", "parallax", "shadows", "walls")  # physics that not every model can learn
 
 
 def validate_recipe(recipe: Recipe, where: str) -> None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.truth.footprint.place import BOX, GAUSSIAN
 from pipeline.truth.geometry.heightfield import HeightField, height_field
+from pipeline.truth.geometry.plane import reference_plane
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices
@@ -38,6 +39,10 @@ class ClothSide(NamedTuple):
         GAUSSIAN or BOX.
     projected : bool
         Whether the denominator is the footprint's projected area.
+    parallax : bool
+        Whether points of the footprint are view rays through the reference plane.
+    plane : float
+        Height of that plane.
     """
 
     front: HeightField
@@ -45,6 +50,8 @@ class ClothSide(NamedTuple):
     choices: Choices
     shape: int
     projected: bool
+    parallax: bool
+    plane: float
 
 
 class WideQueries(NamedTuple):
@@ -107,17 +114,20 @@ def columns_of(queries: Queries, behind: bool = False) -> WideQueries:
 
 def cloth_side(fabric: Fabric, options: TruthOptions, behind: bool = False) -> ClothSide:
     """Return the front of a fabric for kernels, or its back if the viewer is `behind` it."""
-    front, back = _sides(fabric)
+    front, back, planes = _sides(fabric)
     return ClothSide(
         back if behind else front,
         front if behind else back,
-        Choices(options.frame == "macro", options.shadows),
+        Choices(options.frame == "macro", options.shadows, options.walls == "rim"),
         SHAPES[options.footprint],
         options.normaliser == "projected",
+        options.parallax,
+        planes[behind],
     )
 
 
 @lru_cache(maxsize=64)
-def _sides(fabric: Fabric) -> tuple[HeightField, HeightField]:
-    """Tabulate both sides, once for each fabric; the draft of a back repeats as that of the front does."""
-    return height_field(fabric), height_field(fabric.back())
+def _sides(fabric: Fabric) -> tuple[HeightField, HeightField, tuple[float, float]]:
+    """Tabulate both sides and their reference planes; the draft of a back repeats as that of the front does."""
+    front, back = height_field(fabric), height_field(fabric.back())
+    return front, back, (reference_plane(front), reference_plane(back))

@@ -108,9 +108,9 @@ def estimate(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int,
     """Answer queries about a fabric; viewer and light may be on either side of the cloth.
 
     A query's random numbers depend on `seed`, 0 <= seed < 2^64, and on its index in its stream alone; `start` is that
-    of the first. BadInput if a query has no answer (`pipeline.truth.query.faults`).
+    of the first. BadInput if a query has no answer (`pipeline.truth.query.faults`) or, with parallax, too low a viewer.
     """
-    validate(queries)
+    validate(queries, parallax=options.parallax)
     raw = uncalibrated(fabric, queries, options, seed, start)
     mean, error, bound = (values.astype(np.float32) for values in (raw.mean, *calibrate(raw, queries.behind)))
     through = mean[:, 4], error[:, 4], bound[:, 4]

@@ -25,7 +25,7 @@ from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.geometry.march import wrap
 from pipeline.truth.options import Limits
 from pipeline.truth.query import HIDDEN_SHARE
-from pipeline.truth.scattering.point import Directions, directions_of, point_share
+from pipeline.truth.scattering.point import Directions, directions_of, point_share, ray_share
 
 _CERTAIN: Final = 0.001
 """Probability of a wrong decision that is not worth more points."""
@@ -96,7 +96,11 @@ def add_point(
     cloth: ClothSide, x: float, y: float, weight: float, directions: Directions, sums: Float64, r: int
 ) -> bool:
     """Add the weighted share of a point to row r of the sums, (rows, POINT_SUMS); return whether the viewer sees it."""
-    family, area, specular, diffuse, through = point_share(cloth.front, cloth.back, x, y, directions, cloth.choices)
+    front, back, choices = cloth.front, cloth.back, cloth.choices
+    if cloth.parallax:
+        family, area, specular, diffuse, through, _, _ = ray_share(front, back, cloth.plane, x, y, directions, choices)
+    else:
+        family, area, specular, diffuse, through = point_share(front, back, x, y, directions, choices)
     if family != GAP:
         sums[r, family] += weight * specular
         sums[r, 2 + family] += weight * diffuse

@@ -51,6 +51,13 @@ class TruthOptions(Frozen):
     normaliser: Literal["visible", "projected"] = "visible"
     """The denominator: `visible` is the projected area that the viewer sees, A_P; `projected` is |wo.n_s| times the
     area of the footprint, which restores reciprocity."""
+    parallax: bool = False
+    """True if a footprint is a patch of view rays: its density belongs to the points where they cross the reference
+    plane (`pipeline.truth.geometry.plane`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
+    which heights displace nothing [Chen2024Woven]. Known to the estimators `mc`, `r2`, `owen` and `auto`."""
+    walls: Literal["left_out", "rim"] = "left_out"
+    """What a view ray sees that meets the step between two floats: nothing, and it does not count; or the rim of the
+    yarn above, so that the mean over all places does not depend on the footprint."""
     shadows: bool = True
     """True if points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
     variation: None = None
@@ -71,6 +78,16 @@ class TruthOptions(Frozen):
                 raise ValueError(f"{name} must be a power of two, got {count}")
         if self.max_count < self.min_count:
             raise ValueError(f"max_count ({self.max_count}) must not be below min_count ({self.min_count})")
+        return self
+
+    @model_validator(mode="after")
+    def _rays_have_one_model(self) -> TruthOptions:
+        if self.parallax and (self.frame == "macro" or not self.shadows):
+            raise ValueError("parallax needs frame 'ply' and shadows: a view ray ends at the first point that it meets")
+        if self.parallax and self.estimator in ("quadrature", "node_table"):
+            raise ValueError(f"{self.estimator} integrates over the fabric plane, without parallax: take auto or owen")
+        if self.walls != "left_out" and not self.parallax:
+            raise ValueError("walls are met by view rays alone: parallax is needed")
         return self
 
     @property

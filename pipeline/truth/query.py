@@ -6,6 +6,7 @@ answer holds the four components.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -123,6 +124,9 @@ class Answers(NamedTuple):
 HIDDEN_SHARE = 1e-3
 """A patch of which the viewer sees less than this share of its projected area counts as hidden and answers 0."""
 
+LOWEST_VIEWER = math.cos(math.radians(89.0))
+"""Least cosine of a viewer with parallax: a lower one sees a footprint through many yarns."""
+
 STEEPEST_CURVATURE = 1.0
 """Largest curvature: a cylinder as thick as two yarn spacings."""
 
@@ -153,17 +157,21 @@ def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
             length = np.linalg.norm(directions.astype(np.float64), axis=-1)
             note(np.abs(length - 1.0) > _UNIT_TOLERANCE, name, "must have unit length")
         note(directions[:, 2] == 0, name, "must not lie in the fabric plane")
-    thick = f"must be from 0 to {STEEPEST_CURVATURE:g}: no cylinder may be thinner than the yarns on it"
-    note((queries.curvature < 0) | (queries.curvature > STEEPEST_CURVATURE), "curvature", thick)
+    allowed = f"must be from 0 to {STEEPEST_CURVATURE:g}: no cylinder may be thinner than the yarns on it"
+    note((queries.curvature < 0) | (queries.curvature > STEEPEST_CURVATURE), "curvature", allowed)
     curved_behind = (queries.curvature > 0) & (queries.wo[:, 2] < 0)
     note(curved_behind, "curvature", "must be 0 where the viewer is behind the cloth")
     return found
 
 
-def validate(queries: Queries, where: str = "queries") -> None:
+def validate(queries: Queries, where: str = "queries", parallax: bool = False) -> None:
     """Refuse queries that have no answer with a BadInput that names the first and counts the others."""
     _refuse_shapes(queries, where)
     found = faults(queries)
+    if parallax:
+        allowed = "with parallax a viewer must be within 89 degrees of the normal"
+        for low in np.flatnonzero(np.abs(queries.wo[:, 2]) < LOWEST_VIEWER).tolist():
+            found.setdefault(low, ("wo", queries.wo[low].tolist(), allowed))
     if not found:
         return
     row = min(found)

@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 from pipeline.truth.estimator import estimate
+from pipeline.truth.geometry.heightfield import height_field
+from pipeline.truth.geometry.plane import reference_plane
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.slab import density, sigma
@@ -42,6 +44,9 @@ FABRICS = {
     "twill": ("cotton_twill", Twill(over=(2,), under=(2,)), 24.0, 24.0),
     "satin": ("silk_charmeuse", Satin(ends=5, move=2), 35.0, 60.0),
 }
+SEEN = FABRICS | {"denim": ("denim", None, 12.0, 38.0), "gabardine": ("wool_gabardine", None, 30.0, 30.0)}
+BLOCK = 16
+"""Pixels of Mitsuba along a side of one of the pixels that are compared."""
 # Polar and azimuth angle of wi, then of wo. A mirror pair cannot tell the two apart; the others can.
 PAIRS = {
     "mirror": ((30, 30), (30, 210)),
@@ -130,15 +135,20 @@ def _scene(fabric, wi, wo):
     )
 
 
-def _rendered(fabric, wi, wo):
-    """Return C_warp and C_weft with their standard errors, from pictures (seeds, y, x, 6): radiance and albedo."""
+def _pictures(fabric, wi, wo, seeds=SEEDS):
+    """Return radiance of warp and weft, and which of them is seen, as pictures (seeds, y, x, 2)."""
     scene = _scene(fabric, wi, wo)
-    pictures = np.stack([np.array(mi.render(scene, spp=1, seed=seed))[..., :6] for seed in SEEDS])
+    pictures = np.stack([np.array(mi.render(scene, spp=1, seed=seed))[..., :6] for seed in seeds]).astype(np.float64)
     # Every ray meets the cloth: one yarn in full, or a wall.
-    yarns = pictures[..., 3:5].astype(np.float64)
+    yarns = pictures[..., 3:5]
     assert np.isin(yarns, (0.0, 1.0)).all() and yarns.sum(axis=-1).max() <= 1.0
-    visible = yarns.sum(axis=(1, 2, 3))
-    runs = pictures[..., :2].astype(np.float64).sum(axis=(1, 2)) / visible[:, None]
+    return pictures[..., :2], yarns
+
+
+def _rendered(fabric, wi, wo):
+    """Return C_warp and C_weft with their standard errors."""
+    radiance, yarns = _pictures(fabric, wi, wo)
+    runs = radiance.sum(axis=(1, 2)) / yarns.sum(axis=(1, 2, 3))[:, None]
     return runs.mean(axis=0), runs.std(axis=0, ddof=1) / math.sqrt(len(runs))
 
 
@@ -166,6 +176,39 @@ def test_diffuse_components_are_those_of_a_rendering(name, pair):
     mean, error = _estimated(fabric, wi, wo)
     allowed = TOLERANCE * rendered + FLOOR + ERRORS * np.hypot(rendered_error, error)
     assert (np.abs(mean - rendered) <= allowed).all(), (mean, error, rendered, rendered_error)
+
+
+@pytest.mark.parametrize(
+    ("name", "degrees"),
+    [(name, degrees) if name == "twill" else slow(name, degrees) for name in SEEN for degrees in (0, 45, 70)],
+)
+def test_a_picture_is_that_of_its_pixels_as_queries(name, degrees):
+    """Rationale: where a viewer sees each point, and what is hidden; one repeat in 32 x 32 pixels.
+
+    Expected: the root mean square over the pixels that see no wall is 1 % of their mean at most. Both renderings have
+    about a thousand rays a pixel, whose noise is .2 %.
+    """
+    fabric = _fabric(*SEEN[name])
+    wi, wo = unit(40, 110), unit(degrees, 20)
+    radiance, yarns = _pictures(fabric, wi, wo)
+    count = SIDE // BLOCK
+    blocks = (len(SEEDS), count, BLOCK, count, BLOCK, 2)
+    seen = yarns.reshape(blocks).sum(axis=(0, 2, 4, 5))
+    whole = seen == len(SEEDS) * BLOCK * BLOCK
+    rendered = (radiance.reshape(blocks).sum(axis=(0, 2, 4)).sum(axis=-1) / np.maximum(seen, 1))[whole]
+
+    # The camera's pixels lie on the plane of the highest point, footprints on the reference plane; rows start on top.
+    field, extent = height_field(fabric), np.array(fabric.weave.repeat)
+    shift = (field.highest - reference_plane(field)) * wo[:2] / wo[2]
+    row, column = np.nonzero(whole)
+    u, v = (np.stack([column + 0.5, count - row - 0.5], axis=1) / count * extent - shift).T
+    deviation = np.ones((len(u), 1)) * extent / count / math.sqrt(12.0)
+    directions = (np.tile(w, (len(u), 1)) for w in (wi, wo))
+    queries = Queries.round(u, v, deviation[:, 0], *directions)._replace(sigma_minor=np.float32(deviation[:, 1]))
+    options = TruthOptions(estimator="owen", parallax=True, footprint="box", relative_error=0.005)
+    answers = estimate(fabric, queries, options, 1).mean[:, 2:].sum(axis=1)
+    assert whole.mean() > 0.5
+    assert np.sqrt(np.mean((answers - rendered) ** 2)) < 0.01 * rendered.mean()
 
 
 def _unit(vectors):

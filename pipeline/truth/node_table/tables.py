@@ -41,7 +41,7 @@ _KEPT: Final = 24  # tables of 1 to 5 MB: those of a benchmark with about a doze
 
 ALLOWED: Final = (
     f"flat cloth of at most {TABLE_CELLS} different cells, footprints of at least {TABLE_SIGMA:.3g} yarn spacings and "
-    "not too thin, and the default frame and shadows: take auto"
+    "not too thin, without parallax, and the default frame and shadows: take auto"
 )
 """Queries that a table answers, as the end of a sentence."""
 
@@ -69,7 +69,7 @@ class NodeTable:
 
     def knows(self, cloth: ClothSide, columns: WideQueries) -> Mask:
         """Return which queries a table answers, (N,)."""
-        other = cloth.choices.macro or not cloth.choices.shadows
+        other = cloth.choices.macro or not cloth.choices.shadows or cloth.parallax
         if other or different_cells(cloth.front) > TABLE_CELLS:
             return np.zeros(len(columns.u), np.bool_)
         known = (np.minimum(columns.sigma, columns.sigma_minor) >= TABLE_SIGMA) & (columns.curvature == 0.0)

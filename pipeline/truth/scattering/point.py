@@ -13,10 +13,14 @@ import math
 from typing import NamedTuple
 
 from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.truth.geometry.first_hit import NOTHING, WALL, first_hit, level_at, sinking
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, UNDER, HeightField, surface_at
-from pipeline.truth.geometry.march import Ray, ray
+from pipeline.truth.geometry.march import Ray, ray, wrap
 from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
+
+Surface = tuple[int, int, float, float, float, float, float, float, float]
+"""What `surface_at` returns."""
 
 
 class Choices(NamedTuple):
@@ -28,10 +32,13 @@ class Choices(NamedTuple):
         Cosines in the slab and in A are taken to n_s instead of n_p.
     shadows : bool
         Whether points can hide one another.
+    rims : bool
+        Whether view rays that meet a wall see the yarn's rim above it.
     """
 
     macro: bool
     shadows: bool
+    rims: bool = False
 
 
 class Directions(NamedTuple):
@@ -82,8 +89,9 @@ def point_share(
     area, specular, diffuse, through : float
         A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); the unscattered share, times A(wo).
     """
-    light, viewer = directions.light, directions.viewer
-    family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y))
+    viewer = directions.viewer
+    surface = surface_at(front, x, y, int(x), int(y))
+    family, side, z, nx, ny, nz, _, _, _ = surface
     if family == GAP:
         # A ray that enters a gap and ends on a yarn further down counts there, not here.
         if choices.shadows and not (
@@ -100,6 +108,54 @@ def point_share(
         cos_o, area = viewer.z, viewer.z
     else:
         area = cos_o / nz
+    return yarn_share(front, back, x, y, surface, cos_o, area, directions, choices)
+
+
+@inlined_kernel
+def ray_share(
+    front: HeightField, back: HeightField, plane: float, x: float, y: float, directions: Directions, choices: Choices
+) -> tuple[int, float, float, float, float, float, float]:
+    """Return the same for the view ray that crosses the reference plane at (x, y), and how far from there it ends.
+
+    With dq the area in which the rays of a patch cross the plane, A(wo) dp = (n_s.wo) dq: every ray that meets a yarn
+    has the area n_s.wo. One that meets a wall has none, or sees the rim above. One that crosses the fabric plane in a
+    gap and meets nothing on either side is light that goes straight through. On curved cloth wo has the same angle to
+    the tangent plane everywhere, as in `pipeline.truth.geometry.opacity`.
+    """
+    viewer = directions.viewer
+    towards, along = sinking(viewer, front.highest - plane)
+    hit = first_hit(front, x + along * viewer.dx, y + along * viewer.dy, front.highest, towards)
+    moved_x, moved_y = (along - hit.distance) * viewer.dx, (along - hit.distance) * viewer.dy
+    down = level_at(towards, front.highest)
+    if (hit.what == NOTHING or hit.distance > down) and down < math.inf:
+        picks, ends = front.top.shape
+        at_x = wrap(x + (along - down) * viewer.dx, float(ends))
+        at_y = wrap(y + (along - down) * viewer.dy, float(picks))
+        family, _, _, _, _, _, _, _, _ = surface_at(front, at_x, at_y, int(at_x), int(at_y))
+        # Below the fabric plane a yarn is solid down to its back: a ray that clears the back meets none of its walls.
+        if family == GAP and visible(back, at_x, at_y, 0.0, UNDER, directions.viewer_behind):
+            return GAP, viewer.z, 0.0, 0.0, viewer.z, moved_x, moved_y
+    if hit.what == NOTHING:
+        return GAP, 0.0, 0.0, 0.0, 0.0, moved_x, moved_y
+    surface = surface_at(front, hit.x, hit.y, hit.end, hit.pick)
+    family, _, _, nx, ny, nz, _, _, _ = surface
+    cos_o = viewer.x * nx + viewer.y * ny + viewer.z * nz
+    if (hit.what == WALL and not choices.rims) or cos_o <= 0.0:
+        return family, 0.0, 0.0, 0.0, 0.0, moved_x, moved_y
+    _, area, specular, diffuse, through = yarn_share(
+        front, back, hit.x, hit.y, surface, cos_o, viewer.z, directions, choices
+    )
+    return family, area, specular, diffuse, through, moved_x, moved_y
+
+
+@inlined_kernel
+def yarn_share(
+    front: HeightField, back: HeightField, x: float, y: float, surface: Surface, cos_o: float, area: float,
+    directions: Directions, choices: Choices,
+) -> tuple[int, float, float, float, float]:  # fmt: skip
+    """Return the shares of a point of a yarn that the viewer sees; `area` is its A(wo)."""
+    light, viewer = directions.light, directions.viewer
+    family, side, z, nx, ny, nz, tx, ty, tz = surface
     alpha, blend = front.yarn[family, ALPHA], front.yarn[family, BLEND]
     sigma_o = sigma(viewer.x, viewer.y, viewer.z, tx, ty, tz, alpha)
     through = area * unscattered(sigma_o, cos_o, front.thickness)

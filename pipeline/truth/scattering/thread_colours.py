@@ -26,7 +26,7 @@ from pipeline.truth.geometry.march import wrap
 from pipeline.truth.monte_carlo import RANDOMISATIONS, place_in, query_directions
 from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.query import Queries, validate
-from pipeline.truth.scattering.point import point_share
+from pipeline.truth.scattering.point import point_share, ray_share
 from weaves.colour_order import ThreadColours
 from weaves.fabric import Fabric
 
@@ -82,7 +82,7 @@ def component_colours(
     Points are doubled until the standard error of the patch BSDF's colour is `options.relative_error` of its size.
     Parameters and errors are those of `pipeline.truth.estimator.estimate`; the estimator of the options plays no part.
     """
-    validate(queries)
+    validate(queries, parallax=options.parallax)
     rows = len(queries.u)
     found = ComponentColours(np.zeros((rows, 4, 3)), np.zeros((rows, 3)))
     behind, through = queries.wo[:, 2] < 0, queries.wi[:, 2] * queries.wo[:, 2] < 0
@@ -145,10 +145,14 @@ def _add_points(
     for k in range(first, last):
         a, b = owen_pair(randomisation, k)
         x, y, weight = place_in(float(threads.ends), float(threads.picks), columns, row, cloth.shape, a, b)
-        own_x, own_y = wrap(x, float(ends)), wrap(y, float(picks))
-        family, seen, specular, diffuse, _ = point_share(
-            cloth.front, cloth.back, own_x, own_y, directions, cloth.choices
-        )
+        own_x, own_y, front, back = wrap(x, float(ends)), wrap(y, float(picks)), cloth.front, cloth.back
+        if cloth.parallax:
+            family, seen, specular, diffuse, _, moved_x, moved_y = ray_share(
+                front, back, cloth.plane, own_x, own_y, directions, cloth.choices
+            )
+            x, y = wrap(x + moved_x, float(threads.ends)), wrap(y + moved_y, float(threads.picks))
+        else:
+            family, seen, specular, diffuse, _ = point_share(front, back, own_x, own_y, directions, cloth.choices)
         area[0] += weight * seen
         if family == GAP:
             continue

@@ -1,0 +1,190 @@
+"""The point of the cloth that a view ray meets first, found without a step size.
+
+The ray sinks from the height of the highest yarn, cell by cell, as the rays of `visibility` rise. Over the yarn on top,
+height minus ray is concave along the ray: it lies below its tangents, so Newton's steps from a place where the ray is
+above the yarn never pass the first meeting, and converge to it. A ray that is below a piece where it enters it has met
+the wall between this piece and the last. In gaps nothing stops a ray; it goes on to yarns further down, or leaves the
+cloth below. On a base that falls away by kappa s^2 / 2 it may rise again and leave above.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER, HeightField, surface_at
+from pipeline.truth.geometry.march import Cell, Ray, first_cell, height_along, next_cell, span_on_top, span_over, wrap
+
+YARN, WALL, NOTHING = 0, 1, 2
+"""What a ray meets."""
+
+_STRIP_POINTS = 16
+_MAX_CELLS = 100_000
+_NEWTON_STEPS = 60
+_HALVINGS = 48
+_CLOSE = 1e-13  # in yarn spacings: a step that ends the search
+_LEVEL = 1e-9  # height above the ray that counts as on it: neighbouring cells round their common border differently
+_INSIDE = 1e-12  # distance of a point from the border of its cell
+
+
+class Hit(NamedTuple):
+    """Where a ray ends.
+
+    Attributes
+    ----------
+    what : int
+        YARN, WALL or NOTHING.
+    x, y : float
+        The point, in the cell (pick, end) of the repeat; the start of the ray if it meets nothing.
+    end, pick : int
+        The cell.
+    distance : float
+        Distance from the start of the ray, in the fabric plane.
+    """
+
+    what: int
+    x: float
+    y: float
+    end: int
+    pick: int
+    distance: float
+
+
+@kernel
+def sinking(viewer: Ray, rise: float) -> tuple[Ray, float]:
+    """Return a view ray from a height `rise` above the plane that it crosses, and how far from the crossing it starts.
+
+    `viewer` leads from the plane to the viewer; the cloth falls away below it by kappa s^2 / 2.
+    """
+    if viewer.rise == math.inf:
+        return Ray(
+            -viewer.x, -viewer.y, -viewer.z, viewer.dx, viewer.dy, -math.inf, 0.0, viewer.stride_x, viewer.stride_y
+        ), 0.0
+    slope = math.sqrt(viewer.rise * viewer.rise + 2.0 * viewer.bend * rise)
+    along = 2.0 * rise / (viewer.rise + slope)
+    ray = Ray(
+        -viewer.x, -viewer.y, -viewer.z, -viewer.dx, -viewer.dy, -slope, viewer.bend, viewer.stride_x, viewer.stride_y
+    )
+    return ray, along
+
+
+@kernel
+def level_at(towards: Ray, height: float) -> float:
+    """Return the distance at which a sinking ray has lost a height, or infinity if it rises before."""
+    if towards.rise == -math.inf:
+        return 0.0
+    square = towards.rise * towards.rise - 2.0 * towards.bend * height
+    return 2.0 * height / (math.sqrt(square) - towards.rise) if square > 0.0 else math.inf
+
+
+@inlined_kernel
+def _above(
+    field: HeightField, side: int, x: float, y: float, z: float, towards: Ray, distance: float, cell: Cell
+) -> tuple[float, float]:
+    """Return how far a piece of a cell is above the ray at a distance, and how fast that grows."""
+    height, slope = height_along(field, side, x, y, towards, distance, cell)
+    altitude = z + distance * (towards.rise + 0.5 * towards.bend * distance)
+    return height - altitude, slope - (towards.rise + towards.bend * distance)
+
+
+@inlined_kernel
+def _meets_top(
+    field: HeightField, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
+) -> float:
+    """Return the distance at which a ray above the top piece of a cell at `start` meets it; more than `stop`: never."""
+    s = start
+    for _ in range(_NEWTON_STEPS):
+        above, growth = _above(field, TOP, x, y, z, towards, s, cell)
+        if above >= 0.0:
+            return s
+        if growth <= 0.0:
+            return math.inf
+        step = -above / growth
+        s += step
+        if s > stop:
+            return math.inf
+        if step < _CLOSE:
+            return s
+    return s
+
+
+@inlined_kernel
+def _meets_strip(
+    field: HeightField, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
+) -> float:
+    """Return the same for the yarn beneath, whose height is not concave; meetings are sought between points."""
+    before = start
+    for k in range(1, _STRIP_POINTS):
+        s = start + (stop - start) * k / (_STRIP_POINTS - 1.0)
+        above, _ = _above(field, UNDER, x, y, z, towards, s, cell)
+        if above > 0.0:
+            low, high = before, s
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                above, _ = _above(field, UNDER, x, y, z, towards, middle, cell)
+                if above > 0.0:
+                    high = middle
+                else:
+                    low = middle
+            return high
+        before = s
+    return math.inf
+
+
+@inlined_kernel
+def _ends_in(
+    field: HeightField, side: int, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
+) -> tuple[int, float]:
+    """Return what a ray meets of a piece of a cell between two distances, YARN, WALL or NOTHING, and where."""
+    if side == UNDER:
+        start, stop = span_over(field, 1 - int(field.top[cell.pick, cell.end]), x, y, towards, start, stop, cell)
+    if stop <= start:
+        return NOTHING, 0.0
+    above, _ = _above(field, side, x, y, z, towards, start, cell)
+    if above > _LEVEL:
+        return WALL, start
+    if side == TOP:
+        s = _meets_top(field, x, y, z, towards, start, stop, cell)
+    else:
+        s = _meets_strip(field, x, y, z, towards, start, stop, cell)
+    return (YARN, s) if s <= stop else (NOTHING, 0.0)
+
+
+@kernel
+def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) -> Hit:
+    """Return what a ray meets first that starts at (x, y, z), not below the surface.
+
+    The ray sinks at first (towards.z < 0), or runs straight down; (x, y) may lie anywhere on the endless cloth.
+    """
+    picks, ends = field.top.shape
+    x, y = wrap(x, ends), wrap(y, picks)
+    rise, bend = towards.rise, towards.bend
+    cell = first_cell(x, y, towards)
+    distance = 0.0
+    if rise == -math.inf:
+        family, _, _, _, _, _, _, _, _ = surface_at(field, x, y, cell.end, cell.pick)
+        return Hit(NOTHING if family == GAP else YARN, x, y, cell.end, cell.pick, 0.0)
+    bottom = level_at(towards, z - field.lowest)
+    for _ in range(_MAX_CELLS):
+        leave = min(cell.next_x, cell.next_y, bottom)
+        # A ray is lowest where it leaves the cell, unless it rises again.
+        lowest = min(max(-rise / bend, distance), leave) if bend > 0.0 else leave
+        if leave > distance and field.crown[cell.pick, cell.end] >= z + lowest * (rise + 0.5 * bend * lowest):
+            enter, exit_ = span_on_top(field, cell, x, y, towards, distance, leave)
+            what, s = _ends_in(field, UNDER, x, y, z, towards, distance, enter, cell)
+            if what == NOTHING:
+                what, s = _ends_in(field, TOP, x, y, z, towards, enter, exit_, cell)
+            if what == NOTHING:
+                what, s = _ends_in(field, UNDER, x, y, z, towards, exit_, leave, cell)
+            if what != NOTHING:
+                column, row = float(cell.column - cell.end), float(cell.row - cell.pick)
+                hit_x = min(max(x + s * towards.dx - column, cell.end + _INSIDE), cell.end + 1.0 - _INSIDE)
+                hit_y = min(max(y + s * towards.dy - row, cell.pick + _INSIDE), cell.pick + 1.0 - _INSIDE)
+                return Hit(what, hit_x, hit_y, cell.end, cell.pick, s)
+        distance = leave
+        slope = rise + bend * distance
+        if distance == bottom or (slope >= 0.0 and z + distance * (rise + 0.5 * bend * distance) > field.highest):
+            break
+        cell = next_cell(field, cell, towards)
+    return Hit(NOTHING, x, y, cell.end, cell.pick, distance)

@@ -1,0 +1,84 @@
+"""First hits against a march through the oracle's heights, and the reference plane against a fine grid of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.truth.geometry.first_hit import NOTHING, WALL, YARN, first_hit, sinking
+from pipeline.truth.geometry.heightfield import height_field, surface_at
+from pipeline.truth.geometry.march import ray
+from pipeline.truth.geometry.plane import reference_plane
+from tests.pipeline.truth.cloths import LOPSIDED, cylinders, direction, woven
+from weaves.fabric import load_fabric
+from weaves.surface import surface_at as oracle
+
+STEP = 0.002
+NEVER = 1e9
+
+
+def _marched(fabric, x, y, towards, start, lowest):
+    """Return for each ray the first distance, in steps of STEP, at which the cloth is above it, or NEVER."""
+    found, left, s = np.full(len(x), NEVER), np.arange(len(x)), 0.0
+    while left.size:
+        s += STEP
+        altitude, slope = start + s * (towards.rise + 0.5 * towards.bend * s), towards.rise + towards.bend * s
+        if (altitude < lowest and slope < 0) or (altitude > start and slope > 0):
+            break
+        below = oracle(fabric, x[left] + s * towards.dx, y[left] + s * towards.dy).height > altitude
+        found[left[below]] = s
+        left = left[~below]
+    return found
+
+
+@pytest.mark.parametrize("fabric", [LOPSIDED, woven("silk_charmeuse"), woven("voile")], ids=["narrow", "satin", "open"])
+@pytest.mark.parametrize(("degrees", "curvature"), [(20.0, 0.0), (55.0, 0.0), (80.0, 0.0), (80.0, 0.1)])
+def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
+    field = height_field(fabric)
+    random = np.random.default_rng(int(degrees))
+    x, y = random.random((2, 600)) * np.array(fabric.weave.repeat)[:, None]
+    theta, azimuth = math.radians(degrees), random.uniform(0.0, 2.0 * math.pi)
+    viewer = ray(math.sin(theta) * math.cos(azimuth), math.sin(theta) * math.sin(azimuth), math.cos(theta), curvature)
+    towards, _ = sinking(viewer, 0.0)
+    hits = [first_hit(field, *at, field.highest, towards) for at in zip(x, y, strict=True)]
+    what = np.array([hit.what for hit in hits])
+    distance = np.array([hit.distance if hit.what != NOTHING else NEVER for hit in hits])
+    marched = _marched(fabric, x, y, towards, field.highest, field.lowest)
+    # A march steps over slivers of yarn, and finds the rest up to a step too late.
+    late = marched - distance
+    assert ((late < -1e-6) | (late > STEP + 1e-6)).mean() < 0.01
+    assert (what == YARN).mean() > 0.3
+
+    # Where a ray meets a yarn, it is on its surface, and comes from above it.
+    for hit in (hit for hit in hits if hit.what == YARN):
+        _, _, height, nx, ny, nz, _, _, _ = surface_at(field, hit.x, hit.y, hit.end, hit.pick)
+        s = hit.distance
+        assert height == pytest.approx(field.highest + s * (towards.rise + 0.5 * towards.bend * s), abs=1e-8)
+        slope = (towards.rise + towards.bend * s) * nz + towards.dx * nx + towards.dy * ny
+        assert slope < 1e-6
+
+
+def test_a_ray_along_the_normal_meets_what_is_seen_from_above():
+    field = height_field(load_fabric("voile"))
+    down, along = sinking(ray(0.0, 0.0, 1.0, 0.0), 0.3)
+    met = {first_hit(field, x, y, field.highest, down).what for x in np.linspace(0.0, 1.9, 20) for y in (0.02, 0.5)}
+    assert along == 0.0 and met == {YARN, NOTHING}
+
+
+def test_rays_meet_walls_where_floats_end():
+    """Of denim, where the step between two floats faces the viewer; none along yarns that never end."""
+    shares = []
+    for fabric in (load_fabric("denim"), cylinders()):
+        field, (towards, _) = height_field(fabric), sinking(ray(*direction(80.0, 20.0), 0.0), 0.0)
+        hits = [first_hit(field, 0.21 * k, 0.137 * k, field.highest, towards).what for k in range(400)]
+        shares.append(np.mean(np.array(hits) == WALL))
+    assert 0.02 < shares[0] < 0.5 and shares[1] == 0.0
+
+
+@pytest.mark.parametrize("fabric", [LOPSIDED, woven("denim"), woven("voile")], ids=["narrow", "closed", "open"])
+def test_the_reference_plane_is_the_mean_height(fabric):
+    ends, picks = fabric.weave.repeat
+    x, y = (np.arange(200 * count) / 200 + 0.0025 for count in (ends, picks))
+    height = oracle(fabric, *np.meshgrid(x, y)).height
+    expected = height[np.isfinite(height)].mean()
+    assert reference_plane(height_field(fabric)) == pytest.approx(expected, abs=2e-4)
