@@ -1,4 +1,4 @@
-"""Crew: the workers of a scheduler, and the tasks that are with them.
+"""Crew: the workers of a scheduler, their software, and the tasks that are with them.
 
 Workers may come and go while a run is under way, as those of a cluster that adapts do. One whose software is not the
 driver's is refused: each new worker is checked before it counts, and a task that dask hands to one before that is not
@@ -7,11 +7,16 @@ computed there.
 
 from __future__ import annotations
 
+import hashlib
+import platform
 import time
 import uuid
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from http.client import HTTPException
+from importlib import metadata
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 from urllib.request import ProxyHandler, build_opener
@@ -20,11 +25,12 @@ from jobs.plan.task import Task
 from jobs.run.compiling import KernelGroup
 from jobs.run.outcome import Outcome, work
 from jobs.run.receipt import Product
-from jobs.run.software import software
 from pipeline import patience
 from pipeline.storage import place
 from weaves.errors import WorkFailed
 
+_PACKAGES: Final = ("weaves", "pipeline", "reports", "jobs")
+_LIBRARIES: Final = ("numba", "numpy", "torch")
 _SECONDS_BETWEEN_LOOKS: Final = 1.0
 _SECONDS_BETWEEN_SIGNS: Final = 0.2
 _SECONDS_FOR_AN_ERROR: Final = 5.0
@@ -262,3 +268,24 @@ def _outcome(content: Mapping[str, Any]) -> Outcome:
     """Return the outcome in a message."""
     files = {name: Product(**product) for name, product in content["files"].items()}
     return Outcome(**{**content, "files": files})
+
+
+@cache
+def software() -> dict[str, str]:
+    """Return the versions of this process: the hash of twillight's sources, Python, and the libraries that compute.
+
+    Builds of PyTorch for different devices (``+cpu``, ``+cu126``) count as one version.
+    """
+    python = ".".join(platform.python_version_tuple()[:2])
+    libraries = {name: metadata.version(name).partition("+")[0] for name in _LIBRARIES}
+    return {"twillight's sources": _sources(), "Python": python, **libraries}
+
+
+def _sources() -> str:
+    """Return a hash of all Python files of the packages, by their paths within them."""
+    root = Path(__file__).parents[2]
+    digest = hashlib.sha256()
+    for path in sorted(path for package in _PACKAGES for path in (root / package).rglob("*.py")):
+        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()[:8]

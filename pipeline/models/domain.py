@@ -28,7 +28,7 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.validation import Frozen
 
-PHYSICS: Final = ("footprint", "frame", "normaliser", "parallax", "shadows", "variation", "walls")
+PHYSICS: Final = ("footprint", "frame", "normaliser", "parallax", "shadows", "walls")
 """Options of the truth that define the learnt quantity; the other options set its accuracy."""
 
 _YARN: Final = ("roughness", "bend", "twist", "relief", "width", "blend")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.truth.footprint.place import BOX, GAUSSIAN
 from pipeline.truth.geometry.heightfield import HeightField, height_field
-from pipeline.truth.geometry.plane import reference_plane
+from pipeline.truth.geometry.pieces import reference_plane
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices

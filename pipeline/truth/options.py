@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from pydantic import Field, field_validator, model_validator
 
@@ -53,15 +53,21 @@ class TruthOptions(Frozen):
     area of the footprint, which restores reciprocity."""
     parallax: bool = False
     """True if a footprint is a patch of view rays: its density belongs to the points where they cross the reference
-    plane (`pipeline.truth.geometry.plane`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
+    plane (`pipeline.truth.geometry.pieces`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
     which heights displace nothing [Chen2024Woven]. Known to the estimators `mc`, `r2`, `owen` and `auto`."""
     walls: Literal["left_out", "rim"] = "left_out"
-    """What a view ray sees that meets the step between two floats: nothing, and it does not count; or the rim of the
-    yarn above, so that the mean over all places does not depend on the footprint."""
+    """Meaning of a view ray that meets the step between two floats: it does not count, or it sees the rim of the yarn
+    above, so that the mean over all places does not depend on the footprint."""
     shadows: bool = True
     """True if points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
-    variation: None = None
-    """All yarns of a family are alike. Part of the identity of shards and of the physics on model cards."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_variation(cls, options: Any) -> Any:
+        """Accept data sets of earlier versions, which say that all yarns of a family are alike."""
+        if isinstance(options, dict) and "variation" in options and options["variation"] is None:
+            return {name: value for name, value in options.items() if name != "variation"}
+        return options
 
     @field_validator("estimator", mode="before")
     @classmethod

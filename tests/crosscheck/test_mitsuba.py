@@ -16,7 +16,7 @@ import pytest
 
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import height_field
-from pipeline.truth.geometry.plane import reference_plane
+from pipeline.truth.geometry.pieces import reference_plane
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.slab import density, sigma

@@ -16,8 +16,8 @@ from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER, HeightField, surface_at
 from pipeline.truth.geometry.march import Cell, Ray, first_cell, height_along, next_cell, span_on_top, span_over, wrap
 
-YARN, WALL, NOTHING = 0, 1, 2
-"""What a ray meets."""
+ON_YARN, ON_WALL, MISSED = 0, 1, 2
+"""Ends of a ray."""
 
 _STRIP_POINTS = 16
 _MAX_CELLS = 100_000
@@ -34,7 +34,7 @@ class Hit(NamedTuple):
     Attributes
     ----------
     what : int
-        YARN, WALL or NOTHING.
+        ON_YARN, ON_WALL or MISSED.
     x, y : float
         The point, in the cell (pick, end) of the repeat; the start of the ray if it meets nothing.
     end, pick : int
@@ -52,28 +52,24 @@ class Hit(NamedTuple):
 
 
 @kernel
-def sinking(viewer: Ray, rise: float) -> tuple[Ray, float]:
-    """Return a view ray from a height `rise` above the plane that it crosses, and how far from the crossing it starts.
+def sinking(viewer: Ray, highest: float, plane: float) -> tuple[Ray, float, float]:
+    """Return the view ray that crosses the reference plane at a point, from the height of the highest yarn on.
 
-    `viewer` leads from the plane to the viewer; the cloth falls away below it by kappa s^2 / 2.
+    `viewer` leads from the plane to the viewer; the cloth falls away below it by kappa s^2 / 2. Also returned is how
+    far from the point the ray starts, and at what distance from there it crosses the fabric plane: infinity if never.
     """
     if viewer.rise == math.inf:
-        return Ray(
-            -viewer.x, -viewer.y, -viewer.z, viewer.dx, viewer.dy, -math.inf, 0.0, viewer.stride_x, viewer.stride_y
-        ), 0.0
-    slope = math.sqrt(viewer.rise * viewer.rise + 2.0 * viewer.bend * rise)
-    along = 2.0 * rise / (viewer.rise + slope)
-    ray = Ray(
-        -viewer.x, -viewer.y, -viewer.z, -viewer.dx, -viewer.dy, -slope, viewer.bend, viewer.stride_x, viewer.stride_y
-    )
-    return ray, along
+        down = Ray(-viewer.x, -viewer.y, -viewer.z, viewer.dx, viewer.dy, -math.inf, 0.0, 1.0, math.inf)
+        return down, 0.0, 0.0
+    slope = math.sqrt(viewer.rise * viewer.rise + 2.0 * viewer.bend * (highest - plane))
+    x, y, z, dx, dy, bend = -viewer.x, -viewer.y, -viewer.z, -viewer.dx, -viewer.dy, viewer.bend
+    towards = Ray(x, y, z, dx, dy, -slope, bend, viewer.stride_x, viewer.stride_y)
+    return towards, 2.0 * (highest - plane) / (viewer.rise + slope), _level_at(towards, highest)
 
 
 @kernel
-def level_at(towards: Ray, height: float) -> float:
+def _level_at(towards: Ray, height: float) -> float:
     """Return the distance at which a sinking ray has lost a height, or infinity if it rises before."""
-    if towards.rise == -math.inf:
-        return 0.0
     square = towards.rise * towards.rise - 2.0 * towards.bend * height
     return 2.0 * height / (math.sqrt(square) - towards.rise) if square > 0.0 else math.inf
 
@@ -136,19 +132,19 @@ def _meets_strip(
 def _ends_in(
     field: HeightField, side: int, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
 ) -> tuple[int, float]:
-    """Return what a ray meets of a piece of a cell between two distances, YARN, WALL or NOTHING, and where."""
+    """Return what a ray meets of a piece of a cell between two distances, ON_YARN, ON_WALL or MISSED, and where."""
     if side == UNDER:
         start, stop = span_over(field, 1 - int(field.top[cell.pick, cell.end]), x, y, towards, start, stop, cell)
     if stop <= start:
-        return NOTHING, 0.0
+        return MISSED, 0.0
     above, _ = _above(field, side, x, y, z, towards, start, cell)
     if above > _LEVEL:
-        return WALL, start
+        return ON_WALL, start
     if side == TOP:
         s = _meets_top(field, x, y, z, towards, start, stop, cell)
     else:
         s = _meets_strip(field, x, y, z, towards, start, stop, cell)
-    return (YARN, s) if s <= stop else (NOTHING, 0.0)
+    return (ON_YARN, s) if s <= stop else (MISSED, 0.0)
 
 
 @kernel
@@ -164,8 +160,8 @@ def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) ->
     distance = 0.0
     if rise == -math.inf:
         family, _, _, _, _, _, _, _, _ = surface_at(field, x, y, cell.end, cell.pick)
-        return Hit(NOTHING if family == GAP else YARN, x, y, cell.end, cell.pick, 0.0)
-    bottom = level_at(towards, z - field.lowest)
+        return Hit(MISSED if family == GAP else ON_YARN, x, y, cell.end, cell.pick, 0.0)
+    bottom = _level_at(towards, z - field.lowest)
     for _ in range(_MAX_CELLS):
         leave = min(cell.next_x, cell.next_y, bottom)
         # A ray is lowest where it leaves the cell, unless it rises again.
@@ -173,11 +169,11 @@ def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) ->
         if leave > distance and field.crown[cell.pick, cell.end] >= z + lowest * (rise + 0.5 * bend * lowest):
             enter, exit_ = span_on_top(field, cell, x, y, towards, distance, leave)
             what, s = _ends_in(field, UNDER, x, y, z, towards, distance, enter, cell)
-            if what == NOTHING:
+            if what == MISSED:
                 what, s = _ends_in(field, TOP, x, y, z, towards, enter, exit_, cell)
-            if what == NOTHING:
+            if what == MISSED:
                 what, s = _ends_in(field, UNDER, x, y, z, towards, exit_, leave, cell)
-            if what != NOTHING:
+            if what != MISSED:
                 column, row = float(cell.column - cell.end), float(cell.row - cell.pick)
                 hit_x = min(max(x + s * towards.dx - column, cell.end + _INSIDE), cell.end + 1.0 - _INSIDE)
                 hit_y = min(max(y + s * towards.dy - row, cell.pick + _INSIDE), cell.pick + 1.0 - _INSIDE)
@@ -187,4 +183,4 @@ def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) ->
         if distance == bottom or (slope >= 0.0 and z + distance * (rise + 0.5 * bend * distance) > field.highest):
             break
         cell = next_cell(field, cell, towards)
-    return Hit(NOTHING, x, y, cell.end, cell.pick, distance)
+    return Hit(MISSED, x, y, cell.end, cell.pick, distance)

@@ -1,4 +1,4 @@
-"""Parts of a repeat: the rectangles of a cell that have one surface, and the cells that differ.
+"""Parts of a repeat: the rectangles of a cell that have one surface, their mean height, and the cells that differ.
 
 A cell shows its top yarn; if that yarn is narrow, also the yarn beneath on either side, and gaps in the corners. A
 satin of 8 ends has 64 cells a repeat, of which 8 differ: cells that a translation carries into one another form an
@@ -13,7 +13,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.compiled.arrays import Mask
+from pipeline.compiled.arrays import Float64, Mask
+from pipeline.compiled.decorators import kernel
 from pipeline.truth.geometry.heightfield import (
     BEND_RADIUS,
     GAP,
@@ -24,8 +25,11 @@ from pipeline.truth.geometry.heightfield import (
     UNDER,
     WARP,
     HeightField,
+    height_beneath,
+    torus_height,
 )
 
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _NONE: Final = 1e-6  # width of margins, in yarn spacings, that are not there
 
 Extent = tuple[float, float]
@@ -165,3 +169,55 @@ def longest_period(field: HeightField) -> float:
         if (m or n) and all((m * e * picks + n * p * ends) % (ends * picks) == 0 for p, e in shifts)
     )
     return 1.0 / shortest
+
+
+def reference_plane(field: HeightField) -> float:
+    """Return the height of the reference plane, the mean height of what is seen from straight above, without gaps.
+
+    A view ray belongs to the point at which it crosses this plane. The height is in yarn spacings above the axes of the
+    yarns at the ends of floats; Gauss-Legendre along a yarn, and across it in the angle v, x = r sin v.
+    """
+    height, area = _sums(field, _NODES, _WEIGHTS)
+    return float(height / area)
+
+
+@kernel
+def _sums(field: HeightField, nodes: Float64, weights: Float64) -> tuple[float, float]:
+    """Return the integrals of the height and of 1 over everything that is seen from straight above."""
+    height, area = 0.0, 0.0
+    picks, ends = field.top.shape
+    for pick in range(picks):
+        for end in range(ends):
+            top = int(field.top[pick, end])
+            radius = field.yarn[top, RADIUS]
+            h, a = _piece(field, top, TOP, pick, end, -0.5, 0.5, nodes, weights)
+            height, area = height + h, area + a
+            if radius < 0.5:
+                for sign in (-1.0, 1.0):
+                    low, high = min(sign * radius, sign * 0.5), max(sign * radius, sign * 0.5)
+                    h, a = _piece(field, 1 - top, UNDER, pick, end, low, high, nodes, weights)
+                    height, area = height + h, area + a
+    return height, area
+
+
+@kernel
+def _piece(
+    field: HeightField, family: int, side: int, pick: int, end: int, low: float, high: float, nodes: Float64,
+    weights: Float64,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the same for one piece, from `low` to `high` along its yarn, from the middle of the cell."""
+    yarn, own = field.yarn[family], field.floats[pick, end, side]
+    radius, middle, half = yarn[RADIUS], own[OFFSET] + 0.5 * (low + high), 0.5 * (high - low)
+    height, area = 0.0, 0.0
+    for i in range(len(nodes)):
+        v = 0.5 * math.pi * nodes[i]
+        share = 0.5 * math.pi * weights[i] * radius * math.cos(v) * half
+        for k in range(len(nodes)):
+            y = middle + half * nodes[k]
+            if side == TOP:
+                h, _, _ = torus_height(yarn, own, radius * math.sin(v), y)
+            else:
+                h, _, _ = height_beneath(yarn, own, radius * math.sin(v), y)
+            height += share * weights[k] * h
+            area += share * weights[k]
+    return height, area

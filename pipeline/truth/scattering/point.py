@@ -13,14 +13,14 @@ import math
 from typing import NamedTuple
 
 from pipeline.compiled.decorators import inlined_kernel, kernel
-from pipeline.truth.geometry.first_hit import NOTHING, WALL, first_hit, level_at, sinking
+from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, first_hit, sinking
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, UNDER, HeightField, surface_at
 from pipeline.truth.geometry.march import Ray, ray, wrap
 from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
 
 Surface = tuple[int, int, float, float, float, float, float, float, float]
-"""What `surface_at` returns."""
+"""Surface at a point, as `surface_at` returns it."""
 
 
 class Choices(NamedTuple):
@@ -108,7 +108,7 @@ def point_share(
         cos_o, area = viewer.z, viewer.z
     else:
         area = cos_o / nz
-    return yarn_share(front, back, x, y, surface, cos_o, area, directions, choices)
+    return _yarn_share(front, back, x, y, surface, cos_o, area, directions, choices)
 
 
 @inlined_kernel
@@ -123,11 +123,10 @@ def ray_share(
     the tangent plane everywhere, as in `pipeline.truth.geometry.opacity`.
     """
     viewer = directions.viewer
-    towards, along = sinking(viewer, front.highest - plane)
+    towards, along, down = sinking(viewer, front.highest, plane)
     hit = first_hit(front, x + along * viewer.dx, y + along * viewer.dy, front.highest, towards)
     moved_x, moved_y = (along - hit.distance) * viewer.dx, (along - hit.distance) * viewer.dy
-    down = level_at(towards, front.highest)
-    if (hit.what == NOTHING or hit.distance > down) and down < math.inf:
+    if (hit.what == MISSED or hit.distance > down) and down < math.inf:
         picks, ends = front.top.shape
         at_x = wrap(x + (along - down) * viewer.dx, float(ends))
         at_y = wrap(y + (along - down) * viewer.dy, float(picks))
@@ -135,21 +134,21 @@ def ray_share(
         # Below the fabric plane a yarn is solid down to its back: a ray that clears the back meets none of its walls.
         if family == GAP and visible(back, at_x, at_y, 0.0, UNDER, directions.viewer_behind):
             return GAP, viewer.z, 0.0, 0.0, viewer.z, moved_x, moved_y
-    if hit.what == NOTHING:
+    if hit.what == MISSED:
         return GAP, 0.0, 0.0, 0.0, 0.0, moved_x, moved_y
     surface = surface_at(front, hit.x, hit.y, hit.end, hit.pick)
     family, _, _, nx, ny, nz, _, _, _ = surface
     cos_o = viewer.x * nx + viewer.y * ny + viewer.z * nz
-    if (hit.what == WALL and not choices.rims) or cos_o <= 0.0:
+    if (hit.what == ON_WALL and not choices.rims) or cos_o <= 0.0:
         return family, 0.0, 0.0, 0.0, 0.0, moved_x, moved_y
-    _, area, specular, diffuse, through = yarn_share(
+    _, area, specular, diffuse, through = _yarn_share(
         front, back, hit.x, hit.y, surface, cos_o, viewer.z, directions, choices
     )
     return family, area, specular, diffuse, through, moved_x, moved_y
 
 
 @inlined_kernel
-def yarn_share(
+def _yarn_share(
     front: HeightField, back: HeightField, x: float, y: float, surface: Surface, cos_o: float, area: float,
     directions: Directions, choices: Choices,
 ) -> tuple[int, float, float, float, float]:  # fmt: skip

@@ -74,7 +74,7 @@ def test_a_task_that_fails_on_one_worker_is_tried_on_another(tmp_path, processes
 
 
 OTHER_NUMBA = """
-import jobs.run.software as module
+import jobs.run.crew as module
 found = module.software() | {"numba": "0.1"}
 module.software = lambda: found
 """

@@ -11,12 +11,13 @@ import pytest
 
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import GAP, height_field, surface_at
-from pipeline.truth.geometry.plane import reference_plane
+from pipeline.truth.geometry.pieces import reference_plane
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices, directions_of, point_share
 from pipeline.truth.scattering.thread_colours import component_colours
 from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, direction, equal_queries, woven
+from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.validation import validated
 
@@ -56,7 +57,7 @@ def _from_displaced_points(fabric, query, count=60_000):
 
 
 @pytest.mark.parametrize("fabric", [LOPSIDED, woven("voile"), woven("denim")], ids=["narrow", "open", "closed"])
-@pytest.mark.parametrize(("degrees", "light"), [(30.0, 40.0), (65.0, 20.0), (65.0, 150.0)])
+@pytest.mark.parametrize(("degrees", "light"), [slow(30.0, 40.0), slow(65.0, 20.0), (65.0, 150.0)])
 def test_rays_and_displaced_points_have_the_same_mean(fabric, degrees, light):
     """z-tests of five numbers in nine cases, Šidák-corrected to 1e-3; the light of 150 degrees is behind the cloth."""
     query = equal_queries(direction(light, 100.0), direction(degrees, 25.0), sigma=0.25, centre=(0.8, 1.3))
@@ -73,7 +74,7 @@ def test_rays_and_displaced_points_have_the_same_mean(fabric, degrees, light):
 
 
 @pytest.mark.parametrize("estimator", ["mc", "r2", "owen", "auto"])
-@pytest.mark.parametrize("degrees", [0.0, 50.0, 80.0])
+@pytest.mark.parametrize("degrees", [slow(0.0), slow(50.0), 80.0])
 def test_a_footprint_of_a_repeat_sees_no_parallax(estimator, degrees):
     query = equal_queries(direction(35.0, 200.0), direction(degrees, 70.0), sigma=4.0)
     rays, flat = (_answers(LOPSIDED, query, parallax, estimator) for parallax in (True, False))
@@ -82,16 +83,16 @@ def test_a_footprint_of_a_repeat_sees_no_parallax(estimator, degrees):
     assert (np.abs(rays.transparency - flat.transparency) < 4 * doubt + 1e-6).all()
 
 
-@pytest.mark.parametrize("degrees", [0.0, 45.0, 75.0, 85.0])
+@pytest.mark.parametrize("degrees", [slow(0.0), slow(45.0), 75.0, slow(85.0)])
 def test_the_mean_over_places_does_not_depend_on_the_size_of_the_footprint(degrees):
     """Where no ray meets a wall: warps that never bend, side by side, seen across, of which each hides a part.
 
-    The mean over a lattice of 512 places errs by less than .2 % for a smooth integrand with a few kinks.
+    The mean over a lattice of 256 places errs by less than .2 % for a smooth integrand with a few kinks.
     """
     fabric = woven("denim", ("##", "##"), {"width": 1.0})
     wi, wo = direction(30.0, 120.0), direction(degrees, 0.0)
-    small = equal_queries(wi, wo, sigma=0.03, rows=512)
-    small = small._replace(u=np.float32(np.arange(512) / 256))
+    small = equal_queries(wi, wo, sigma=0.03, rows=256)
+    small = small._replace(u=np.float32(np.arange(256) / 128))
     wide = equal_queries(wi, wo, sigma=4.0)
     near, far = (_answers(fabric, queries).mean.mean(axis=0) @ COLOUR for queries in (small, wide))
     assert near == pytest.approx(far, rel=0.005)
@@ -107,7 +108,7 @@ def test_a_viewer_behind_sees_the_back():
     np.testing.assert_array_equal(behind.mean, front.mean)
 
 
-@pytest.mark.parametrize("walls", ["left_out", "rim"])
+@pytest.mark.parametrize("walls", [slow("left_out"), "rim"])
 def test_with_rims_no_place_weighs_less(walls):
     """A satin, of which a tenth of the rays meet walls; 4,096 places of a lattice, whose mean has an error of .5 %."""
     fabric, wi, wo = woven("satin_8"), direction(30.0, 115.0), direction(60.0, 29.0)

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.truth.geometry.first_hit import NOTHING, WALL, YARN, first_hit, sinking
+from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, ON_YARN, first_hit, sinking
 from pipeline.truth.geometry.heightfield import height_field, surface_at
 from pipeline.truth.geometry.march import ray
-from pipeline.truth.geometry.plane import reference_plane
+from pipeline.truth.geometry.pieces import reference_plane
 from tests.pipeline.truth.cloths import LOPSIDED, cylinders, direction, woven
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at as oracle
@@ -39,18 +39,18 @@ def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
     x, y = random.random((2, 600)) * np.array(fabric.weave.repeat)[:, None]
     theta, azimuth = math.radians(degrees), random.uniform(0.0, 2.0 * math.pi)
     viewer = ray(math.sin(theta) * math.cos(azimuth), math.sin(theta) * math.sin(azimuth), math.cos(theta), curvature)
-    towards, _ = sinking(viewer, 0.0)
+    towards, _, _ = sinking(viewer, field.highest, field.highest)
     hits = [first_hit(field, *at, field.highest, towards) for at in zip(x, y, strict=True)]
     what = np.array([hit.what for hit in hits])
-    distance = np.array([hit.distance if hit.what != NOTHING else NEVER for hit in hits])
+    distance = np.array([hit.distance if hit.what != MISSED else NEVER for hit in hits])
     marched = _marched(fabric, x, y, towards, field.highest, field.lowest)
     # A march steps over slivers of yarn, and finds the rest up to a step too late.
     late = marched - distance
     assert ((late < -1e-6) | (late > STEP + 1e-6)).mean() < 0.01
-    assert (what == YARN).mean() > 0.3
+    assert (what == ON_YARN).mean() > 0.3
 
     # Where a ray meets a yarn, it is on its surface, and comes from above it.
-    for hit in (hit for hit in hits if hit.what == YARN):
+    for hit in (hit for hit in hits if hit.what == ON_YARN):
         _, _, height, nx, ny, nz, _, _, _ = surface_at(field, hit.x, hit.y, hit.end, hit.pick)
         s = hit.distance
         assert height == pytest.approx(field.highest + s * (towards.rise + 0.5 * towards.bend * s), abs=1e-8)
@@ -60,18 +60,19 @@ def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
 
 def test_a_ray_along_the_normal_meets_what_is_seen_from_above():
     field = height_field(load_fabric("voile"))
-    down, along = sinking(ray(0.0, 0.0, 1.0, 0.0), 0.3)
+    down, along, _ = sinking(ray(0.0, 0.0, 1.0, 0.0), field.highest, 0.1)
     met = {first_hit(field, x, y, field.highest, down).what for x in np.linspace(0.0, 1.9, 20) for y in (0.02, 0.5)}
-    assert along == 0.0 and met == {YARN, NOTHING}
+    assert along == 0.0 and met == {ON_YARN, MISSED}
 
 
 def test_rays_meet_walls_where_floats_end():
     """Of denim, where the step between two floats faces the viewer; none along yarns that never end."""
     shares = []
     for fabric in (load_fabric("denim"), cylinders()):
-        field, (towards, _) = height_field(fabric), sinking(ray(*direction(80.0, 20.0), 0.0), 0.0)
+        field = height_field(fabric)
+        towards, _, _ = sinking(ray(*direction(80.0, 20.0), 0.0), field.highest, field.highest)
         hits = [first_hit(field, 0.21 * k, 0.137 * k, field.highest, towards).what for k in range(400)]
-        shares.append(np.mean(np.array(hits) == WALL))
+        shares.append(np.mean(np.array(hits) == ON_WALL))
     assert 0.02 < shares[0] < 0.5 and shares[1] == 0.0
 
 

@@ -2,8 +2,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from jobs.run.crew import Crew
-from jobs.run.software import software
+from jobs.run.crew import Crew, software
 from weaves.errors import WorkFailed
 
 
