@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -102,9 +103,8 @@ def gone(processes, seconds=20.0):
 
 @contextmanager
 def cluster(folder, number):
-    """A scheduler and two workers of their own; yields the scheduler's process and its file."""
-    own = folder / f"scheduler-{number}"
-    own.mkdir()
+    """A scheduler and two workers of their own, in a new folder; yields the scheduler's process and its file."""
+    own = Path(tempfile.mkdtemp(prefix=f"scheduler-{number}-", dir=folder))
     with DaskProcesses(own) as dask:
         for _ in range(2):
             dask.add("--nanny")
