@@ -28,7 +28,7 @@ _INHERITED = ("fastmath", "forceinline")
 class _SelfContained(JITCodeLibrary):
     """A compiled function that runs its own copies of what it calls, and is to its callers what the cache holds.
 
-    Machine code is made, or taken from the cache, when its address is first asked for: what only kernels call has none.
+    Machine code is made, or taken from the cache, when its address is first needed: what only kernels call has none.
     """
 
     _loaded = False
@@ -98,7 +98,7 @@ _set_env: Any = JITCPUCodegen.set_env
 
 
 def _set_env_of_loaded(self: Any, name: str, env: Any) -> None:
-    """Set the environment of a function that has machine code: LLVM ends a process that asks for another's."""
+    """Set the environment of a function that has machine code: LLVM ends a process that looks for another's."""
     if self._engine.is_symbol_defined(name):
         _set_env(self, name, env)
 
