@@ -10,6 +10,8 @@ pipeline.compiled.reproducible sees to it that neither the process nor the order
 compile different kernels at the same time. Of one kernel, one process alone: the others wait and read what it wrote,
 because numba lets two processes overwrite each other's index of a kernel. A kernel is compiled while the locks of its
 callers are held; calls form no circle, so no two processes wait for each other.
+
+What other kernels call is compiled for them alone, in two thirds of the time; if Python calls it too, once more.
 """
 
 from __future__ import annotations
@@ -101,12 +103,19 @@ class _KernelCacheFormat(CompileResultCacheImpl):
 
 
 class _KernelCache(FunctionCache):
+    """Compiled forms of a kernel: one that Python can call, and one for other kernels, without machine code."""
+
     _impl_class = _KernelCacheFormat
+    for_kernels = False
+
+    def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+        return (*super()._index_key(sig, codegen), self.for_kernels)  # type: ignore[no-untyped-call]
 
 
 make_reproducible()
 
 _listeners: list[Callable[[str], None]] = []
+_compiling: list[str] = []  # kernels that wait for those that they call
 
 
 @contextmanager
@@ -132,18 +141,34 @@ def _decorator(allocates: bool = False, **flags: Any) -> Callable[[_Function], _
 
     def decorate(function: _Function) -> _Function:
         dispatcher: Any = compiled(function)
-        dispatcher._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
-        folder = Path(dispatcher._cache.cache_path)
-        compile_or_load = dispatcher.compile
+        cache = dispatcher._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
+        folder = Path(cache.cache_path)
+        compile_or_load, add_overload = dispatcher.compile, dispatcher.add_overload
+        for_kernels: set[Any] = set()
         name = f"{function.__module__}.{function.__qualname__}-{function.__code__.co_firstlineno}"
+
+        def add(result: Any) -> None:
+            if cache.for_kernels:
+                dispatcher.overloads[result.signature.args] = result
+                for_kernels.add(result.signature.args)
+            else:
+                add_overload(result)
 
         def compile_alone(signature: Any) -> Any:
             # This process's compiler first, then the kernel's file; a process that dies releases both.
             with global_compiler_lock:
                 folder.mkdir(parents=True, exist_ok=True)
-                # A lock made before a fork would refuse to work in the child.
-                with FileLock(folder / f"{name}.lock", thread_local=False):
-                    result = compile_or_load(signature)
+                cache.for_kernels = dispatcher.targetoptions["no_cpython_wrapper"] = bool(_compiling)
+                if not _compiling and signature in for_kernels:
+                    for_kernels.remove(signature)
+                    del dispatcher.overloads[signature]
+                _compiling.append(name)
+                try:
+                    # A lock made before a fork would refuse to work in the child.
+                    with FileLock(folder / f"{name}.lock", thread_local=False):
+                        result = compile_or_load(signature)
+                finally:
+                    _compiling.pop()
             returned = list(dispatcher.overloads.values())[-1].signature.return_type
             if not allocates and _holds_array(returned):
                 raise TypeError(f"{name} returns {returned}: it must be an allocating_kernel")
@@ -151,7 +176,7 @@ def _decorator(allocates: bool = False, **flags: Any) -> Callable[[_Function], _
                 listener(name)
             return result
 
-        dispatcher.compile = compile_alone
+        dispatcher.compile, dispatcher.add_overload = compile_alone, add
         return cast(_Function, dispatcher)
 
     return decorate

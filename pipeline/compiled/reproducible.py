@@ -18,7 +18,7 @@ from typing import Any
 
 from llvmlite import binding
 from numba.core.base import BaseContext
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.cpu import CPUTargetOptions
 from numba.core.registry import cpu_target
 
@@ -26,15 +26,35 @@ _INHERITED = ("fastmath", "forceinline")
 
 
 class _SelfContained(JITCodeLibrary):
-    """A compiled function that runs its own copies of what it calls, and is to its callers what the cache holds."""
+    """A compiled function that runs its own copies of what it calls, and is to its callers what the cache holds.
+
+    Machine code is made, or taken from the cache, when its address is first needed: what only kernels call has none.
+    """
+
+    _loaded = False
 
     def _finalize_final_module(self) -> None:
-        # One read from the cache has its code for callers already, and is finished.
-        if self._shared_module is None:
-            self._shared_module = self._for_callers()
+        self._shared_module = self._for_callers()
+        self._compiled_object, self._finalized = b"", True
+
+    def get_pointer_to_function(self, name: str) -> Any:
+        self._ensure_finalized()  # type: ignore[no-untyped-call]
+        if not self._loaded and any(function.name == name for function in _defined(self._shared_module)):
+            self._loaded = True
             for function in _defined(self._final_module, binding.Linkage.linkonce_odr):
                 function.linkage = binding.Linkage.internal
-        super()._finalize_final_module()  # type: ignore[no-untyped-call]
+            super()._finalize_final_module()  # type: ignore[no-untyped-call]
+            self._codegen._engine._load_defined_symbols(self._shared_module)  # type: ignore[no-untyped-call]
+        return super().get_pointer_to_function(name)  # type: ignore[no-untyped-call]
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: tuple[str, str, tuple[bytes, bytes]]) -> _SelfContained:
+        name, _, (machine_code, bitcode) = state
+        self: _SelfContained = codegen.create_library(name)
+        self.enable_object_caching()  # type: ignore[no-untyped-call]
+        self._set_compiled_object(machine_code)  # type: ignore[no-untyped-call]
+        self._shared_module, self._finalized = binding.parse_bitcode(bitcode), True
+        return self
 
     def _for_callers(self) -> binding.ModuleRef:
         """Return the optimised code before machine code is made of it, by way of bytes like all that is cached."""
@@ -44,9 +64,10 @@ class _SelfContained(JITCodeLibrary):
         return binding.parse_bitcode(shared.as_bitcode())
 
 
-def _defined(module: binding.ModuleRef, linkage: binding.Linkage) -> list[binding.ValueRef]:
-    """Return the functions that a module defines with this linkage."""
-    return [function for function in module.functions if not function.is_declaration and function.linkage == linkage]
+def _defined(module: binding.ModuleRef, linkage: binding.Linkage | None = None) -> list[binding.ValueRef]:
+    """Return the functions that a module defines, of this linkage if there is one."""
+    functions = [function for function in module.functions if not function.is_declaration]
+    return [function for function in functions if linkage is None or function.linkage == linkage]
 
 
 class _OwnFlags(CPUTargetOptions):
@@ -73,8 +94,18 @@ def _compile_by_flags(self: BaseContext, *arguments: Any, **keywords: Any) -> An
     return _compile_subroutine(self, *arguments, **keywords)
 
 
+_set_env: Any = JITCPUCodegen.set_env
+
+
+def _set_env_of_loaded(self: Any, name: str, env: Any) -> None:
+    """Set the environment of a function that has machine code: LLVM ends a process that looks for another's."""
+    if self._engine.is_symbol_defined(name):
+        _set_env(self, name, env)
+
+
 def make_reproducible() -> None:
     """Replace these parts of numba's compiler in this process, before anything is compiled."""
     cpu_target.target_context.codegen()._library_class = _SelfContained
     cpu_target.options = _OwnFlags
     BaseContext.compile_subroutine = _compile_by_flags  # type: ignore[method-assign]
+    JITCPUCodegen.set_env = _set_env_of_loaded  # type: ignore[method-assign]

@@ -77,8 +77,14 @@ def colours_with(folder: Path, name: str, factor: float, size: tuple[int, int]) 
     return np.load(out)
 
 
-def main(fabrics: int = 6, queries: int = 400, factor: float = 1.5, out: Path | None = None) -> None:
-    """Print the errors with each constant changed; with `out`, only answer, and write the colours there."""
+def main(
+    fabrics: int = 6,
+    queries: int = 400,
+    factor: float = 1.5,
+    constant: list[str] | None = None,
+    out: Path | None = None,
+) -> None:
+    """Print the errors with each constant changed, or those named; with `out`, only answer, and write the colours."""
     if out:
         answer(fabrics, queries, out)
         return
@@ -92,7 +98,8 @@ def main(fabrics: int = 6, queries: int = 400, factor: float = 1.5, out: Path | 
 
     in_use = error(np.array([SoftNodes().predict(*cloth) @ COLOUR_WEIGHTS for cloth in drawn]))
     with tempfile.TemporaryDirectory() as folder:
-        for name, (file, _) in CONSTANTS.items():
+        for name in constant or CONSTANTS:
+            file = CONSTANTS[name][0]
             colours = {one: colours_with(Path(folder), name, one, (fabrics, queries)) for one in (1.0 / factor, factor)}
             errors = {1.0: in_use} | {one: error(values) for one, values in colours.items()}
             shown = ", ".join(f"x {one:.2f}: {errors[one]:.2%}" for one in sorted(errors))

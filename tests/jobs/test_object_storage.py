@@ -247,7 +247,7 @@ def test_a_run_ends_when_its_storage_fails_for_too_long_and_goes_on_later(switch
 
 
 @pytest.mark.slow
-def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, call):
+def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, recipe, call):
     address = "s3://products/run"
     code, said, told = call("run", address, "--workers", "1")
     assert code == 0 and f"the page: {address}/report/stored/index.html" in said, told
@@ -264,8 +264,11 @@ def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, call):
     assert call("check", address)[0] == 1
     assert call("check", address, "--repair", "--workers", "1")[0] == 0
     assert weights.read_bytes() == whole[0] and picture.exists()
-    # Another recipe needs none of it.
-    code, said, _ = call("prune", address, "--delete", recipe=small(tmp_path, "other", seed=9))
+    # Another recipe needs none of it but what both measure without the data set.
+    other = small(tmp_path, "other", seed=9)
+    code, said, _ = call("prune", address, "--delete", recipe=other)
     assert code == 0 and "files removed" in said
-    left = [str(path.relative_to(there)) for path in there.rglob("*") if path.is_file()]
-    assert sorted(left) == ["ledger/lock", "report/stored/results.md"]
+    first, second = ({task.id: task.products for task in plan(load_recipe(path))} for path in (recipe, other))
+    shared = {path for id in first.keys() & second.keys() for path in (f"ledger/{id}.json", *first[id])}
+    left = {str(path.relative_to(there)) for path in there.rglob("*") if path.is_file()}
+    assert left == shared | {"ledger/lock", "report/stored/results.md"}

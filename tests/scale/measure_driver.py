@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import io
 import json
-import os
 import resource
 import subprocess
 import sys
@@ -35,8 +34,6 @@ from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from tests.jobs.dask_processes import DaskProcesses
-
-PATH = os.pathsep.join([str(Path(__file__).parents[2]), str(Path(__file__).parent)])
 
 RECIPE = """
 name = "many"
@@ -78,6 +75,9 @@ def timed(count: int, function: Callable[[], object]) -> dict[str, float]:
 
 def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
     """Measure a number of tasks in this process; on a cluster of its own if `here`."""
+    # Other processes would not find the class of `__main__`.
+    from tests.scale import measure_driver as importable
+
     result = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -85,9 +85,7 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
         recipe = load_recipe(write_many(folder, count - 2))
         parts: list[Shard] = []
         result["plan"] = timed(count, lambda: parts.extend(plan(recipe)))  # type: ignore[arg-type]
-        sys.modules["measure_driver"] = sys.modules["__main__"]
-        ShortShard.__module__ = "measure_driver"
-        tasks = [ShortShard.model_construct(**dict(part)) for part in parts if isinstance(part, Shard)]
+        tasks = [importable.ShortShard.model_construct(**dict(part)) for part in parts if isinstance(part, Shard)]
         parts.clear()
 
         def run() -> None:
@@ -104,7 +102,7 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
         else:
             with DaskProcesses(folder) as dask:
                 for _ in range(2):
-                    dask.add("--nthreads", "8", PYTHONPATH=PATH)
+                    dask.add("--nthreads", "8")
                 connection = dask.given
                 result["run"] = timed(count, run)
         result["resume"] = timed(count, run)

@@ -159,6 +159,9 @@ print(*sorted({name.rpartition("-")[0].rpartition(".")[2] for name in names}))
 small.twice(x)
 (code,) = small.twice.inspect_asm().values()
 print("call" in code and "smooth" in code, *re.findall(r"[.]weak\\s+(\\S+)", code))
+print(*(result.library._loaded for result in small.smooth.overloads.values()))
+small.smooth(x, np.zeros(5, np.float32))
+print(*(result.library._loaded for result in small.smooth.overloads.values()))
 print(*sorted(f"{path.name}:{path.stat().st_mtime_ns}" for path in Path(sys.argv[1]).rglob("*.nbc")))
 """
 
@@ -166,13 +169,14 @@ print(*sorted(f"{path.name}:{path.stat().st_mtime_ns}" for path in Path(sys.argv
 def test_copies_of_the_tree_and_forks_share_kernels_that_run_their_own_copies(copies, tmp_path, monkeypatch):
     """Each kernel is announced when it is compiled; a child of a fork compiles too.
 
-    A weak function is one that the linker replaces by whatever of its name came into the process first.
+    A weak function is one that the linker replaces by whatever of its name came into the process first. `smooth` has
+    machine code only after Python has called it.
     """
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     first, second = (answers(start(copy, CACHED, str(tmp_path / "kernels"))) for copy in copies[:2])
     *lines, compiled = first.splitlines()
-    assert lines == ["child 0", "fast inverse_length shared", "True"]
-    assert second.splitlines()[-1] == compiled and len(compiled.split()) == 6
+    assert lines == ["child 0", "fast inverse_length shared", "True", "False", "True"]
+    assert second.splitlines()[-1] == compiled and len(compiled.split()) == 7
     assert not list(copies[0].rglob("*.nbc"))
 
 
