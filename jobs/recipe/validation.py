@@ -167,7 +167,7 @@ def _check_models(recipe: Recipe, where: str) -> None:
             allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
             raise BadInput(where, f"models.{index}.name", options.name, allowed)
         for name in () if options.any_physics else _LEARNT:
-            if (value := getattr(truth, name)) != (own := getattr(_PLAIN, name)):
+            if (value := getattr(truth, name)) != (own := getattr(options, name, getattr(_PLAIN, name))):
                 allowed = f"{options.name} (models.{index}) knows {name} = {own!r} only"
                 raise BadInput(where, f"dataset.truth.{name}", value, allowed)
         footprint = getattr(options, "footprint", truth.footprint)

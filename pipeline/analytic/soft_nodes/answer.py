@@ -9,6 +9,9 @@ the narrower one < `SoftNodeTable.narrow`,
     the wider one < `LONG`           nodes placed in the footprint, a second time where it is almost hidden
 else                                 densities of both axes, which fixed nodes resolve from `RESOLVED` on
 
+A footprint of view rays (`SoftNodeTable.parallax`) has its own ways: the cloth evenly, nodes on view lines below
+`SoftNodeTable.view_lines` unless they were too many, else the density where the viewer sees each fixed node.
+
 Deviations are compared along a footprint's own axes. For a rotated footprint densities are a mixture
 (pipeline.truth.footprint.mixture), waves and lines are exact, and other nodes are placed in a footprint along the
 yarns of equal area.
@@ -23,10 +26,11 @@ import numpy as np
 
 from pipeline.analytic.soft_horizons import around
 from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, ellipse, most_nodes
-from pipeline.analytic.soft_nodes.narrow import LONG, MOST_OF_FOOTPRINT, sum_ellipse, sum_round
+from pipeline.analytic.soft_nodes.narrow import LONG, MOST_OF_FOOTPRINT, sum_ellipse, sum_round, sum_view_lines
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
-from pipeline.analytic.soft_nodes.scratch import Scratch, SoftQuery, scratch_for
+from pipeline.analytic.soft_nodes.scratch import MOST_ON_LINES, Scratch, SoftQuery, scratch_for
 from pipeline.analytic.soft_nodes.shade import NODE_SUMS
+from pipeline.analytic.soft_nodes.view_lines import nodes_on_lines
 from pipeline.analytic.soft_nodes.wide import NARROW, sum_fixed
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, kernel
@@ -81,6 +85,17 @@ def sum_queries(
     return result, gaps
 
 
+@kernel
+def _rises(table: SoftNodeTable, wo: Float32, bend: np.float32) -> bool:
+    """Return whether rays over curved cloth rise again before they have sunk to the least height that is seen.
+
+    They may meet a yarn as they rise, which view lines do not know: then the footprint counts as one of the fabric
+    plane.
+    """
+    depth = np.float32(table.plane) - table.shown[0]
+    return bool(wo[2] * wo[2] < np.float32(2.0) * bend * (wo[0] * wo[0] + wo[1] * wo[1]) * depth)
+
+
 # Not in `sum_queries`: what allocates counts references to every slice, a third of the time of a query.
 @kernel
 def _sum_rows(
@@ -123,7 +138,12 @@ def _sum_rows(
             x, y, dx, dy, rho, narrowest, wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2], low_i, high_i,
             turn_i, low_o, high_o, turn_o, bend_i, bend_o,
         )  # fmt: skip
-        if thin:
+        if table.parallax and not _rises(table, wo[n], bend_o):
+            if narrowest < table.view_lines and nodes_on_lines(dx, dy, narrowest) <= MOST_ON_LINES:
+                gaps[n] = sum_view_lines(table, scratch, look, result[n])
+            else:
+                gaps[n] = sum_fixed(table, scratch, look, widest, result[n])
+        elif thin:
             gaps[n] = sum_ellipse(table, scratch, look, shape, result[n])
         elif min(near_x, near_y) < table.narrow and max(near_x, near_y) < LONG:
             gaps[n] = sum_round(table, scratch, look, near_x, near_y, result[n])

@@ -30,7 +30,7 @@ from pipeline.analytic.soft_nodes.nodes import (
 )
 from pipeline.analytic.soft_nodes.shade import ALONG, COS, HALF_ALONG, HALF_V, LIMIT, SIN, TURN, WEIGHT, GridHorizons
 from pipeline.compiled.arrays import Float32, Index
-from pipeline.compiled.decorators import kernel
+from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.compiled.float32 import arcsine, remaining
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, WARP, WEFT
 
@@ -110,7 +110,7 @@ def sharpness_of(shape: Ellipse) -> np.float32:
 
 
 @kernel
-def _next_cut(place: float, forward: bool, radius: float) -> float:
+def next_cut(place: float, forward: bool, radius: float) -> float:
     """Return the next border of a piece along an axis, of cells and of yarns of a radius."""
     cell = math.floor(place + _NEAREST) if forward else math.ceil(place - _NEAREST) - 1
     inside = place - cell
@@ -124,18 +124,18 @@ def _next_cut(place: float, forward: bool, radius: float) -> float:
     return cell + low if inside > low + _NEAREST and radius < 0.5 else float(cell)
 
 
-@kernel
-def _piece_at(table: SoftNodeTable, cell: int, x: np.float32, y: np.float32) -> int:
+@inlined_kernel
+def piece_at(piece_starts: Index, bounds: Float32, cell: int, x: np.float32, y: np.float32) -> int:
     """Return the piece of a cell at a place within it, -1 if there is none."""
-    for p in range(table.piece_starts[cell], table.piece_starts[cell + 1]):
-        box = table.bounds[p]
+    for p in range(piece_starts[cell], piece_starts[cell + 1]):
+        box = bounds[p]
         if box[X_LOW] <= x <= box[X_HIGH] and box[Y_LOW] <= y <= box[Y_HIGH]:
             return p
     return -1
 
 
 @kernel
-def _in_grid(box: Float32, family: int, radius: np.float32, x: np.float32, y: np.float32, size: int) -> int:
+def in_grid(box: Float32, family: int, radius: np.float32, x: np.float32, y: np.float32, size: int) -> int:
     """Return the cell of a piece's grid at a place, counted from its first; cells are even in v across a yarn."""
     count = np.float32(size)
     last = count - np.float32(0.01)
@@ -150,7 +150,7 @@ def _in_grid(box: Float32, family: int, radius: np.float32, x: np.float32, y: np
 
 
 @kernel
-def _write_node(
+def write_node(
     nodes: Float32,
     k: int,
     piece: Float32,
@@ -205,16 +205,22 @@ def place_ellipse(
             # The next cut along either axis.
             after = reach
             if abs(dx) > _NEAREST:
-                cut = _next_cut(x0 + t * dx, dx > 0.0, warp_radius)
+                cut = next_cut(x0 + t * dx, dx > 0.0, warp_radius)
                 after = min(after, max((cut - x0) / dx, t + _NEAREST))
             if abs(dy) > _NEAREST:
-                cut = _next_cut(y0 + t * dy, dy > 0.0, weft_radius)
+                cut = next_cut(y0 + t * dy, dy > 0.0, weft_radius)
                 after = min(after, max((cut - y0) / dy, t + _NEAREST))
             half, middle = 0.5 * (after - t), 0.5 * (after + t)
             t = after
             column, row = math.floor(x0 + middle * dx), math.floor(y0 + middle * dy)
             cell = (row % picks) * ends + column % ends
-            p = _piece_at(table, cell, np.float32(x0 + middle * dx - column), np.float32(y0 + middle * dy - row))
+            p = piece_at(
+                table.piece_starts,
+                table.bounds,
+                cell,
+                np.float32(x0 + middle * dx - column),
+                np.float32(y0 + middle * dy - row),
+            )
             if p < 0 or half < _NEAREST:
                 continue
             family, first, box = table.pieces[p, FAMILY], table.pieces[p, BLOCK] * per_grid, table.bounds[p]
@@ -226,7 +232,7 @@ def place_ellipse(
                 length, at = half * _WEIGHTS[rule, i], middle + half * _PLACES[rule, i]
                 in_x, in_y = np.float32(x0 + at * dx - column), np.float32(y0 + at * dy - row)
                 weight = np.float32(of_line * length) * remaining(np.float32(0.5 * (at / shape.major) ** 2))
-                place = first + _in_grid(box, family, radius, in_x, in_y, size)
+                place = first + in_grid(box, family, radius, in_x, in_y, size)
                 if family == GAP:
                     low, high = viewer.grid[place + viewer.low], viewer.grid[place + viewer.high]
                     gaps += weight * oz * ramp(above(level, np.float32(low), np.float32(high), viewer.turn, sharp))
@@ -234,7 +240,7 @@ def place_ellipse(
                 k = stops[kind]
                 box_x = np.float32(0.5 * (length * abs(dx) + shape.apart * abs(dy)))
                 box_y = np.float32(0.5 * (length * abs(dy) + shape.apart * abs(dx)))
-                _write_node(nodes[kind], k, box, family, radius, in_x, in_y, box_x, box_y, weight)
+                write_node(nodes[kind], k, box, family, radius, in_x, in_y, box_x, box_y, weight)
                 cells[kind, k] = place
                 stops[kind] = k + 1
     return gaps

@@ -88,7 +88,7 @@ def nodes_for(length: np.float32, most: int) -> int:
 
 
 @fast_kernel
-def _sine_cosine(v: np.float32) -> tuple[np.float32, np.float32]:
+def sine_cosine(v: np.float32) -> tuple[np.float32, np.float32]:
     """Return sine and cosine of |v| <= pi/2."""
     w = v * v
     series = np.float32(-1 / 5040) + w * np.float32(1 / 362880)
@@ -154,7 +154,7 @@ def place_nodes(
         area = half_v * radius * inverse_a * _INVERSE_ROOT
         for k in range(8):
             v = middle_v + half_v * _GAUSS_PLACES[across, k]
-            sv, cv = _sine_cosine(v)
+            sv, cv = sine_cosine(v)
             da = (radius * sv - centre_a) * inverse_a
             line[0, k], line[1, k] = sv, cv
             line[2, k] = area * _GAUSS_WEIGHTS[across, k] * cv * remaining(_HALF * da * da)
@@ -187,22 +187,22 @@ def place_nodes(
     nodes, k = scratch.nodes[kind], scratch.stops[kind]
     for j in range(along):
         # Along a weft, y of its frame runs against x.
-        _write(nodes[SIN], k, line[0])
-        _write(nodes[COS], k, line[1])
-        _fill(nodes[ALONG], k, line[5, j] if warp else -line[5, j])
-        _write(nodes[HALF_V], k, line[4])
-        _fill(nodes[HALF_ALONG], k, line[8, j])
-        _write_times(nodes[WEIGHT], k, line[2], line[6, j])
-        _fill(nodes[TURN], k, bounds[CURVE])
-        _fill(nodes[LIMIT], k, bounds[BOUND])
-        _shift(scratch.cells[kind], k, offsets, np.uint32(first + int(line[7, j]) * step_b))
+        write_eight(nodes[SIN], k, line[0])
+        write_eight(nodes[COS], k, line[1])
+        fill_eight(nodes[ALONG], k, line[5, j] if warp else -line[5, j])
+        write_eight(nodes[HALF_V], k, line[4])
+        fill_eight(nodes[HALF_ALONG], k, line[8, j])
+        write_eight_times(nodes[WEIGHT], k, line[2], line[6, j])
+        fill_eight(nodes[TURN], k, bounds[CURVE])
+        fill_eight(nodes[LIMIT], k, bounds[BOUND])
+        shift_eight(scratch.cells[kind], k, offsets, np.uint32(first + int(line[7, j]) * step_b))
         k += across
     scratch.stops[kind] = k
 
 
 # Eight statements in place of a loop: they become one instruction, which a loop over arrays that may overlap does not.
 @inlined_fast_kernel
-def _write(row: Float32, k: int, values: Float32) -> None:
+def write_eight(row: Float32, k: int, values: Float32) -> None:
     """Write eight numbers from `k` on."""
     v0, v1, v2, v3 = values[0], values[1], values[2], values[3]
     v4, v5, v6, v7 = values[4], values[5], values[6], values[7]
@@ -211,7 +211,7 @@ def _write(row: Float32, k: int, values: Float32) -> None:
 
 
 @inlined_fast_kernel
-def _write_times(row: Float32, k: int, values: Float32, f: np.float32) -> None:
+def write_eight_times(row: Float32, k: int, values: Float32, f: np.float32) -> None:
     """Write eight numbers times a factor from `k` on."""
     v0, v1, v2, v3 = f * values[0], f * values[1], f * values[2], f * values[3]
     v4, v5, v6, v7 = f * values[4], f * values[5], f * values[6], f * values[7]
@@ -220,7 +220,7 @@ def _write_times(row: Float32, k: int, values: Float32, f: np.float32) -> None:
 
 
 @inlined_fast_kernel
-def _fill(row: Float32, k: int, value: np.float32) -> None:
+def fill_eight(row: Float32, k: int, value: np.float32) -> None:
     """Write a number eight times from `k` on."""
     own = row[k : k + 8]
     own[0], own[1], own[2], own[3], own[4], own[5], own[6], own[7] = (
@@ -229,7 +229,7 @@ def _fill(row: Float32, k: int, value: np.float32) -> None:
 
 
 @inlined_fast_kernel
-def _shift(row: npt.NDArray[np.uint32], k: int, values: npt.NDArray[np.uint32], shift: np.uint32) -> None:
+def shift_eight(row: npt.NDArray[np.uint32], k: int, values: npt.NDArray[np.uint32], shift: np.uint32) -> None:
     """Write eight numbers plus another one from `k` on."""
     v0, v1, v2, v3 = values[0] + shift, values[1] + shift, values[2] + shift, values[3] + shift
     v4, v5, v6, v7 = values[4] + shift, values[5] + shift, values[6] + shift, values[7] + shift

@@ -42,6 +42,8 @@ class Detail(NamedTuple):
         Most nodes along each axis of a piece that a narrow footprint covers in part.
     narrow : float
         Deviation, in yarn spacings, below which a footprint places its nodes; at most `NARROW`.
+    lines : float
+        The same of a footprint of view rays, which places them on lines.
     """
 
     most: int
@@ -49,13 +51,14 @@ class Detail(NamedTuple):
     parts: int
     legendre: int
     narrow: float
+    lines: float
 
 
 DETAILS: Final = {
-    1: Detail(most=64, along=0.5, parts=1, legendre=5, narrow=0.15),
-    2: Detail(most=256, along=1.0, parts=1, legendre=6, narrow=0.25),
-    4: Detail(most=1024, along=1.0, parts=2, legendre=6, narrow=0.25),
-    8: Detail(most=2048, along=2.0, parts=2, legendre=6, narrow=0.25),
+    1: Detail(most=64, along=0.5, parts=1, legendre=5, narrow=0.15, lines=0.15),
+    2: Detail(most=256, along=1.0, parts=1, legendre=6, narrow=0.25, lines=0.3),
+    4: Detail(most=1024, along=1.0, parts=2, legendre=6, narrow=0.25, lines=0.5),
+    8: Detail(most=2048, along=2.0, parts=2, legendre=6, narrow=0.25, lines=0.8),
 }
 """The details of every level k."""
 

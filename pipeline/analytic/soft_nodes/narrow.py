@@ -22,6 +22,7 @@ from pipeline.analytic.soft_nodes.footprint_nodes import (
     gap_area,
     place_nodes,
 )
+from pipeline.analytic.soft_nodes.line_nodes import LineRays, shade_lines, shade_lines_behind
 from pipeline.analytic.soft_nodes.nodes import BLOCK, FAMILY, X_HIGH, X_LOW, Y_HIGH, Y_LOW, SoftNodeTable
 from pipeline.analytic.soft_nodes.scratch import Scratch, SoftQuery
 from pipeline.analytic.soft_nodes.shade import (
@@ -37,6 +38,7 @@ from pipeline.analytic.soft_nodes.shade import (
     shade_footprint_behind,
     write_sums,
 )
+from pipeline.analytic.soft_nodes.view_lines import ViewRay, place_on_view_lines
 from pipeline.analytic.soft_nodes.wide import NARROW
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_kernel, kernel
@@ -56,7 +58,9 @@ MOST_OF_FOOTPRINT: Final = max(3 * _MOST_CELLS * MOST_ACROSS**2, MOST)
 """Most nodes of a kind of yarn that a footprint places."""
 
 _LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
-_0 = np.float32(0.0)
+_0, _1 = np.float32(0.0), np.float32(1.0)
+_STRAIGHT = np.float32(1e-6)
+_BETWEEN = np.float32(0.1)  # deviation of the box of a node on a line
 
 
 @kernel
@@ -189,4 +193,39 @@ def sum_round(
     if parts > 1 and seen < np.float32(HIDDEN_SHARE) * look.oz:
         for q in (DIFFUSE, SPECULAR, OPEN_DIFFUSE, OPEN_SPECULAR):
             result[:, q] = _0
+    return gaps
+
+
+@inlined_kernel
+def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: Float32) -> np.float32:
+    """Write the sums of a footprint of view rays (K, NODE_SUMS), and return the area seen through gaps."""
+    run = np.hypot(look.ox, look.oy)
+    dx, dy = (look.ox / run, look.oy / run) if run > _STRAIGHT else (_1, _0)
+    run = run / look.oz
+    ray = ViewRay(float(dx), float(dy), float(run), float(look.bend_o), table.plane)
+    gaps, inverse = place_on_view_lines(table, scratch, look, ray)
+    rays = LineRays(run, np.float32(table.plane), np.float32(2.0) * look.bend_o * run * run, inverse)
+    back, of_warp, size = look.iz < _0, table.kinds[0], table.grid.shape[2]
+    grid = scratch.behind_grid if back else scratch.grid
+    light = GridHorizons(grid, *_offsets(table, look.low_i, look.high_i), look.turn_i)
+    sharp, thickness = sharpness_of_points(min(look.narrowest, _BETWEEN)), np.float32(table.thickness)
+    falls, fall = scratch.grid_falls, bend_of(look.bend_i)
+    for kind in range(len(result)):
+        count = scratch.stops[kind]
+        if count == 0:
+            continue
+        family = 0 if kind < of_warp else 1
+        d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
+        draft, firsts, yarn, own = scratch.drafts[kind], scratch.firsts[kind, :count], table.yarn[family], result[kind]
+        if back:
+            sums = shade_lines_behind(draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness)
+            write_sums(sums, own)
+        elif look.bend_i > _0:
+            write_sums(
+                shade_lines(draft, firsts, rays, light, falls, fall, size, sharp, d, yarn, family, thickness), own
+            )
+        else:
+            write_sums(
+                shade_lines(draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness), own
+            )
     return gaps

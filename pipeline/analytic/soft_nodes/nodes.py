@@ -11,6 +11,7 @@ different pieces there are, the coarser they are, so that a table stays near a m
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, Final, NamedTuple
 
@@ -32,7 +33,17 @@ from pipeline.analytic.soft_nodes.groups import (
 from pipeline.analytic.soft_nodes.waves import TOGETHER, tabulate_waves
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import ClothSide, cloth_side
-from pipeline.truth.geometry.heightfield import GAP, HALF_LENGTH, TOP, WARP, WEFT, HeightField
+from pipeline.truth.geometry.heightfield import (
+    BEND,
+    GAP,
+    HALF_LENGTH,
+    TOP,
+    WARP,
+    WEFT,
+    HeightField,
+    height_beneath,
+    torus_height,
+)  # fmt: skip
 from pipeline.truth.geometry.horizon import horizon_sines, horizons
 from pipeline.truth.geometry.pieces import CellPiece, cell_pieces, longest_period, orbits
 from pipeline.truth.options import TruthOptions
@@ -47,6 +58,9 @@ LEVELS: Final = 255.0
 UPPER: Final = np.float32(4e-3)
 """Cells of a grid: a place so near below the border of two belongs to the upper one. The middle of a piece is such a
 border and often a node; how a processor rounds must not decide."""
+
+LINES_A_BLOCK: Final = BLOCK_NODES // COLUMNS
+"""Lines of nodes in a block."""
 
 _GRID_BYTES = 1 << 20
 _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
@@ -104,6 +118,8 @@ class SoftNodeTable(NamedTuple):
         The pieces of cell c are those from piece_starts[c] to piece_starts[c + 1].
     pieces : int64 (P, 2)
         Family, grid.
+    floats : float64 (P, 4)
+        Row of `HeightField.floats`.
     bounds : float32 (P, 7)
         Extent in x and y within the cell; offset, curve (negative beneath) and largest sine of the inclination.
     grid : uint8 (grids, AZIMUTHS, cells along y, cells along x)
@@ -118,6 +134,18 @@ class SoftNodeTable(NamedTuple):
         Most nodes along each axis of a piece that a narrow footprint covers in part.
     narrow : float32
         Deviation below which a footprint places its nodes.
+    heights : float64 (2, 8)
+        `HeightField.yarn` in double precision, in which heights are found.
+    highest, lowest, plane : float
+        Those of the height field, and the height of the reference plane.
+    spots : float32 (lines, 4, COLUMNS)
+        Of every line of nodes: places in x and y from the corner of the cell, shares of the cell, heights.
+    shown : float32 (2,)
+        Least and greatest of these heights.
+    view_lines : float
+        Deviation below which a footprint of rays places its nodes on lines.
+    parallax : bool
+        Whether footprints are patches of view rays.
     """
 
     repeat: Index
@@ -146,6 +174,8 @@ class SoftNodeTable(NamedTuple):
     piece_starts: Index
     pieces: Index
     bounds: Float32
+    floats: Float64
+    extents: Float64
     grid: npt.NDArray[np.uint8]
     behind_mean: Float32
     behind_sharpness: Float32
@@ -154,15 +184,29 @@ class SoftNodeTable(NamedTuple):
     grid_falls: npt.NDArray[np.uint8]
     legendre: int
     narrow: np.float32
+    heights: Float64
+    highest: float
+    lowest: float
+    plane: float
+    spots: Float32
+    shown: Float32
+    view_lines: float
+    parallax: bool
 
 
 def tabulate(
-    fabric: Fabric, by_thread: bool = False, behind: bool = False, level: int = USUAL, curved: bool = False
+    fabric: Fabric,
+    by_thread: bool = False,
+    behind: bool = False,
+    level: int = USUAL,
+    curved: bool = False,
+    parallax: bool = False,
 ) -> SoftNodeTable:
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
     With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind,
-    with `curved` cloth that is curved towards the viewer. `level` is one of DETAILS.
+    with `curved` cloth that is curved towards the viewer. `level` is one of DETAILS. With `parallax` a footprint is a
+    patch of view rays.
     """
     detail = DETAILS[level]
     model = cloth_side(fabric, TruthOptions())
@@ -222,6 +266,8 @@ def tabulate(
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
+    spots = _spots(front, groups, rules)
+    heights = spots[:, 3][spots[:, 2] > 0.0]
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
@@ -246,7 +292,7 @@ def tabulate(
         waves=waves.periods,
         wave_size=waves.size,
         wave_nodes=_together(waves.nodes),
-        **_piece_columns(located),
+        **_piece_columns(front, located),
         grid=grid,
         behind_mean=_in_blocks(behind_mean),
         behind_sharpness=_in_blocks(_sharpness(behind_variance)),
@@ -255,7 +301,45 @@ def tabulate(
         grid_falls=grid_falls,
         legendre=detail.legendre,
         narrow=np.float32(detail.narrow),
+        heights=front.yarn,
+        highest=front.highest,
+        lowest=front.lowest,
+        plane=model.plane,
+        spots=spots,
+        shown=np.array([heights.min(), heights.max()], np.float32),
+        view_lines=detail.lines,
+        parallax=parallax,
     )
+
+
+def _spots(front: HeightField, groups: list[PieceGroup], rules: list[tuple[Rule, Rule]]) -> Float32:
+    """Return place in the cell, share of the cell and height of the nodes, (lines, 4, COLUMNS), whole blocks a kind."""
+    found = []
+    kind_before: tuple[int, int] | None = None
+    for group, (across, along) in zip(groups, rules, strict=True):
+        kind = (group.piece.family, group.thread)
+        if kind != kind_before and len(found) % LINES_A_BLOCK:
+            found += [np.zeros((4, COLUMNS))] * (LINES_A_BLOCK - len(found) % LINES_A_BLOCK)
+        kind_before = kind
+        a, share_a = (np.pad(v, (0, COLUMNS - len(v))) for v in (across.places, across.weights))
+        for place, share in zip(along.places, along.weights, strict=True):
+            b = np.full(COLUMNS, place)
+            x, y = (b, a) if group.piece.family == WEFT else (a, b)
+            found.append(np.stack([x, y, share_a * share, _heights(front, group.piece, a, place)]))
+    if len(found) % LINES_A_BLOCK:
+        found += [np.zeros((4, COLUMNS))] * (LINES_A_BLOCK - len(found) % LINES_A_BLOCK)
+    return np.ascontiguousarray(found, np.float32)
+
+
+def _heights(front: HeightField, piece: CellPiece, across: Float64, place: float) -> Float64:
+    """Return the heights of a piece at places across it."""
+    if piece.family == GAP:
+        return np.zeros(COLUMNS)
+    yarn = front.yarn[piece.family]
+    bend = 1.0 / piece.curve if piece.curve else 0.0
+    own = np.array([piece.offset, bend, bend * math.sin(yarn[BEND]), bend * math.cos(yarn[BEND])])
+    height = torus_height if piece.side == TOP else height_beneath
+    return np.array([height(yarn, own, float(a) - 0.5, place - 0.5 + piece.offset)[0] for a in across])
 
 
 def _in_blocks(values: Float64) -> Float32:
@@ -269,7 +353,7 @@ def tabulate_pieces(model: ClothSide, size: int) -> dict[str, Any]:
     located = _locate(model.front)
     x, y, gap = _grid_places(located.samples, size)
     grid = _grids(horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS), size)
-    return _piece_columns(located) | {"grid": grid}
+    return _piece_columns(model.front, located) | {"grid": grid}
 
 
 class _Located(NamedTuple):
@@ -296,12 +380,14 @@ def _locate(front: HeightField) -> _Located:
     return found
 
 
-def _piece_columns(located: _Located) -> dict[str, Any]:
+def _piece_columns(front: HeightField, located: _Located) -> dict[str, Any]:
     """Return the columns of `SoftNodeTable` about pieces."""
     return {
         "piece_starts": np.array(located.starts, np.int64),
         "pieces": np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
         "bounds": np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
+        "floats": np.array([front.floats[pick, end, piece.side] for (end, pick), piece, _ in located.pieces]),
+        "extents": np.array([(front.lowest, front.crown[pick, end]) for (end, pick), piece, _ in located.pieces]),
     }
 
 

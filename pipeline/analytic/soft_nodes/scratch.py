@@ -11,7 +11,7 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable
 from pipeline.analytic.soft_nodes.shade import BLOCK_ROWS
 from pipeline.analytic.soft_nodes.waves import HIGHEST, TOGETHER
-from pipeline.compiled.arrays import Float32, Index, Mask
+from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.footprint.mixture import COARSE_LINE
 
@@ -61,6 +61,12 @@ TURN_ROWS: Final = 4
 LINE_ROWS: Final = 9
 """Rows of `Scratch.line`."""
 
+DRAFT_ROWS: Final = 15
+"""Rows of `Scratch.drafts`, see `line_nodes`."""
+
+MOST_ON_LINES: Final = 2048
+"""Most nodes of a kind of yarn on view lines."""
+
 _POINTS = COARSE_LINE.points
 
 
@@ -93,6 +99,12 @@ class Scratch(NamedTuple):
         The same of nodes placed in the footprint, of one kind of yarn; levels.
     order : uint32 (most,)
         Numbers from 0 on.
+    view_lines : float64 (2, lines)
+        Places of view lines across the viewer's azimuth, and the widths that they stand for.
+    drafts, firsts : float32 (K, DRAFT_ROWS, MOST_ON_LINES), uint32 (K, MOST_ON_LINES)
+        Nodes on view lines, and the first cells of their grids.
+    seen : float32 (lines, 2, COLUMNS)
+        Where the viewer sees the fixed nodes, in x and in y.
     """
 
     weight: Float32
@@ -118,6 +130,10 @@ class Scratch(NamedTuple):
     curved: Float32
     curved_narrow: Float32
     order: npt.NDArray[np.uint32]
+    view_lines: Float64
+    drafts: Float32
+    firsts: npt.NDArray[np.uint32]
+    seen: Float32
 
 
 @allocating_kernel
@@ -151,4 +167,8 @@ def scratch_for(table: SoftNodeTable, most: int) -> Scratch:
         np.zeros((2, fixed, BLOCK_NODES), np.float32),
         np.zeros(2 * room, np.float32),
         np.arange(room).astype(np.uint32),
+        np.zeros((2, 512)),
+        np.ones((kinds, DRAFT_ROWS, MOST_ON_LINES), np.float32),
+        np.zeros((kinds, MOST_ON_LINES), np.uint32),
+        np.zeros((len(table.spots), 2, COLUMNS), np.float32),
     )

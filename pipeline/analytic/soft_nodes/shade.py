@@ -193,7 +193,7 @@ def shade_node(
 
 
 @inlined_fast_kernel
-def _add_node(
+def add_node(
     total: Ten,
     d: YarnDirections,
     at: NodeFrame,
@@ -214,7 +214,7 @@ def _add_node(
 
 
 @inlined_fast_kernel
-def _node_behind(
+def node_behind(
     d: YarnDirections,
     at: NodeFrame,
     along: np.float32,
@@ -271,7 +271,7 @@ def _footprint_node(
 
 
 @inlined_fast_kernel
-def _layer(alpha: np.float32, thickness: np.float32, blend: np.float32) -> YarnLayer:
+def yarn_layer(alpha: np.float32, thickness: np.float32, blend: np.float32) -> YarnLayer:
     """Return the optics of a family."""
     square = alpha * alpha
     return YarnLayer(square, _FLAKES * alpha * square, thickness, blend)
@@ -289,7 +289,7 @@ def shade_fixed(
     blend: np.float32,
 ) -> Ten:
     """Return the sums over fixed nodes of one family."""
-    layer = _layer(alpha, thickness, blend)
+    layer = yarn_layer(alpha, thickness, blend)
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
     for b in range(len(weight)):
@@ -297,7 +297,7 @@ def shade_fixed(
             seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
             lit = ramp(above(d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
-            total = _add_node(total, d, at, along, across, seen, lit, weight[b, k], layer)
+            total = add_node(total, d, at, along, across, seen, lit, weight[b, k], layer)
     return total
 
 
@@ -321,7 +321,7 @@ def shade_fixed_behind(
             seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
             lit = ramp(above(-d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
-            of_node = _node_behind(d, at, along, across, seen, lit, weight[b, k], layer)
+            of_node = node_behind(d, at, along, across, seen, lit, weight[b, k], layer)
             a += of_node[0]
             c += of_node[1]
             s += of_node[2]
@@ -350,7 +350,7 @@ def shade_footprint(
 ) -> Ten:
     """Return the sums over nodes placed in a footprint; `cells` is each one's cell of its grid at the first azimuth."""
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    layer = _layer(yarn[ALPHA], thickness, yarn[BLEND])
+    layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
     total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
@@ -358,7 +358,7 @@ def shade_footprint(
         lit = ramp(_over(light, cells[k], level_i, sharp))
         seen = _seen(_over(viewer, cells[k], level_o, sharp))
         at, along, across = _footprint_node(nodes, k, radius, fibre, hx, hy, hz)
-        total = _add_node(total, d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
+        total = add_node(total, d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
     return total
 
 
@@ -384,7 +384,7 @@ def shade_footprint_behind(
         lit = ramp(_over(light, cells[k], level_i, sharp))
         seen = _seen(_over(viewer, cells[k], level_o, sharp))
         at, along, across = _footprint_node(nodes, k, radius, fibre, hx, hy, hz)
-        of_node = _node_behind(d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
+        of_node = node_behind(d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
         a += of_node[0]
         c += of_node[1]
         s += of_node[2]

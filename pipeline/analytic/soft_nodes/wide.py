@@ -37,6 +37,7 @@ NARROW: Final = 0.25
 """Deviation, in yarn spacings, below which fixed nodes are too far apart: a footprint places its own."""
 
 _REACH = np.float32(REACH)
+_RESOLVED, _STRAIGHT = np.float32(0.12), np.float32(1e-6)
 _0, _HALF, _1, _2 = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
 
 
@@ -157,6 +158,85 @@ def product_weights(table: SoftNodeTable, scratch: Scratch, columns: int, rows: 
                         own[k] += factor * across[k]
 
 
+@inlined_fast_kernel
+def _density(x: np.float32, y: np.float32, of_xx: np.float32, of_yy: np.float32, of_xy: np.float32) -> np.float32:
+    """Return exp(-(of_xx x^2 + of_xy x y + of_yy y^2))."""
+    return remaining(of_xx * x * x + (of_yy * y + of_xy * x) * y)
+
+
+@inlined_fast_kernel
+def _add_densities(
+    places: Float32, x: np.float32, y: np.float32, of_xx: np.float32, of_yy: np.float32, of_xy: np.float32,
+    density: Float32,
+) -> None:  # fmt: skip
+    """Add the density of a Gaussian around (x, y) at a line of nodes, places (2, COLUMNS)."""
+    # Sums first: a loop that stores what it reads is kept from the vector units.
+    d0, d1, d2, d3 = (
+        _density(places[0, 0] - x, places[1, 0] - y, of_xx, of_yy, of_xy),
+        _density(places[0, 1] - x, places[1, 1] - y, of_xx, of_yy, of_xy),
+        _density(places[0, 2] - x, places[1, 2] - y, of_xx, of_yy, of_xy),
+        _density(places[0, 3] - x, places[1, 3] - y, of_xx, of_yy, of_xy),
+    )
+    d4, d5, d6, d7 = (
+        _density(places[0, 4] - x, places[1, 4] - y, of_xx, of_yy, of_xy),
+        _density(places[0, 5] - x, places[1, 5] - y, of_xx, of_yy, of_xy),
+        _density(places[0, 6] - x, places[1, 6] - y, of_xx, of_yy, of_xy),
+        _density(places[0, 7] - x, places[1, 7] - y, of_xx, of_yy, of_xy),
+    )
+    density[0] += d0
+    density[1] += d1
+    density[2] += d2
+    density[3] += d3
+    density[4] += d4
+    density[5] += d5
+    density[6] += d6
+    density[7] += d7
+
+
+@inlined_fast_kernel
+def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -> None:
+    """Write the weights of all nodes: the density of a footprint of rays where the viewer sees each of them.
+
+    A node of height h is displaced by d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) towards the viewer (view_lines).
+    """
+    run = np.sqrt(look.ox * look.ox + look.oy * look.oy)
+    ex, ey = (look.ox / run, look.oy / run) if run > _STRAIGHT else (_1, _0)
+    run = run / look.oz
+    bent, plane = _2 * look.bend_o * run * run, np.float32(table.plane)
+    dx, dy, rho = max(look.dx, _RESOLVED), max(look.dy, _RESOLVED), look.rho
+    scale = _1 / (_1 - rho * rho)
+    of_xx, of_yy, of_xy = _HALF * scale / (dx * dx), _HALF * scale / (dy * dy), -rho * scale / (dx * dy)
+    nearest, farthest = table.shown[0] - plane, table.shown[1] - plane
+    nearest = _2 * nearest * run / (_1 + np.sqrt(max(_1 + bent * nearest, _0)))
+    farthest = _2 * farthest * run / (_1 + np.sqrt(max(_1 + bent * farthest, _0)))
+    x_low, x_high = min(nearest * ex, farthest * ex) - _REACH * dx, max(nearest * ex, farthest * ex) + _REACH * dx
+    y_low, y_high = min(nearest * ey, farthest * ey) - _REACH * dy, max(nearest * ey, farthest * ey) + _REACH * dy
+    ends, picks, weight, groups = table.repeat[0], table.repeat[1], scratch.lines, table.groups
+    weight[:, :] = _0
+    seen = scratch.seen
+    for line in range(len(seen)):
+        spot, own = table.spots[line], seen[line]
+        for k in range(COLUMNS):
+            over = spot[3, k] - plane
+            shift = over * run
+            if bent > _0:
+                shift *= _2 / (_1 + np.sqrt(max(_1 + bent * over, _0)))
+            own[0, k], own[1, k] = spot[0, k] - shift * ex, spot[1, k] - shift * ey
+    for row in range(math.floor(look.y + y_low), math.floor(look.y + y_high) + 1):
+        middle_y = np.float32(look.y - row)
+        for column in range(math.floor(look.x + x_low), math.floor(look.x + x_high) + 1):
+            middle_x = np.float32(look.x - column)
+            cell = (row % picks) * ends + column % ends
+            for c in range(table.group_starts[cell], table.group_starts[cell + 1]):
+                group = groups[table.cell_groups[c]]
+                start = group[START] // np.uint32(COLUMNS)
+                for j in range(group[LINES]):
+                    _add_densities(seen[start + j], middle_x, middle_y, of_xx, of_yy, of_xy, weight[start + j])
+    for line in range(len(weight)):
+        for k in range(COLUMNS):
+            weight[line, k] *= table.spots[line, 2, k]
+
+
 RESOLVED: Final = 0.12
 """Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
 
@@ -215,6 +295,8 @@ def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, widest: f
     shares = scratch.weight
     if look.narrowest >= table.uniform:
         shares = table.evenly
+    elif table.parallax:
+        displaced_weights(table, scratch, look)
     elif look.narrowest >= table.waves_from and _waves_pay(table, look, widest):
         wave_weights(table, scratch, look, waves_kept(table.wave_size, look.narrowest))
     else:

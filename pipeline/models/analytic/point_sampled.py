@@ -50,6 +50,9 @@ class PointSampledOptions(AnalyticOptions):
     """A march through the cloth in double precision, or a look-up of tabulated horizons in single precision, as steps
     or as ramps."""
 
+    parallax: bool = False
+    """Whether points are view rays, which end where they first meet the cloth; must be that of the truth."""
+
     horizon_nodes: ClassVar[int] = 32
     """Nodes of the horizon map on each piece of yarn in a cell, across and along; the nearest is taken."""
     azimuths: ClassVar[int] = 64
@@ -59,6 +62,8 @@ class PointSampledOptions(AnalyticOptions):
     def _horizons_of_gaussians(self) -> PointSampledOptions:
         if self.visibility != "exact" and self.footprint != "gaussian":
             raise ValueError(f"visibility = {self.visibility!r} needs footprint = 'gaussian'")
+        if self.visibility != "exact" and self.parallax:
+            raise ValueError(f"visibility = {self.visibility!r} knows no view rays: parallax needs 'exact'")
         return self
 
     @property
@@ -96,7 +101,8 @@ class ExactPoints(Analytic["ClothSide"]):
         from pipeline.analytic.exact_points import sample_points
         from pipeline.truth.cloth import cloth_side
 
-        truth, self._count, self._r2 = TruthOptions(footprint=options.footprint), count, options.sequence == "r2"
+        truth = TruthOptions(footprint=options.footprint, parallax=options.parallax)
+        self._count, self._r2 = count, options.sequence == "r2"
         super().__init__(
             options,
             count,

@@ -27,15 +27,17 @@ if TYPE_CHECKING:
 Level = Literal[1, 2, 4, 8]
 """A level of detail."""
 
-_SHARED: Final[WeakValueDictionary[tuple[int, bool, bool], PerFabric[SoftNodeTable]]] = WeakValueDictionary()
+_SHARED: Final[WeakValueDictionary[tuple[int, bool, bool, bool], PerFabric[SoftNodeTable]]] = WeakValueDictionary()
 
 
-def soft_tables(level: int, behind: bool = False, curved: bool = False) -> PerFabric[SoftNodeTable]:
+def soft_tables(
+    level: int, behind: bool = False, curved: bool = False, parallax: bool = False
+) -> PerFabric[SoftNodeTable]:
     """Return the tables of fabrics at a level of detail, which all methods at hand share."""
     from pipeline.analytic.soft_nodes.nodes import tabulate
 
-    tables = PerFabric(lambda fabric: tabulate(fabric, behind=behind, level=level, curved=curved))
-    return _SHARED.setdefault((level, behind, curved), tables)
+    tables = PerFabric(lambda fabric: tabulate(fabric, behind=behind, level=level, curved=curved, parallax=parallax))
+    return _SHARED.setdefault((level, behind, curved, parallax), tables)
 
 
 class SoftNodesOptions(AnalyticOptions):
@@ -49,6 +51,8 @@ class SoftNodesOptions(AnalyticOptions):
     model: Literal["soft_nodes"] = "soft_nodes"
     levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
     """Levels of detail k, from few nodes to many; each is a row of the tables."""
+    parallax: bool = False
+    """Whether footprints are patches of view rays; must be that of the truth."""
 
     @property
     def kinds(self) -> frozenset[str]:
@@ -57,7 +61,7 @@ class SoftNodesOptions(AnalyticOptions):
 
     def methods(self) -> list[SoftNodes]:
         """Return one method for each level."""
-        return [SoftNodes(level, self.name) for level in self.levels]
+        return [SoftNodes(level, self.name, self.parallax) for level in self.levels]
 
 
 class SoftNodes(Analytic["SoftNodeTable"]):
@@ -69,19 +73,21 @@ class SoftNodes(Analytic["SoftNodeTable"]):
         Level of detail, one of `pipeline.analytic.soft_nodes.groups.DETAILS`.
     name : str
         Name of the method.
+    parallax : bool
+        Whether footprints are patches of view rays.
     """
 
     turns: ClassVar[bool] = SoftNodesOptions.turns
 
-    def __init__(self, level: int = 2, name: str = "soft_nodes") -> None:
+    def __init__(self, level: int = 2, name: str = "soft_nodes", parallax: bool = False) -> None:
         from pipeline.analytic.soft_nodes.features import read_queries
 
         def read(table: SoftNodeTable, queries: Queries, seed: int) -> Float32:
             return in_chunks(queries, lambda part: read_queries(table, part).components)
 
-        super().__init__(SoftNodesOptions(name=name), level, soft_tables(level), read)
-        self._both_sides = soft_tables(level, behind=True)
-        self._curved = soft_tables(level, behind=True, curved=True)
+        super().__init__(SoftNodesOptions(name=name), level, soft_tables(level, parallax=parallax), read)
+        self._both_sides = soft_tables(level, behind=True, parallax=parallax)
+        self._curved = soft_tables(level, behind=True, curved=True, parallax=parallax)
 
     def behind(self, fabric: Fabric, queries: Queries) -> Float32:
         """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""

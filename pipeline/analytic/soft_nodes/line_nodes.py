@@ -1,0 +1,215 @@
+"""Nodes on view lines: what is drafted of each in `view_lines`, and the sums over them.
+
+A draft holds where a node lies on its line, the curve of the yarn along the line, and its float. Height, place and
+weight follow from it in the loop that shades the nodes: stores between two loops would keep both from the vector units.
+What a footprint of rays sees is cut out before, so every node is seen; the light has soft horizons as elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.soft_horizons import Bend, above, ramp
+from pipeline.analytic.soft_nodes.footprint_nodes import sine_cosine
+from pipeline.analytic.soft_nodes.nodes import LEVELS, UPPER
+from pipeline.analytic.soft_nodes.scratch import DRAFT_ROWS
+from pipeline.analytic.soft_nodes.shade import (
+    Five,
+    GridHorizons,
+    NodeFrame,
+    Ten,
+    YarnDirections,
+    add_node,
+    node_behind,
+    yarn_layer,
+)
+from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
+from pipeline.compiled.arrays import Float32
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
+from pipeline.compiled.float32 import arcsine, remaining
+from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WARP
+
+AT, LENGTH, ACROSS, BY_ACROSS, ALONG_FROM, BY_ALONG, DENSITY, APART = range(8)
+"""Angle across the yarn, or place along the line plus `EVEN`; length; place across and along the yarn at s = 0, and
+their changes with s; greatest density of the line; distance of the lines."""
+
+FLOAT_BEND, FLOAT_HALF, FLOAT_DROP, CURVATURE, STEEPEST, ROWS_FROM, ROWS_PER = range(8, DRAFT_ROWS)
+"""Bend radius of the float, negative beneath and 0 if drawn flat, half length and drop; curve and largest sine as in
+`SoftNodeTable.bounds`; row of the grid for b = 0 and rows for each unit of b."""
+
+EVEN: Final = np.float32(1000.0)
+"""Added to places along a line, so that they are told from angles across a yarn."""
+
+Falls = npt.NDArray[np.uint8] | None
+
+_0, _1, _2, _HALF = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(0.5)
+_RIGHT = np.float32(1.7)  # more than any angle across
+_VERTICAL, _LEAST = np.float32(0.99999), np.float32(1e-3)
+_FAR, _LEVELS, _GAUSS = np.float32(1e9), np.float32(LEVELS), np.float32(1.0 / math.sqrt(3.0))
+_INVERSE_PI = np.float32(1.0 / math.pi)
+
+
+class LineRays(NamedTuple):
+    """How the rays of a footprint sink, and its deviation along lines.
+
+    Attributes
+    ----------
+    run : float32
+        Distance in the plane for each unit of height, T.
+    plane : float32
+        Height of the reference plane.
+    bent : float32
+        2 kappa T^2.
+    inverse : float32
+        1 / deviation of the footprint along the lines.
+    """
+
+    run: np.float32
+    plane: np.float32
+    bent: np.float32
+    inverse: np.float32
+
+
+class LineNode(NamedTuple):
+    """A node: its surface, change of the half vector's cosine with the tangent in its box, weight, and grid cell."""
+
+    frame: NodeFrame
+    along: np.float32
+    across: np.float32
+    weight: np.float32
+    row: np.float32
+    column: np.float32
+
+
+@inlined_fast_kernel
+def _node(
+    draft: Float32, k: int, rays: LineRays, radius: np.float32, fibre: Fibre, size: np.float32, d: YarnDirections
+) -> LineNode:  # fmt: skip
+    """Return a drafted node."""
+    # Place across and along the yarn.
+    at, across, by_across = draft[AT, k], draft[ACROSS, k], draft[BY_ACROSS, k]
+    turned, on_line = at < _RIGHT, at - EVEN
+    of_angle, _ = sine_cosine(min(at, _RIGHT))
+    sine = of_angle if turned else min(max((across + on_line * by_across) / radius, -_VERTICAL), _VERTICAL)
+    cosine = np.sqrt((_1 - sine) * (_1 + sine))
+    part_a, part_b = abs(by_across), abs(draft[BY_ALONG, k])
+    s = (radius * sine - across) / by_across if turned else on_line
+    length = draft[LENGTH, k] * radius * cosine / part_a if turned else draft[LENGTH, k]
+    b = draft[ALONG_FROM, k] + s * draft[BY_ALONG, k]
+    # Height, and the density where the viewer sees it.
+    bends, half, drop = draft[FLOAT_BEND, k], draft[FLOAT_HALF, k], draft[FLOAT_DROP, k]
+    beneath, big = bends < _0, abs(bends)
+    ring = big - radius * cosine if beneath else big + radius * cosine
+    limit = ring * half / big if beneath else _FAR
+    on_arc = min(max(b, -limit), limit) if big > _0 else _0
+    root = np.sqrt(max((ring - on_arc) * (ring + on_arc), _0))
+    over = fibre.beta * (drop - root + abs(b - on_arc) * half / drop if beneath else root - drop) - rays.plane
+    fall = np.sqrt(max(_1 + rays.bent * over, _0))
+    q = (s - _2 * over * rays.run / (_1 + fall)) * rays.inverse
+    weight = draft[DENSITY, k] * length * remaining(_HALF * q * q)
+    # Surface.
+    angles, inner = bend(sine, cosine, radius, b, draft[CURVATURE, k], draft[STEEPEST, k])
+    nx, ny, nz = normal(angles, fibre.beta)
+    # A(wo) is that of straight rays: dq / ds of the bent ones in its place.
+    steep = -(nx * by_across + ny * draft[BY_ALONG, k]) / nz * rays.run
+    weight *= (fall - steep) / (fall * max(_1 - steep, _LEAST)) if rays.bent > _0 else _1
+    t = tangent(angles, fibre)
+    by_u, by_v = turning(d.ix + d.ox, d.iy + d.oy, d.iz + d.oz, t, angles, fibre)
+    half_v = min(_HALF * (length * part_a + draft[APART, k] * part_b) / (radius * cosine), _HALF)
+    half_along = _HALF * (length * part_b + draft[APART, k] * part_a)
+    last = size - np.float32(0.01)
+    return LineNode(
+        NodeFrame(nx, ny, nz, _1 / nz, t.x, t.y, t.z),
+        half_along * inner / angles.cos_u * _GAUSS * by_u,
+        half_v * _GAUSS * by_v,
+        weight,
+        min(max(draft[ROWS_FROM, k] + b * draft[ROWS_PER, k] + UPPER, _0), last),
+        min(max((arcsine(sine) * _INVERSE_PI + _HALF) * size + UPPER, _0), last),
+    )
+
+
+@inlined_fast_kernel
+def _lit(
+    light: GridHorizons, falls: Falls, fall: Bend, cell: np.uint32, level: np.float32, sharpness: np.float32
+) -> np.float32:  # fmt: skip
+    """Return the share of a node that the light reaches."""
+    grid, first, last, turn = light.grid, cell + light.low, cell + light.high, light.turn
+    over = above(level, np.float32(grid[first]), np.float32(grid[last]), turn, sharpness)
+    if falls is not None:
+        little, much = np.float32(falls[fall.low, first]), np.float32(falls[fall.high, first])
+        little += turn * (np.float32(falls[fall.low, last]) - little)
+        much += turn * (np.float32(falls[fall.high, last]) - much)
+        over += (fall.of_low * little + fall.of_high * much) * sharpness
+    return ramp(over)
+
+
+@fast_kernel
+def shade_lines(
+    draft: Float32,
+    firsts: npt.NDArray[np.uint32],
+    rays: LineRays,
+    light: GridHorizons,
+    falls: Falls,
+    fall: Bend,
+    size: int,
+    sharpness: np.float32,
+    d: YarnDirections,
+    yarn: Float32,
+    family: int,
+    thickness: np.float32,
+) -> Ten:
+    """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids of `size` cells.
+
+    `falls` and `fall` are those of the horizons over curved cloth (soft_horizons); None on flat cloth, which has a loop
+    of its own.
+    """
+    radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
+    layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
+    step_a, step_b = (1, size) if family == WARP else (size, 1)
+    level, sharp = d.iz * _LEVELS, sharpness / _LEVELS
+    total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
+    for k in range(len(firsts)):
+        at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
+        cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
+        total = add_node(
+            total, d, at.frame, at.along, at.across, _1, _lit(light, falls, fall, cell, level, sharp), at.weight, layer
+        )
+    return total
+
+
+@fast_kernel
+def shade_lines_behind(
+    draft: Float32,
+    firsts: npt.NDArray[np.uint32],
+    rays: LineRays,
+    light: GridHorizons,
+    falls: Falls,
+    fall: Bend,
+    size: int,
+    sharpness: np.float32,
+    d: YarnDirections,
+    yarn: Float32,
+    family: int,
+    thickness: np.float32,
+) -> Five:
+    """Return the same with the light behind, whose horizons are those of the back."""
+    radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
+    layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
+    step_a, step_b = (1, size) if family == WARP else (size, 1)
+    level, sharp = -d.iz * _LEVELS, sharpness / _LEVELS
+    a, c, s, a0, through = _0, _0, _0, _0, _0
+    for k in range(len(firsts)):
+        at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
+        cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
+        lit = _lit(light, falls, fall, cell, level, sharp)
+        of_node = node_behind(d, at.frame, at.along, at.across, _1, lit, at.weight, layer)
+        a += of_node[0]
+        c += of_node[1]
+        s += of_node[2]
+        a0 += of_node[3]
+        through += of_node[4]
+    return a, c, s, a0, through

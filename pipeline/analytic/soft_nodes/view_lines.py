@@ -1,0 +1,446 @@
+"""Nodes that a footprint of view rays places itself: on lines in the viewer's azimuth, with nothing hidden among them.
+
+A ray belongs to the point of the reference plane that it crosses. Seen in the viewer's azimuth, a point of height h at
+s is displaced to q = s - d, with d the distance in which a ray sinks from h to the plane; across the azimuth nothing is
+displaced. So a footprint is cut into lines in that azimuth, and each line is a curve h(s). Going away from the viewer,
+a point is seen if its q is less than all q before it. On a torus h is concave, so q(s) falls to its least at the crest
+that the viewer sees and rises from there: what is seen of a piece is one interval, found by its two ends. Gauss's rule
+is used in it, with the density at q; across the lines the trapezoidal rule.
+
+Over a cloth of curvature kappa the ray is a parabola: with T = |o_xy| / o_z and g the height over the plane,
+d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) [Kuznetsov2022Curved].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.analytic.soft_horizons import AZIMUTHS, above, ramp, sharpness_of_points
+from pipeline.analytic.soft_nodes.ellipse_nodes import next_cut, piece_at
+from pipeline.analytic.soft_nodes.footprint_nodes import fill_eight, write_eight
+from pipeline.analytic.soft_nodes.line_nodes import (
+    ACROSS,
+    ALONG_FROM,
+    APART,
+    AT,
+    BY_ACROSS,
+    BY_ALONG,
+    CURVATURE,
+    DENSITY,
+    EVEN,
+    FLOAT_BEND,
+    FLOAT_DROP,
+    FLOAT_HALF,
+    LENGTH,
+    ROWS_FROM,
+    ROWS_PER,
+    STEEPEST,
+)
+from pipeline.analytic.soft_nodes.nodes import (
+    BLOCK,
+    BLOCK_NODES,
+    BOUND,
+    CURVE,
+    FAMILY,
+    LEVELS,
+    SHIFT,
+    X_HIGH,
+    X_LOW,
+    Y_HIGH,
+    Y_LOW,
+    SoftNodeTable,
+)
+from pipeline.analytic.soft_nodes.scratch import DRAFT_ROWS, Scratch, SoftQuery
+from pipeline.compiled.arrays import Float32, Float64
+from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.compiled.float32 import arcsine
+from pipeline.truth.geometry.heightfield import (
+    AXIS_DROP,
+    BEND_RADIUS,
+    BETA,
+    GAP,
+    HALF_LENGTH,
+    INVERSE_RADIUS,
+    RADIUS,
+    WARP,
+    WEFT,
+)
+
+_BETWEEN: Final = 0.2  # yarn spacings: distance of the lines
+_COARSEST: Final = 1.2  # the same in deviations
+_CUT: Final = 2.6  # where the footprint ends, in deviations
+_LENGTH: Final = 0.2  # yarn spacings of an interval for each node beyond the first
+_DEVIATIONS: Final = 1.2  # and deviations
+_MOST_IN_INTERVAL: Final = 6
+_NEAREST: Final = 1e-5  # least length of a segment
+_CREST_STEPS: Final = 8
+_CREST_CLOSE: Final = 1e-2
+_ROOT_STEPS: Final = 8
+_CLOSE: Final = 0.02  # of a deviation: how near the end of an interval is found where something hides the rest,
+_EDGE: Final = 0.3  # and where the footprint ends
+_NEVER: Final = 1e9
+_STEEP: Final = 0.05  # of a radius, across the yarn: shorter intervals take places even along the line
+_PLACES = np.zeros((_MOST_IN_INTERVAL + 1, 8), np.float32)
+_WEIGHTS = np.zeros((_MOST_IN_INTERVAL + 1, 8), np.float32)
+for _n in range(1, _MOST_IN_INTERVAL + 1):
+    _PLACES[_n, :_n], _WEIGHTS[_n, :_n] = np.polynomial.legendre.leggauss(_n)
+_0, _HALF, _LEVELS = np.float32(0.0), np.float32(0.5), np.float32(LEVELS)
+_SHARP = np.float32(0.0)  # what hides a gap is a step
+_SMEARED: Final = 0.2  # yarn spacings across, in which a line crosses the border of a yarn
+
+
+class ViewRay(NamedTuple):
+    """How the rays of a footprint sink.
+
+    Attributes
+    ----------
+    dx, dy : float
+        The viewer's azimuth.
+    run : float
+        Distance in the plane for each unit of height, T.
+    bend : float
+        Curvature of the cloth in this azimuth, 1/yarn spacings.
+    plane : float
+        Height of the reference plane.
+    """
+
+    dx: float
+    dy: float
+    run: float
+    bend: float
+    plane: float
+
+
+class YarnCurve(NamedTuple):
+    """A piece of a yarn along a line, in its own frame.
+
+    Attributes
+    ----------
+    across, by_across, along, by_along : float
+        Place across and along the yarn, a + s a' and b + s b'.
+    per_radius, radius, beta : float
+        Of the yarn.
+    bend, half, drop, side : float
+        Of its float: bend radius, 0 if it is drawn flat; half length and drop; 1 on top and -1 beneath.
+    """
+
+    across: float
+    by_across: float
+    along: float
+    by_along: float
+    per_radius: float
+    radius: float
+    beta: float
+    bend: float
+    half: float
+    drop: float
+    side: float
+
+
+@kernel
+def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
+    """Return how far before the plane a ray has a height, and the change of this distance with height."""
+    if ray.bend == 0.0:
+        return (height - ray.plane) * ray.run, ray.run
+    square = 1.0 + 2.0 * ray.bend * ray.run * ray.run * (height - ray.plane)
+    if square <= 0.0:
+        return -_NEVER, 0.0
+    root = math.sqrt(square)
+    return 2.0 * (height - ray.plane) * ray.run / (1.0 + root), ray.run / root
+
+
+@inlined_kernel
+def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
+    """Return to where the point at s is displaced, and a number with the sign of n.o, smooth up to the yarn's border.
+
+    The height is that of `torus_height` and `height_beneath`, sqrt((R +- rho)^2 - b^2) - R cos u_max times the relief.
+    """
+    sine = min(1.0, max(-1.0, (curve.across + s * curve.by_across) * curve.per_radius))
+    cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
+    rho, b = curve.radius * cosine, curve.along + s * curve.by_along
+    if curve.bend == 0.0:
+        height, slope = rho, sine * curve.by_across
+        upright = cosine
+    else:
+        ring, beyond = curve.bend + curve.side * rho, 0.0
+        if curve.side < 0.0:
+            bound = ring * curve.half / curve.bend
+            on_arc = min(max(b, -bound), bound)
+            beyond = abs(b - on_arc) * curve.half / curve.drop
+            b = on_arc
+        root = math.sqrt((ring - b) * (ring + b))
+        height = curve.side * (root - curve.drop) + beyond
+        upright, slope = cosine * root, ring * sine * curve.by_across + curve.side * b * cosine * curve.by_along
+    distance, run = sunk(ray, curve.beta * height)
+    return s - distance, upright + run * curve.beta * slope
+
+
+@inlined_kernel
+def _crest(
+    curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, q_high: float
+) -> tuple[float, float]:  # fmt: skip
+    """Return where between a place that faces away and one that faces the viewer the displaced place is least, and it.
+
+    Illinois' method; the error of the least place is of second order.
+    """
+    kept, q = 0, q_high
+    for _ in range(_CREST_STEPS):
+        s = low + (high - low) * at_low / (at_low - at_high)
+        q, at = _seen(curve, ray, s)
+        if at > 0.0:
+            high, at_high = s, at
+            at_low *= 0.5 if kept > 0 else 1.0
+            kept = 1
+        else:
+            low, at_low = s, at
+            at_high *= 0.5 if kept < 0 else 1.0
+            kept = -1
+        if high - low < _CREST_CLOSE or abs(at) < _CREST_CLOSE:
+            return s, q
+    return s, q
+
+
+@inlined_kernel
+def _at_place(
+    curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_crest: float, q_high: float, target: float, near: float
+) -> float:  # fmt: skip
+    """Return an s between the crest and `high` that is displaced to `target`, or to a place as `near` as that.
+
+    Displaced places rise between them. Steps are those of parabolas through both ends, level at the first one.
+    """
+    s = high
+    for _ in range(_ROOT_STEPS):
+        s = crest + (high - crest) * math.sqrt((target - q_crest) / (q_high - q_crest))
+        q, _ = _seen(curve, ray, s)
+        if abs(q - target) < near:
+            break
+        if q > target:
+            high, q_high = s, q
+        else:
+            crest, q_crest = s, q
+    return s
+
+
+@kernel
+def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float) -> float:
+    """Return a bound of the nodes that a footprint places on lines, given its least deviation of any direction."""
+    widest = math.sqrt(max(deviation_x**2 + deviation_y**2 - narrowest**2, narrowest**2))
+    # Parts between borders of yarns have a node more than their length takes.
+    density = 2.0 * _CUT * (1.0 / _BETWEEN + 1.0)
+    return 2.0 * (3.0 + density * narrowest) * (3.0 + density * widest)
+
+
+@kernel
+def _lines_across(
+    ray: ViewRay, x: float, y: float, sigma: float, warp_radius: float, weft_radius: float, reach: float, lines: Float64
+) -> int:  # fmt: skip
+    """Write places of lines across the azimuth and the widths that they stand for, (2, most); return their number.
+
+    Lines that run along yarns have places by Gauss's rule between the borders of yarns.
+    """
+    along_x = abs(ray.dy) < abs(ray.dx)
+    if reach * min(abs(ray.dx), abs(ray.dy)) >= _SMEARED:
+        count = math.ceil(_CUT * sigma / min(_BETWEEN, _COARSEST * sigma))
+        apart = _CUT * sigma / count
+        for j in range(2 * count + 1):
+            lines[0, j], lines[1, j] = (j - count) * apart, apart
+        return 2 * count + 1
+    # At w across the azimuth the line has x = x - w dy, or y = y + w dx.
+    centre, factor, radius = (y, ray.dx, weft_radius) if along_x else (x, -ray.dy, warp_radius)
+    place, stop, found = centre - _CUT * sigma, centre + _CUT * sigma, 0
+    while place < stop - _NEAREST and found < lines.shape[1] - _MOST_IN_INTERVAL:
+        after = min(next_cut(place, True, radius), stop)
+        half, middle = 0.5 * (after - place), 0.5 * (after + place)
+        count = min(1 + int(max(2.0 * half / _BETWEEN, 2.0 * half / (_COARSEST * sigma))), _MOST_IN_INTERVAL)
+        for i in range(count):
+            lines[0, found] = (middle + half * _PLACES[count, i] - centre) / factor
+            lines[1, found] = half * _WEIGHTS[count, i]
+            found += 1
+        place = after
+    return found
+
+
+@inlined_kernel
+def _write_draft(
+    draft: Float32, k: int, count: int, start: np.float32, stop: np.float32, turned: bool, curve: YarnCurve,
+    bounds: Float32, density: np.float32, apart: np.float32, rows_from: np.float32, rows_per: np.float32, line: Float32,
+) -> None:  # fmt: skip
+    """Write the nodes of an interval from `k` on, between two angles across or two places along the line."""
+    half, middle = _HALF * (stop - start), _HALF * (stop + start) + (_0 if turned else EVEN)
+    for i in range(8):
+        line[0, i], line[1, i] = middle + half * _PLACES[count, i], abs(half) * _WEIGHTS[count, i]
+    write_eight(draft[AT], k, line[0])
+    write_eight(draft[LENGTH], k, line[1])
+    fill_eight(draft[ACROSS], k, np.float32(curve.across))
+    fill_eight(draft[BY_ACROSS], k, np.float32(curve.by_across))
+    fill_eight(draft[ALONG_FROM], k, np.float32(curve.along))
+    fill_eight(draft[BY_ALONG], k, np.float32(curve.by_along))
+    fill_eight(draft[DENSITY], k, density)
+    fill_eight(draft[APART], k, apart)
+    fill_eight(draft[FLOAT_BEND], k, np.float32(curve.side * curve.bend))
+    fill_eight(draft[FLOAT_HALF], k, np.float32(curve.half) if curve.bend > 0.0 else _0)
+    fill_eight(draft[FLOAT_DROP], k, np.float32(curve.drop))
+    fill_eight(draft[CURVATURE], k, bounds[CURVE])
+    fill_eight(draft[STEEPEST], k, bounds[BOUND])
+    fill_eight(draft[ROWS_FROM], k, rows_from)
+    fill_eight(draft[ROWS_PER], k, rows_per)
+
+
+@inlined_kernel
+def _fill_block(draft: Float32, firsts: npt.NDArray[np.uint32], stop: int) -> int:
+    """Fill the last block of nodes with such that weigh nothing; return the number of nodes."""
+    for k in (stop, stop + 8):
+        for row in range(DRAFT_ROWS):
+            fill_eight(draft[row], k, draft[row, stop - 1])
+        fill_eight(draft[LENGTH], k, _0)
+        for i in range(8):
+            firsts[k + i] = firsts[stop - 1]
+    return -(-stop // BLOCK_NODES) * BLOCK_NODES
+
+
+@inlined_kernel
+def _gap_seen(table: SoftNodeTable, look: SoftQuery, box: Float32, first: int, x: float, y: float) -> np.float32:
+    """Return the share of a place in a gap, from the corner of its cell, through which the viewer sees."""
+    size = table.grid.shape[2]
+    grid = table.grid.reshape(table.grid.size)
+    row = min(max(int((y - box[Y_LOW]) / (box[Y_HIGH] - box[Y_LOW]) * size), 0), size - 1)
+    column = min(max(int((x - box[X_LOW]) / (box[X_HIGH] - box[X_LOW]) * size), 0), size - 1)
+    at = first + size * row + column
+    low, high = np.float32(grid[at + look.low_o * size * size]), np.float32(grid[at + look.high_o * size * size])
+    return ramp(above(look.oz * _LEVELS, low, high, look.turn_o, sharpness_of_points(_SHARP) / _LEVELS))
+
+
+@inlined_kernel
+def place_on_view_lines(
+    table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay
+) -> tuple[np.float32, np.float32]:
+    """Place the nodes of a footprint of rays; return the area seen through gaps, and 1 / deviation along lines.
+
+    Writes `Scratch.drafts` and `Scratch.firsts`, whole blocks of each kind of yarn, and in `Scratch.stops` how many.
+    Weights are shares of the footprint in the fabric plane, which A(wo) turns into shares of its rays.
+    """
+    ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
+    stops, lines, line, drafts, firsts = scratch.stops, scratch.view_lines, scratch.line, scratch.drafts, scratch.firsts
+    stops[:] = 0
+    per_ends, per_picks = 1.0 / ends, 1.0 / picks
+    of_warp, of_weft, per_grid = table.kinds[0], table.kinds[1], AZIMUTHS * size * size
+    xx, yy, xy = look.dx * look.dx, look.dy * look.dy, look.rho * look.dx * look.dy
+    ex, ey = ray.dx, ray.dy
+    # Deviation across the azimuth; drift and deviation along it, given the place across.
+    sigma_w = math.sqrt(xx * ey * ey + yy * ex * ex - 2.0 * xy * ex * ey)
+    drift = (ex * ey * (yy - xx) + xy * (ex * ex - ey * ey)) / (sigma_w * sigma_w)
+    sigma = math.sqrt(max(xx * yy - xy * xy, 0.0)) / sigma_w
+    warp_radius, weft_radius = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
+    before, _ = sunk(ray, table.highest)
+    after, _ = sunk(ray, table.lowest)
+    of_gap, _ = sunk(ray, 0.0)
+    gaps, limit = 0.0, drafts.shape[2] - 2 * BLOCK_NODES
+    count_lines = _lines_across(
+        ray, look.x, look.y, sigma_w, warp_radius, weft_radius, 2.0 * _CUT * sigma, lines
+    )  # fmt: skip
+    for j in range(count_lines):
+        w, apart = lines[0, j], lines[1, j]
+        of_line = apart / (2.0 * math.pi * sigma_w * sigma) * math.exp(-0.5 * (w / sigma_w) ** 2)
+        # The line runs through (x, y), s = 0 being where the footprint's density is greatest on it.
+        x0, y0 = look.x - w * ey + drift * w * ex, look.y + w * ex + drift * w * ey
+        left, right = -_CUT * sigma, _CUT * sigma
+        s, covered = right + before, _NEVER
+        last = max(left + after, s - 200.0)
+        while s > last and covered > left:
+            # The next cut on the way from the viewer.
+            until = last
+            if abs(ex) > _NEAREST:
+                cut = next_cut(x0 + s * ex, ex < 0.0, warp_radius)
+                until = max(until, min((cut - x0) / ex, s - _NEAREST))
+            if abs(ey) > _NEAREST:
+                cut = next_cut(y0 + s * ey, ey < 0.0, weft_radius)
+                until = max(until, min((cut - y0) / ey, s - _NEAREST))
+            high, low = s, until
+            s = until
+            middle = 0.5 * (low + high)
+            column, row = math.floor(x0 + middle * ex), math.floor(y0 + middle * ey)
+            # Of whole numbers: a quotient of floats is rounded, and integer division is slow.
+            in_row, in_column = math.floor((row + 0.5) * per_picks), math.floor((column + 0.5) * per_ends)
+            cell = int((row - picks * in_row) * ends + column - ends * in_column)
+            p = piece_at(
+                table.piece_starts,
+                table.bounds,
+                cell,
+                np.float32(x0 + middle * ex - column),
+                np.float32(y0 + middle * ey - row),
+            )
+            if p < 0 or high - low < 2.0 * _NEAREST:
+                continue
+            family, first, box = table.pieces[p, FAMILY], table.pieces[p, BLOCK] * per_grid, table.bounds[p]
+            if family == GAP:
+                q_low, q_high = max(low - of_gap, left), min(high - of_gap, right, covered)
+                if q_high > q_low:
+                    q = 0.5 * (q_low + q_high)
+                    share = of_line * (q_high - q_low) * math.exp(-0.5 * (q / sigma) ** 2)
+                    at = q + of_gap
+                    gaps += share * _gap_seen(table, look, box, first, x0 + at * ex - column, y0 + at * ey - row)
+                covered = min(covered, low - of_gap)
+                continue
+            nearest = low - sunk(ray, table.extents[p, 1])[0]
+            if nearest >= covered:
+                continue
+            yarn, own = table.heights[family], table.floats[p]
+            side = -1.0 if box[CURVE] < 0.0 else 1.0
+            a, by_a, b, by_b = x0 - column - 0.5, ex, y0 - row - 0.5 + box[SHIFT], ey
+            if family == WEFT:
+                a, by_a, b, by_b = y0 - row - 0.5, ey, -(x0 - column - 0.5 + box[SHIFT]), -ex
+            curve = YarnCurve(
+                a, by_a, b, by_b, yarn[INVERSE_RADIUS], yarn[RADIUS], yarn[BETA], own[BEND_RADIUS], own[HALF_LENGTH],
+                own[AXIS_DROP], side,
+            )  # fmt: skip
+            crest = low
+            q_crest, at_low = _seen(curve, ray, low)
+            q_high, at_high = _seen(curve, ray, high)
+            if at_low < 0.0:
+                if at_high <= 0.0:
+                    covered = min(covered, q_high)
+                    continue
+                crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, q_high)
+            q_from, q_to = max(q_crest, left), min(q_high, right, covered)
+            covered = min(covered, q_crest)
+            if q_to <= q_from:
+                continue
+            start, stop = crest, high
+            if q_from > q_crest:
+                start = _at_place(curve, ray, crest, high, q_crest, q_high, q_from, _EDGE * sigma)
+            if q_to < q_high:
+                near = (_EDGE if q_to == right else _CLOSE) * sigma
+                stop = _at_place(curve, ray, crest, high, q_crest, q_high, q_to, near)
+            if stop <= start:
+                continue
+            kind = column % of_warp if family == WARP else of_warp + row % of_weft
+            count = 1 + int(max((stop - start) / _LENGTH, (q_to - q_from) / (_DEVIATIONS * sigma)))
+            count = min(count, _MOST_IN_INTERVAL)
+            radius = yarn[RADIUS]
+            turned = abs(curve.by_across) * (stop - start) > _STEEP * radius
+            v_from, v_to = start, stop
+            if turned:
+                v_from = arcsine(np.float32((curve.across + start * curve.by_across) * yarn[INVERSE_RADIUS]))
+                v_to = arcsine(np.float32((curve.across + stop * curve.by_across) * yarn[INVERSE_RADIUS]))
+            if stops[kind] >= limit:
+                continue
+            k = stops[kind]
+            low_along, high_along = (box[Y_LOW], box[Y_HIGH]) if family == WARP else (box[X_LOW], box[X_HIGH])
+            per = np.float32(size) / (high_along - low_along)
+            # Along a weft, y of its frame runs against x.
+            rows_from, rows_per = (_HALF - box[SHIFT] - low_along) * per, per if family == WARP else -per
+            _write_draft(
+                drafts[kind], k, count, np.float32(v_from), np.float32(v_to), turned, curve, box, np.float32(of_line),
+                np.float32(apart), rows_from, rows_per, line,
+            )  # fmt: skip
+            for i in range(8):
+                firsts[kind, k + i] = first
+            stops[kind] = k + count
+    for kind in range(of_warp + of_weft):
+        if stops[kind] > 0:
+            stops[kind] = _fill_block(drafts[kind], firsts[kind], stops[kind])
+    return np.float32(gaps) * look.oz, np.float32(1.0 / sigma)
