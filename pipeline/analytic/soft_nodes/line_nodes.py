@@ -34,21 +34,22 @@ from pipeline.compiled.float32 import arcsine, remaining
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WARP
 
 AT, LENGTH, ACROSS, BY_ACROSS, ALONG_FROM, BY_ALONG, DENSITY, APART = range(8)
-"""Angle across the yarn, or place along the line plus `EVEN`; length; place across and along the yarn at s = 0, and
+"""Angle across the yarn, or place along the line plus `ON_LINE`; length; place across and along the yarn at s = 0, and
 their changes with s; greatest density of the line; distance of the lines."""
 
-FLOAT_BEND, FLOAT_HALF, FLOAT_DROP, CURVATURE, STEEPEST, ROWS_FROM, ROWS_PER = range(8, DRAFT_ROWS)
+FLOAT_BEND, FLOAT_HALF, FLOAT_DROP, BENDING, STEEPEST_SINE, ROWS_FROM, ROWS_PER = range(8, DRAFT_ROWS)
 """Bend radius of the float, negative beneath and 0 if drawn flat, half length and drop; curve and largest sine as in
 `SoftNodeTable.bounds`; row of the grid for b = 0 and rows for each unit of b."""
 
-EVEN: Final = np.float32(1000.0)
-"""Added to places along a line, so that they are told from angles across a yarn."""
+ON_LINE: Final = np.float32(1000.0)
+"""Added to places along a line, so that they differ from angles across a yarn."""
 
 Falls = npt.NDArray[np.uint8] | None
 
 _0, _1, _2, _HALF = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(0.5)
 _RIGHT = np.float32(1.7)  # more than any angle across
-_VERTICAL, _LEAST = np.float32(0.99999), np.float32(1e-3)
+_VERTICAL = np.float32(0.99999)
+_GRAZING = np.float32(1e-3)  # least cosine, over that from above, by which areas are divided
 _FAR, _LEVELS, _GAUSS = np.float32(1e9), np.float32(LEVELS), np.float32(1.0 / math.sqrt(3.0))
 _INVERSE_PI = np.float32(1.0 / math.pi)
 
@@ -92,7 +93,7 @@ def _node(
     """Return a drafted node."""
     # Place across and along the yarn.
     at, across, by_across = draft[AT, k], draft[ACROSS, k], draft[BY_ACROSS, k]
-    turned, on_line = at < _RIGHT, at - EVEN
+    turned, on_line = at < _RIGHT, at - ON_LINE
     of_angle, _ = sine_cosine(min(at, _RIGHT))
     sine = of_angle if turned else min(max((across + on_line * by_across) / radius, -_VERTICAL), _VERTICAL)
     cosine = np.sqrt((_1 - sine) * (_1 + sine))
@@ -112,11 +113,11 @@ def _node(
     q = (s - _2 * over * rays.run / (_1 + fall)) * rays.inverse
     weight = draft[DENSITY, k] * length * remaining(_HALF * q * q)
     # Surface.
-    angles, inner = bend(sine, cosine, radius, b, draft[CURVATURE, k], draft[STEEPEST, k])
+    angles, inner = bend(sine, cosine, radius, b, draft[BENDING, k], draft[STEEPEST_SINE, k])
     nx, ny, nz = normal(angles, fibre.beta)
     # A(wo) is that of straight rays: dq / ds of the bent ones in its place.
     steep = -(nx * by_across + ny * draft[BY_ALONG, k]) / nz * rays.run
-    weight *= (fall - steep) / (fall * max(_1 - steep, _LEAST)) if rays.bent > _0 else _1
+    weight *= (fall - steep) / (fall * max(_1 - steep, _GRAZING)) if rays.bent > _0 else _1
     t = tangent(angles, fibre)
     by_u, by_v = turning(d.ix + d.ox, d.iy + d.oy, d.iz + d.oz, t, angles, fibre)
     half_v = min(_HALF * (length * part_a + draft[APART, k] * part_b) / (radius * cosine), _HALF)

@@ -59,7 +59,7 @@ MOST_OF_FOOTPRINT: Final = max(3 * _MOST_CELLS * MOST_ACROSS**2, MOST)
 
 _LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
 _0, _1 = np.float32(0.0), np.float32(1.0)
-_STRAIGHT = np.float32(1e-6)
+_FROM_ABOVE = np.float32(1e-6)
 _BETWEEN = np.float32(0.1)  # deviation of the box of a node on a line
 
 
@@ -200,7 +200,7 @@ def sum_round(
 def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: Float32) -> np.float32:
     """Write the sums of a footprint of view rays (K, NODE_SUMS), and return the area seen through gaps."""
     run = np.hypot(look.ox, look.oy)
-    dx, dy = (look.ox / run, look.oy / run) if run > _STRAIGHT else (_1, _0)
+    dx, dy = (look.ox / run, look.oy / run) if run > _FROM_ABOVE else (_1, _0)
     run = run / look.oz
     ray = ViewRay(float(dx), float(dy), float(run), float(look.bend_o), table.plane)
     gaps, inverse = place_on_view_lines(table, scratch, look, ray)

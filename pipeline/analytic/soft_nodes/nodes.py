@@ -59,9 +59,6 @@ UPPER: Final = np.float32(4e-3)
 """Cells of a grid: a place so near below the border of two belongs to the upper one. The middle of a piece is such a
 border and often a node; how a processor rounds must not decide."""
 
-LINES_A_BLOCK: Final = BLOCK_NODES // COLUMNS
-"""Lines of nodes in a block."""
-
 _GRID_BYTES = 1 << 20
 _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 EVEN: Final = 0.42
@@ -120,6 +117,8 @@ class SoftNodeTable(NamedTuple):
         Family, grid.
     floats : float64 (P, 4)
         Row of `HeightField.floats`.
+    crowns : float64 (P,)
+        Greatest height of its cell.
     bounds : float32 (P, 7)
         Extent in x and y within the cell; offset, curve (negative beneath) and largest sine of the inclination.
     grid : uint8 (grids, AZIMUTHS, cells along y, cells along x)
@@ -175,7 +174,7 @@ class SoftNodeTable(NamedTuple):
     pieces: Index
     bounds: Float32
     floats: Float64
-    extents: Float64
+    crowns: Float64
     grid: npt.NDArray[np.uint8]
     behind_mean: Float32
     behind_sharpness: Float32
@@ -214,19 +213,7 @@ def tabulate(
     picks, ends = front.top.shape
 
     located = _locate(front)
-    samples = located.samples
-    size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
-    x, y, gap = _grid_places(samples, size)
-    sines = horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS)
-    grid = _grids(sines, size)
-    grid_falls = np.zeros((len(CURVATURES) if curved else 0, *grid.shape), np.uint8)
-    for own, curvature in zip(grid_falls, CURVATURES, strict=False):
-        bent = horizon_sines(front, model.back, x, y, gap, 2 * AZIMUTHS, curvature)
-        own[:] = _grids(np.clip((sines - bent) / (FALL * curvature), 0.0, 1.0), size)
-    behind_grid = grid[:0]
-    if behind:
-        slopes = horizons(model.back, x, y, 2 * AZIMUTHS, True).astype(np.float64)
-        behind_grid = _grids(slopes / np.sqrt(1.0 + slopes * slopes), size)
+    grid, grid_falls, behind_grid = _horizon_grids(model, located.samples, behind, curved)
 
     # The nodes of every group, each kind in whole blocks.
     groups = gather(located.pieces, detail, by_thread)
@@ -266,8 +253,6 @@ def tabulate(
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    spots = _spots(front, groups, rules)
-    heights = spots[:, 3][spots[:, 2] > 0.0]
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
@@ -301,34 +286,58 @@ def tabulate(
         grid_falls=grid_falls,
         legendre=detail.legendre,
         narrow=np.float32(detail.narrow),
-        heights=front.yarn,
-        highest=front.highest,
-        lowest=front.lowest,
-        plane=model.plane,
-        spots=spots,
-        shown=np.array([heights.min(), heights.max()], np.float32),
-        view_lines=detail.lines,
-        parallax=parallax,
-    )
+        **_ray_columns(model, groups, rules, first_nodes, stop),
+        view_lines=detail.lines, parallax=parallax,
+    )  # fmt: skip
 
 
-def _spots(front: HeightField, groups: list[PieceGroup], rules: list[tuple[Rule, Rule]]) -> Float32:
-    """Return place in the cell, share of the cell and height of the nodes, (lines, 4, COLUMNS), whole blocks a kind."""
-    found = []
-    kind_before: tuple[int, int] | None = None
-    for group, (across, along) in zip(groups, rules, strict=True):
-        kind = (group.piece.family, group.thread)
-        if kind != kind_before and len(found) % LINES_A_BLOCK:
-            found += [np.zeros((4, COLUMNS))] * (LINES_A_BLOCK - len(found) % LINES_A_BLOCK)
-        kind_before = kind
-        a, share_a = (np.pad(v, (0, COLUMNS - len(v))) for v in (across.places, across.weights))
-        for place, share in zip(along.places, along.weights, strict=True):
+def _horizon_grids(
+    model: ClothSide, samples: list[tuple[int, int, CellPiece]], behind: bool, curved: bool
+) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], npt.NDArray[np.uint8]]:
+    """Return grids of horizons, their falls over curved cloth, and those of the back, empty if not wanted."""
+    size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
+    x, y, gap = _grid_places(samples, size)
+    sines = horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS)
+    grid = _grids(sines, size)
+    grid_falls = np.zeros((len(CURVATURES) if curved else 0, *grid.shape), np.uint8)
+    for own, curvature in zip(grid_falls, CURVATURES, strict=False):
+        bent = horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS, curvature)
+        own[:] = _grids(np.clip((sines - bent) / (FALL * curvature), 0.0, 1.0), size)
+    behind_grid = grid[:0]
+    if behind:
+        slopes = horizons(model.back, x, y, 2 * AZIMUTHS, True).astype(np.float64)
+        behind_grid = _grids(slopes / np.sqrt(1.0 + slopes * slopes), size)
+    return grid, grid_falls, behind_grid
+
+
+def _ray_columns(
+    model: ClothSide, groups: list[PieceGroup], rules: list[tuple[Rule, Rule]], first_nodes: list[int], stop: int
+) -> dict[str, Any]:
+    """Return the columns of `SoftNodeTable` by which view rays meet heights."""
+    front, spots = model.front, _spots(model.front, groups, rules, first_nodes, stop)
+    shown = spots[:, 3][spots[:, 2] > 0.0]
+    return {
+        "heights": front.yarn,
+        "highest": front.highest,
+        "lowest": front.lowest,
+        "plane": model.plane,
+        "spots": spots,
+        "shown": np.array([shown.min(), shown.max()], np.float32),
+    }
+
+
+def _spots(
+    front: HeightField, groups: list[PieceGroup], rules: list[tuple[Rule, Rule]], first_nodes: list[int], stop: int
+) -> Float32:
+    """Return place in the cell, share of the cell and height of all nodes, (lines, 4, COLUMNS)."""
+    spots = np.zeros((stop // COLUMNS, 4, COLUMNS), np.float32)
+    for group, (across, along), first in zip(groups, rules, first_nodes, strict=True):
+        a, of_a = (np.pad(column, (0, COLUMNS - len(across.places))) for column in (across.places, across.weights))
+        for line, (place, weight) in enumerate(zip(along.places, along.weights, strict=True), first // COLUMNS):
             b = np.full(COLUMNS, place)
             x, y = (b, a) if group.piece.family == WEFT else (a, b)
-            found.append(np.stack([x, y, share_a * share, _heights(front, group.piece, a, place)]))
-    if len(found) % LINES_A_BLOCK:
-        found += [np.zeros((4, COLUMNS))] * (LINES_A_BLOCK - len(found) % LINES_A_BLOCK)
-    return np.ascontiguousarray(found, np.float32)
+            spots[line] = x, y, of_a * weight, _heights(front, group.piece, a, place)
+    return spots
 
 
 def _heights(front: HeightField, piece: CellPiece, across: Float64, place: float) -> Float64:
@@ -387,7 +396,7 @@ def _piece_columns(front: HeightField, located: _Located) -> dict[str, Any]:
         "pieces": np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
         "bounds": np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
         "floats": np.array([front.floats[pick, end, piece.side] for (end, pick), piece, _ in located.pieces]),
-        "extents": np.array([(front.lowest, front.crown[pick, end]) for (end, pick), piece, _ in located.pieces]),
+        "crowns": np.array([front.crown[pick, end] for (end, pick), _, _ in located.pieces]),
     }
 
 

@@ -27,18 +27,18 @@ from pipeline.analytic.soft_nodes.line_nodes import (
     ALONG_FROM,
     APART,
     AT,
+    BENDING,
     BY_ACROSS,
     BY_ALONG,
-    CURVATURE,
     DENSITY,
-    EVEN,
     FLOAT_BEND,
     FLOAT_DROP,
     FLOAT_HALF,
     LENGTH,
+    ON_LINE,
     ROWS_FROM,
     ROWS_PER,
-    STEEPEST,
+    STEEPEST_SINE,
 )
 from pipeline.analytic.soft_nodes.nodes import (
     BLOCK,
@@ -72,7 +72,7 @@ from pipeline.truth.geometry.heightfield import (
 
 _BETWEEN: Final = 0.2  # yarn spacings: distance of the lines
 _COARSEST: Final = 1.2  # the same in deviations
-_CUT: Final = 2.6  # where the footprint ends, in deviations
+_FOOTPRINT_ENDS: Final = 2.6  # where the footprint ends, in deviations
 _LENGTH: Final = 0.2  # yarn spacings of an interval for each node beyond the first
 _DEVIATIONS: Final = 1.2  # and deviations
 _MOST_IN_INTERVAL: Final = 6
@@ -81,15 +81,15 @@ _CREST_STEPS: Final = 8
 _CREST_CLOSE: Final = 1e-2
 _ROOT_STEPS: Final = 8
 _CLOSE: Final = 0.02  # of a deviation: how near the end of an interval is found where something hides the rest,
-_EDGE: Final = 0.3  # and where the footprint ends
+_WHERE_IT_ENDS: Final = 0.3  # and where the footprint ends
 _NEVER: Final = 1e9
+_FARTHEST: Final = 200.0  # yarn spacings that a line is followed
 _STEEP: Final = 0.05  # of a radius, across the yarn: shorter intervals take places even along the line
 _PLACES = np.zeros((_MOST_IN_INTERVAL + 1, 8), np.float32)
 _WEIGHTS = np.zeros((_MOST_IN_INTERVAL + 1, 8), np.float32)
 for _n in range(1, _MOST_IN_INTERVAL + 1):
     _PLACES[_n, :_n], _WEIGHTS[_n, :_n] = np.polynomial.legendre.leggauss(_n)
 _0, _HALF, _LEVELS = np.float32(0.0), np.float32(0.5), np.float32(LEVELS)
-_SHARP = np.float32(0.0)  # what hides a gap is a step
 _SMEARED: Final = 0.2  # yarn spacings across, in which a line crosses the border of a yarn
 
 
@@ -230,7 +230,7 @@ def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float) -> 
     """Return a bound of the nodes that a footprint places on lines, given its least deviation of any direction."""
     widest = math.sqrt(max(deviation_x**2 + deviation_y**2 - narrowest**2, narrowest**2))
     # Parts between borders of yarns have a node more than their length takes.
-    density = 2.0 * _CUT * (1.0 / _BETWEEN + 1.0)
+    density = 2.0 * _FOOTPRINT_ENDS * (1.0 / _BETWEEN + 1.0)
     return 2.0 * (3.0 + density * narrowest) * (3.0 + density * widest)
 
 
@@ -244,33 +244,102 @@ def _lines_across(
     """
     along_x = abs(ray.dy) < abs(ray.dx)
     if reach * min(abs(ray.dx), abs(ray.dy)) >= _SMEARED:
-        count = math.ceil(_CUT * sigma / min(_BETWEEN, _COARSEST * sigma))
-        apart = _CUT * sigma / count
+        count = math.ceil(_FOOTPRINT_ENDS * sigma / min(_BETWEEN, _COARSEST * sigma))
+        apart = _FOOTPRINT_ENDS * sigma / count
         for j in range(2 * count + 1):
             lines[0, j], lines[1, j] = (j - count) * apart, apart
         return 2 * count + 1
     # At w across the azimuth the line has x = x - w dy, or y = y + w dx.
     centre, factor, radius = (y, ray.dx, weft_radius) if along_x else (x, -ray.dy, warp_radius)
-    place, stop, found = centre - _CUT * sigma, centre + _CUT * sigma, 0
-    while place < stop - _NEAREST and found < lines.shape[1] - _MOST_IN_INTERVAL:
+    place, stop, n = centre - _FOOTPRINT_ENDS * sigma, centre + _FOOTPRINT_ENDS * sigma, 0
+    while place < stop - _NEAREST and n < lines.shape[1] - _MOST_IN_INTERVAL:
         after = min(next_cut(place, True, radius), stop)
         half, middle = 0.5 * (after - place), 0.5 * (after + place)
         count = min(1 + int(max(2.0 * half / _BETWEEN, 2.0 * half / (_COARSEST * sigma))), _MOST_IN_INTERVAL)
         for i in range(count):
-            lines[0, found] = (middle + half * _PLACES[count, i] - centre) / factor
-            lines[1, found] = half * _WEIGHTS[count, i]
-            found += 1
+            lines[0, n] = (middle + half * _PLACES[count, i] - centre) / factor
+            lines[1, n] = half * _WEIGHTS[count, i]
+            n += 1
         place = after
-    return found
+    return n
+
+
+class ViewLine(NamedTuple):
+    """A line of a footprint.
+
+    Attributes
+    ----------
+    x, y : float
+        Its place s = 0, where the footprint is densest on it.
+    density, sigma : float
+        Density there times the width that the line stands for, and deviation along the line.
+    apart : float
+        That width.
+    """
+
+    x: float
+    y: float
+    density: float
+    sigma: float
+    apart: float
+
+
+@inlined_kernel
+def _curve_of(table: SoftNodeTable, p: int, ray: ViewRay, x: float, y: float) -> YarnCurve:
+    """Return the curve of a piece along a line that has s = 0 at (x, y) from the corner of the cell."""
+    family, box, own = table.pieces[p, FAMILY], table.bounds[p], table.floats[p]
+    yarn, side = table.heights[family], -1.0 if box[CURVE] < 0.0 else 1.0
+    a, by_a, b, by_b = x - 0.5, ray.dx, y - 0.5 + box[SHIFT], ray.dy
+    if family == WEFT:
+        # Along a weft, y of its frame runs against x.
+        a, by_a, b, by_b = y - 0.5, ray.dy, -(x - 0.5 + box[SHIFT]), -ray.dx
+    return YarnCurve(
+        a, by_a, b, by_b, yarn[INVERSE_RADIUS], yarn[RADIUS], yarn[BETA], own[BEND_RADIUS], own[HALF_LENGTH],
+        own[AXIS_DROP], side,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _interval(
+    curve: YarnCurve, ray: ViewRay, low: float, high: float, sigma: float, covered: float
+) -> tuple[float, float, float, float]:
+    """Return from where to where a piece between two places is seen, how long that seems, and what is covered then.
+
+    Rays from `covered` on meet something nearer to the viewer. The interval is empty if its end is not behind its
+    start, and cut where the footprint ends.
+    """
+    crest, left, right = low, -_FOOTPRINT_ENDS * sigma, _FOOTPRINT_ENDS * sigma
+    q_crest, at_low = _seen(curve, ray, low)
+    q_high, at_high = _seen(curve, ray, high)
+    if at_low < 0.0:
+        if at_high <= 0.0:
+            return low, low, 0.0, min(covered, q_high)
+        crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, q_high)
+    q_from, q_to = max(q_crest, left), min(q_high, right, covered)
+    start, stop = crest, high
+    if q_to > q_from:
+        if q_from > q_crest:
+            start = _at_place(curve, ray, crest, high, q_crest, q_high, q_from, _WHERE_IT_ENDS * sigma)
+        if q_to < q_high:
+            near = (_WHERE_IT_ENDS if q_to == right else _CLOSE) * sigma
+            stop = _at_place(curve, ray, crest, high, q_crest, q_high, q_to, near)
+    else:
+        stop = start
+    return start, stop, q_to - q_from, min(covered, q_crest)
 
 
 @inlined_kernel
 def _write_draft(
-    draft: Float32, k: int, count: int, start: np.float32, stop: np.float32, turned: bool, curve: YarnCurve,
-    bounds: Float32, density: np.float32, apart: np.float32, rows_from: np.float32, rows_per: np.float32, line: Float32,
+    draft: Float32, k: int, start: float, stop: float, count: int, curve: YarnCurve, of_line: ViewLine, bounds: Float32,
+    family: int, size: int, line: Float32,
 ) -> None:  # fmt: skip
-    """Write the nodes of an interval from `k` on, between two angles across or two places along the line."""
-    half, middle = _HALF * (stop - start), _HALF * (stop + start) + (_0 if turned else EVEN)
+    """Write the nodes of an interval from `k` on: even along the line, or in the angle across the yarn."""
+    turned = abs(curve.by_across) * (stop - start) > _STEEP * curve.radius
+    first, last = np.float32(start), np.float32(stop)
+    if turned:
+        first = arcsine(np.float32((curve.across + start * curve.by_across) * curve.per_radius))
+        last = arcsine(np.float32((curve.across + stop * curve.by_across) * curve.per_radius))
+    half, middle = _HALF * (last - first), _HALF * (last + first) + (_0 if turned else ON_LINE)
     for i in range(8):
         line[0, i], line[1, i] = middle + half * _PLACES[count, i], abs(half) * _WEIGHTS[count, i]
     write_eight(draft[AT], k, line[0])
@@ -279,15 +348,17 @@ def _write_draft(
     fill_eight(draft[BY_ACROSS], k, np.float32(curve.by_across))
     fill_eight(draft[ALONG_FROM], k, np.float32(curve.along))
     fill_eight(draft[BY_ALONG], k, np.float32(curve.by_along))
-    fill_eight(draft[DENSITY], k, density)
-    fill_eight(draft[APART], k, apart)
+    fill_eight(draft[DENSITY], k, np.float32(of_line.density))
+    fill_eight(draft[APART], k, np.float32(of_line.apart))
     fill_eight(draft[FLOAT_BEND], k, np.float32(curve.side * curve.bend))
     fill_eight(draft[FLOAT_HALF], k, np.float32(curve.half) if curve.bend > 0.0 else _0)
     fill_eight(draft[FLOAT_DROP], k, np.float32(curve.drop))
-    fill_eight(draft[CURVATURE], k, bounds[CURVE])
-    fill_eight(draft[STEEPEST], k, bounds[BOUND])
-    fill_eight(draft[ROWS_FROM], k, rows_from)
-    fill_eight(draft[ROWS_PER], k, rows_per)
+    fill_eight(draft[BENDING], k, bounds[CURVE])
+    fill_eight(draft[STEEPEST_SINE], k, bounds[BOUND])
+    low, high = (bounds[Y_LOW], bounds[Y_HIGH]) if family == WARP else (bounds[X_LOW], bounds[X_HIGH])
+    rows = np.float32(size) / (high - low)
+    fill_eight(draft[ROWS_FROM], k, (_HALF - bounds[SHIFT] - low) * rows)
+    fill_eight(draft[ROWS_PER], k, rows if family == WARP else -rows)
 
 
 @inlined_kernel
@@ -311,7 +382,65 @@ def _gap_seen(table: SoftNodeTable, look: SoftQuery, box: Float32, first: int, x
     column = min(max(int((x - box[X_LOW]) / (box[X_HIGH] - box[X_LOW]) * size), 0), size - 1)
     at = first + size * row + column
     low, high = np.float32(grid[at + look.low_o * size * size]), np.float32(grid[at + look.high_o * size * size])
-    return ramp(above(look.oz * _LEVELS, low, high, look.turn_o, sharpness_of_points(_SHARP) / _LEVELS))
+    # What hides a gap is a step.
+    return ramp(above(look.oz * _LEVELS, low, high, look.turn_o, sharpness_of_points(_0) / _LEVELS))
+
+
+@inlined_kernel
+def _place_line(
+    table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay, view_line: ViewLine
+) -> float:  # fmt: skip
+    """Place the nodes of one line, from the viewer on until all its rays have met something; return the gaps seen."""
+    ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
+    per_ends, per_picks, per_grid = 1.0 / ends, 1.0 / picks, AZIMUTHS * size * size
+    of_warp, of_weft, stops = table.kinds[0], table.kinds[1], scratch.stops
+    warp_radius, weft_radius = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
+    x0, y0, ex, ey, sigma = view_line.x, view_line.y, ray.dx, ray.dy, view_line.sigma
+    of_gap, gaps, covered, limit = sunk(ray, 0.0)[0], 0.0, _NEVER, scratch.drafts.shape[2] - 2 * BLOCK_NODES
+    left, right = -_FOOTPRINT_ENDS * sigma, _FOOTPRINT_ENDS * sigma
+    low = right + sunk(ray, table.highest)[0]
+    last = max(left + sunk(ray, table.lowest)[0], low - _FARTHEST)
+    while low > last and covered > left:
+        # The next cut on the way from the viewer.
+        high, low = low, last
+        if abs(ex) > _NEAREST:
+            low = max(low, min((next_cut(x0 + high * ex, ex < 0.0, warp_radius) - x0) / ex, high - _NEAREST))
+        if abs(ey) > _NEAREST:
+            low = max(low, min((next_cut(y0 + high * ey, ey < 0.0, weft_radius) - y0) / ey, high - _NEAREST))
+        in_x, in_y = x0 + 0.5 * (low + high) * ex, y0 + 0.5 * (low + high) * ey
+        column, row = math.floor(in_x), math.floor(in_y)
+        # Of whole numbers: a quotient of floats is rounded, and integer division is slow.
+        repeats_x, repeats_y = math.floor((column + 0.5) * per_ends), math.floor((row + 0.5) * per_picks)
+        cell = int((row - picks * repeats_y) * ends + column - ends * repeats_x)
+        p = piece_at(table.piece_starts, table.bounds, cell, np.float32(in_x - column), np.float32(in_y - row))
+        if p < 0 or high - low < 2.0 * _NEAREST:
+            continue
+        family, first, bounds = table.pieces[p, FAMILY], table.pieces[p, BLOCK] * per_grid, table.bounds[p]
+        if family == GAP:
+            q_low, q_high = max(low - of_gap, left), min(high - of_gap, right, covered)
+            covered = min(covered, low - of_gap)
+            if q_high > q_low:
+                q = 0.5 * (q_low + q_high)
+                share = view_line.density * (q_high - q_low) * math.exp(-0.5 * (q / sigma) ** 2)
+                at_x, at_y = x0 + (q + of_gap) * ex - column, y0 + (q + of_gap) * ey - row
+                gaps += share * float(_gap_seen(table, look, bounds, first, at_x, at_y))
+            continue
+        if low - sunk(ray, table.crowns[p])[0] >= covered:
+            continue
+        curve = _curve_of(table, p, ray, x0 - column, y0 - row)
+        start, stop, seen, covered = _interval(curve, ray, low, high, sigma, covered)
+        kind = column % of_warp if family == WARP else of_warp + row % of_weft
+        k = stops[kind]
+        if stop <= start or k >= limit:
+            continue
+        count = min(1 + int(max((stop - start) / _LENGTH, seen / (_DEVIATIONS * sigma))), _MOST_IN_INTERVAL)
+        _write_draft(
+            scratch.drafts[kind], k, start, stop, count, curve, view_line, bounds, family, size, scratch.line
+        )  # fmt: skip
+        for i in range(8):
+            scratch.firsts[kind, k + i] = first
+        stops[kind] = k + count
+    return gaps
 
 
 @inlined_kernel
@@ -323,124 +452,20 @@ def place_on_view_lines(
     Writes `Scratch.drafts` and `Scratch.firsts`, whole blocks of each kind of yarn, and in `Scratch.stops` how many.
     Weights are shares of the footprint in the fabric plane, which A(wo) turns into shares of its rays.
     """
-    ends, picks, size = table.repeat[0], table.repeat[1], table.grid.shape[2]
-    stops, lines, line, drafts, firsts = scratch.stops, scratch.view_lines, scratch.line, scratch.drafts, scratch.firsts
-    stops[:] = 0
-    per_ends, per_picks = 1.0 / ends, 1.0 / picks
-    of_warp, of_weft, per_grid = table.kinds[0], table.kinds[1], AZIMUTHS * size * size
+    scratch.stops[:] = 0
     xx, yy, xy = look.dx * look.dx, look.dy * look.dy, look.rho * look.dx * look.dy
-    ex, ey = ray.dx, ray.dy
+    ex, ey, lines, gaps = ray.dx, ray.dy, scratch.view_lines, 0.0
     # Deviation across the azimuth; drift and deviation along it, given the place across.
-    sigma_w = math.sqrt(xx * ey * ey + yy * ex * ex - 2.0 * xy * ex * ey)
-    drift = (ex * ey * (yy - xx) + xy * (ex * ex - ey * ey)) / (sigma_w * sigma_w)
-    sigma = math.sqrt(max(xx * yy - xy * xy, 0.0)) / sigma_w
-    warp_radius, weft_radius = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
-    before, _ = sunk(ray, table.highest)
-    after, _ = sunk(ray, table.lowest)
-    of_gap, _ = sunk(ray, 0.0)
-    gaps, limit = 0.0, drafts.shape[2] - 2 * BLOCK_NODES
-    count_lines = _lines_across(
-        ray, look.x, look.y, sigma_w, warp_radius, weft_radius, 2.0 * _CUT * sigma, lines
-    )  # fmt: skip
-    for j in range(count_lines):
+    across = math.sqrt(xx * ey * ey + yy * ex * ex - 2.0 * xy * ex * ey)
+    drift = (ex * ey * (yy - xx) + xy * (ex * ex - ey * ey)) / (across * across)
+    sigma = math.sqrt(float(max(xx * yy - xy * xy, np.float32(0.0)))) / across
+    radii = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
+    for j in range(_lines_across(ray, look.x, look.y, across, *radii, 2.0 * _FOOTPRINT_ENDS * sigma, lines)):
         w, apart = lines[0, j], lines[1, j]
-        of_line = apart / (2.0 * math.pi * sigma_w * sigma) * math.exp(-0.5 * (w / sigma_w) ** 2)
-        # The line runs through (x, y), s = 0 being where the footprint's density is greatest on it.
-        x0, y0 = look.x - w * ey + drift * w * ex, look.y + w * ex + drift * w * ey
-        left, right = -_CUT * sigma, _CUT * sigma
-        s, covered = right + before, _NEVER
-        last = max(left + after, s - 200.0)
-        while s > last and covered > left:
-            # The next cut on the way from the viewer.
-            until = last
-            if abs(ex) > _NEAREST:
-                cut = next_cut(x0 + s * ex, ex < 0.0, warp_radius)
-                until = max(until, min((cut - x0) / ex, s - _NEAREST))
-            if abs(ey) > _NEAREST:
-                cut = next_cut(y0 + s * ey, ey < 0.0, weft_radius)
-                until = max(until, min((cut - y0) / ey, s - _NEAREST))
-            high, low = s, until
-            s = until
-            middle = 0.5 * (low + high)
-            column, row = math.floor(x0 + middle * ex), math.floor(y0 + middle * ey)
-            # Of whole numbers: a quotient of floats is rounded, and integer division is slow.
-            in_row, in_column = math.floor((row + 0.5) * per_picks), math.floor((column + 0.5) * per_ends)
-            cell = int((row - picks * in_row) * ends + column - ends * in_column)
-            p = piece_at(
-                table.piece_starts,
-                table.bounds,
-                cell,
-                np.float32(x0 + middle * ex - column),
-                np.float32(y0 + middle * ey - row),
-            )
-            if p < 0 or high - low < 2.0 * _NEAREST:
-                continue
-            family, first, box = table.pieces[p, FAMILY], table.pieces[p, BLOCK] * per_grid, table.bounds[p]
-            if family == GAP:
-                q_low, q_high = max(low - of_gap, left), min(high - of_gap, right, covered)
-                if q_high > q_low:
-                    q = 0.5 * (q_low + q_high)
-                    share = of_line * (q_high - q_low) * math.exp(-0.5 * (q / sigma) ** 2)
-                    at = q + of_gap
-                    gaps += share * _gap_seen(table, look, box, first, x0 + at * ex - column, y0 + at * ey - row)
-                covered = min(covered, low - of_gap)
-                continue
-            nearest = low - sunk(ray, table.extents[p, 1])[0]
-            if nearest >= covered:
-                continue
-            yarn, own = table.heights[family], table.floats[p]
-            side = -1.0 if box[CURVE] < 0.0 else 1.0
-            a, by_a, b, by_b = x0 - column - 0.5, ex, y0 - row - 0.5 + box[SHIFT], ey
-            if family == WEFT:
-                a, by_a, b, by_b = y0 - row - 0.5, ey, -(x0 - column - 0.5 + box[SHIFT]), -ex
-            curve = YarnCurve(
-                a, by_a, b, by_b, yarn[INVERSE_RADIUS], yarn[RADIUS], yarn[BETA], own[BEND_RADIUS], own[HALF_LENGTH],
-                own[AXIS_DROP], side,
-            )  # fmt: skip
-            crest = low
-            q_crest, at_low = _seen(curve, ray, low)
-            q_high, at_high = _seen(curve, ray, high)
-            if at_low < 0.0:
-                if at_high <= 0.0:
-                    covered = min(covered, q_high)
-                    continue
-                crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, q_high)
-            q_from, q_to = max(q_crest, left), min(q_high, right, covered)
-            covered = min(covered, q_crest)
-            if q_to <= q_from:
-                continue
-            start, stop = crest, high
-            if q_from > q_crest:
-                start = _at_place(curve, ray, crest, high, q_crest, q_high, q_from, _EDGE * sigma)
-            if q_to < q_high:
-                near = (_EDGE if q_to == right else _CLOSE) * sigma
-                stop = _at_place(curve, ray, crest, high, q_crest, q_high, q_to, near)
-            if stop <= start:
-                continue
-            kind = column % of_warp if family == WARP else of_warp + row % of_weft
-            count = 1 + int(max((stop - start) / _LENGTH, (q_to - q_from) / (_DEVIATIONS * sigma)))
-            count = min(count, _MOST_IN_INTERVAL)
-            radius = yarn[RADIUS]
-            turned = abs(curve.by_across) * (stop - start) > _STEEP * radius
-            v_from, v_to = start, stop
-            if turned:
-                v_from = arcsine(np.float32((curve.across + start * curve.by_across) * yarn[INVERSE_RADIUS]))
-                v_to = arcsine(np.float32((curve.across + stop * curve.by_across) * yarn[INVERSE_RADIUS]))
-            if stops[kind] >= limit:
-                continue
-            k = stops[kind]
-            low_along, high_along = (box[Y_LOW], box[Y_HIGH]) if family == WARP else (box[X_LOW], box[X_HIGH])
-            per = np.float32(size) / (high_along - low_along)
-            # Along a weft, y of its frame runs against x.
-            rows_from, rows_per = (_HALF - box[SHIFT] - low_along) * per, per if family == WARP else -per
-            _write_draft(
-                drafts[kind], k, count, np.float32(v_from), np.float32(v_to), turned, curve, box, np.float32(of_line),
-                np.float32(apart), rows_from, rows_per, line,
-            )  # fmt: skip
-            for i in range(8):
-                firsts[kind, k + i] = first
-            stops[kind] = k + count
-    for kind in range(of_warp + of_weft):
-        if stops[kind] > 0:
-            stops[kind] = _fill_block(drafts[kind], firsts[kind], stops[kind])
+        density = apart / (2.0 * math.pi * across * sigma) * math.exp(-0.5 * (w / across) ** 2)
+        x, y = look.x - w * ey + drift * w * ex, look.y + w * ex + drift * w * ey
+        gaps += _place_line(table, scratch, look, ray, ViewLine(x, y, density, sigma, apart))
+    for kind in range(len(scratch.stops)):
+        if scratch.stops[kind] > 0:
+            scratch.stops[kind] = _fill_block(scratch.drafts[kind], scratch.firsts[kind], scratch.stops[kind])
     return np.float32(gaps) * look.oz, np.float32(1.0 / sigma)

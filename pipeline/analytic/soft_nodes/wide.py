@@ -37,7 +37,7 @@ NARROW: Final = 0.25
 """Deviation, in yarn spacings, below which fixed nodes are too far apart: a footprint places its own."""
 
 _REACH = np.float32(REACH)
-_RESOLVED, _STRAIGHT = np.float32(0.12), np.float32(1e-6)
+_RESOLVED, _SHORTEST_RUN = np.float32(0.12), np.float32(1e-6)
 _0, _HALF, _1, _2 = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
 
 
@@ -200,7 +200,7 @@ def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -
     A node of height h is displaced by d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) towards the viewer (view_lines).
     """
     run = np.sqrt(look.ox * look.ox + look.oy * look.oy)
-    ex, ey = (look.ox / run, look.oy / run) if run > _STRAIGHT else (_1, _0)
+    ex, ey = (look.ox / run, look.oy / run) if run > _SHORTEST_RUN else (_1, _0)
     run = run / look.oz
     bent, plane = _2 * look.bend_o * run * run, np.float32(table.plane)
     dx, dy, rho = max(look.dx, _RESOLVED), max(look.dy, _RESOLVED), look.rho

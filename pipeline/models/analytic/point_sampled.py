@@ -51,7 +51,7 @@ class PointSampledOptions(AnalyticOptions):
     or as ramps."""
 
     parallax: bool = False
-    """Whether points are view rays, which end where they first meet the cloth; must be that of the truth."""
+    """True if points are view rays, which end where they first meet the cloth; must be that of the truth."""
 
     horizon_nodes: ClassVar[int] = 32
     """Nodes of the horizon map on each piece of yarn in a cell, across and along; the nearest is taken."""

@@ -52,7 +52,7 @@ class SoftNodesOptions(AnalyticOptions):
     levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
     """Levels of detail k, from few nodes to many; each is a row of the tables."""
     parallax: bool = False
-    """Whether footprints are patches of view rays; must be that of the truth."""
+    """True if footprints are patches of view rays; must be that of the truth."""
 
     @property
     def kinds(self) -> frozenset[str]:
