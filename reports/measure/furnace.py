@@ -64,7 +64,7 @@ def measure_furnace(method: Method, fabric: Fabric) -> list[Record]:
     coloured = energy @ colours(fabric)
     figures = [energy[:, 2:].sum(axis=1), energy[:, :2].sum(axis=1), coloured.max(axis=1)]
     try:
-        behind = _energy(method, fabric, queries._replace(wi=queries.wi * np.float32([1.0, 1.0, -1.0])))
+        behind = _energy(method, fabric, queries._replace(wi=queries.wi * np.array([1.0, 1.0, -1.0], np.float32)))
     except BadInput:
         pass  # it knows light from the viewer's side only
     else:
