@@ -20,8 +20,8 @@ at most for k_s = 0. So it is at most 1 for
 
 in every channel, which is `Yarn.most_diffuse`. A patch is a mean of points, and in gaps the sum is 1. Light that yarns
 give to each other adds to no radiance above 1, as each gives at most what it sees. (Cosines are those of frame = "ply".
-The sum over viewers of one light is at most 1 for what is reflected; the transmitted diffuse lobe is not reciprocal and
-may exceed it: 2.5 for light at 88 degrees behind a satin bent by 2 degrees.)
+Summed over viewers, what a repeat reflects of one light is bounded alike; the diffuse lobe of light from behind is not
+reciprocal and may exceed 1: it has 2.5 for light at 88 degrees behind a satin bent by 2 degrees.)
 """
 
 from __future__ import annotations
