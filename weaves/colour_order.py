@@ -10,11 +10,11 @@ from typing import Annotated, Any, Final, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, StrictInt, ValidationError, model_validator
+from pydantic import Field, StrictInt, model_validator
 
 from weaves.colour import Colour, linear_rgb
 from weaves.draft import smallest_period
-from weaves.errors import nearest
+from weaves.errors import BadInput, nearest
 from weaves.validation import Frozen
 from weaves.yarn import Yarn
 
@@ -44,17 +44,18 @@ class PaletteColour(Frozen):
     specular: Colour | None = None
     """Colour k_s of the light scattered once by the fibres."""
     diffuse_transmission: Colour | None = None
-    """Colour k_dt of the light scattered many times that leaves on the other side; if not given, at most 1 - k_d."""
+    """Colour k_dt of the light scattered many times that leaves on the other side; if not given, as much of the yarn's
+    as the other colours leave (`Yarn.most_diffuse`)."""
 
-    def on(self, yarn: Yarn) -> Yarn:
-        """Return a yarn in this colour; ValidationError if it would make light."""
+    def on(self, yarn: Yarn, thickness: float) -> Yarn:
+        """Return a yarn in this colour, of a layer of an optical thickness."""
+        specular = yarn.specular if self.specular is None else self.specular
+        dyed = yarn.model_copy(update={"specular": specular, "diffuse": self.diffuse})
         through: Any = self.diffuse_transmission
         if through is None:
-            limits = zip(yarn.diffuse_transmission_rgb, linear_rgb(self.diffuse), strict=True)
-            through = tuple(min(k, 1.0 - back) for k, back in limits)
-        specular = yarn.specular if self.specular is None else self.specular
-        given = {"specular": specular, "diffuse": self.diffuse, "diffuse_transmission": through}
-        return Yarn.model_validate(yarn.model_dump() | given)
+            limits = zip(yarn.diffuse_transmission_rgb, dyed.most_diffuse(thickness), dyed.diffuse_rgb, strict=True)
+            through = tuple(max(min(k, most - back), 0.0) for k, most, back in limits)
+        return dyed.model_copy(update={"diffuse_transmission": through})
 
 
 class ColourOrder(Frozen):
@@ -98,19 +99,19 @@ class ColourOrder(Frozen):
         names = np.array([name for name, number in runs for _ in range(number)], dtype=object)
         return tuple(names[: smallest_period(names)])
 
-    def refuse_gain(self, axis: str, yarn: Yarn) -> None:
-        """Refuse colours in which the threads of a yarn would send back more light than they receive; ValueError."""
+    def refuse_gain(self, axis: str, yarn: Yarn, thickness: float) -> None:
+        """Refuse colours in which the threads of a yarn would send out more light than they receive; BadInput."""
         for name in sorted(set(self.threads(axis))):
             try:
-                self.palette[name].on(yarn)
-            except ValidationError as error:
-                reason = error.errors()[0]["msg"].removeprefix("Value error, ")
-                raise ValueError(f"colour {name!r} of the {axis}: {reason}") from error
+                self.palette[name].on(yarn, thickness).refuse_gain(thickness)
+            except BadInput as error:
+                key = f"palette.{name}.{error.key}"
+                raise BadInput(error.where, key, error.value, f"on {axis} {error.allowed}") from error
 
-    def thread_colours(self, axis: str, yarn: Yarn) -> ThreadColours:
+    def thread_colours(self, axis: str, yarn: Yarn, thickness: float) -> ThreadColours:
         """Return the colours of the ``"ends"`` or ``"picks"``, which are of one yarn; a single row without an order."""
         names = self.threads(axis)
-        dyed = {name: self.palette[name].on(yarn) for name in set(names)}
+        dyed = {name: self.palette[name].on(yarn, thickness) for name in set(names)}
         return colours_of_yarns([dyed[name] for name in names] or [yarn])
 
 

@@ -73,9 +73,15 @@ class Fabric(Frozen):
 
     @model_validator(mode="after")
     def _keeps_energy(self) -> Fabric:
-        if self.colours is not None:
-            self.colours.refuse_gain("ends", self.warp)
-            self.colours.refuse_gain("picks", self.weft)
+        thickness = self.optical_thickness
+        for key, axis, yarn in (("warp", "ends", self.warp), ("weft", "picks", self.weft)):
+            try:
+                yarn.refuse_gain(thickness)
+                if self.colours is not None:
+                    key = "colours"
+                    self.colours.refuse_gain(axis, yarn, thickness)
+            except BadInput as error:
+                raise BadInput(self.name, f"{key}.{error.key}", error.value, error.allowed) from error
         return self
 
     @model_serializer(mode="wrap")
@@ -88,7 +94,9 @@ class Fabric(Frozen):
         """Return the colours of the ends and of the picks, one row for each thread after which they repeat."""
         if self.colours is None:
             return colours_of_yarns([self.warp]), colours_of_yarns([self.weft])
-        return self.colours.thread_colours("ends", self.warp), self.colours.thread_colours("picks", self.weft)
+        axes = (("ends", self.warp), ("picks", self.weft))
+        ends, picks = (self.colours.thread_colours(axis, yarn, self.optical_thickness) for axis, yarn in axes)
+        return ends, picks
 
     @property
     def weave(self) -> Draft:

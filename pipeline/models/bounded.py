@@ -6,9 +6,12 @@ i_z) / pi integrates to at most 1 over the viewer's side, and so does any mean o
 
     answer <= bound  for every wi   implies   integral of C_warp + C_weft over wi <= 1
 
-whatever the network has learnt. The specular bounds, scattered once, integrate to less than one half of the light that
-meets the layer. The bound costs one evaluation of the soft nodes, about a microsecond a query; `selvage` evaluates them
-anyway, and is bounded from the start.
+whatever the network has learnt. With wi behind, the transmitted lobe takes the place of the diffuse one, and integrates
+to at most 1 as well. The specular bounds, reflected and transmitted, integrate together to what a white layer scatters
+once. So in the colours of any fabric (weaves.yarn) the four together, and what goes straight through, are at most 1.
+
+The bound costs one evaluation of the soft nodes, about a microsecond a query; `selvage` evaluates them anyway, and is
+bounded from the start.
 
 A component above its bound gives the excess to the same component of the other yarn, as far as its bound allows. On
 unseen cloth networks predict the sum of both yarns better than the share of each: their errors in warp and weft have
@@ -17,18 +20,22 @@ opposite signs, and a bound that only cuts removes one of the two.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.features import read_behind, read_queries
 from pipeline.analytic.soft_nodes.groups import USUAL
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import nbytes
 from pipeline.models.analytic.soft_nodes import soft_tables
-from pipeline.models.method import Around, Method, in_chunks, refuse_other
+from pipeline.models.method import Around, Method, in_chunks, refuse_other, row_by_row
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
+_BELOW = -1e3  # a horizon that hides nothing
 _OTHER_YARN = [1, 0, 3, 2]  # of each component, the same one of the other yarn
 
 
@@ -38,7 +45,7 @@ class Bounded(Around):
     Parameters
     ----------
     method : Method
-        Anything that answers for flat cloth lit from the viewer's side.
+        Anything that answers for flat cloth, lit from either side.
     """
 
     def __init__(self, method: Method) -> None:
@@ -52,13 +59,28 @@ class Bounded(Around):
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
         """Answer N queries, float32 (N, 4). BadInput for queries that the method or the soft nodes do not know."""
-        refuse_other(queries, f"the method {self.name} answers", ("stretch",))
+        refuse_other(queries, f"the method {self.name} answers", ("stretch", "behind"))
         result, table = self.method.predict(fabric, queries, seed), self._tables.of(fabric)
-        return limited(result, in_chunks(queries, lambda part: read_queries(table, part).bounds))
+        bounds = row_by_row(
+            queries,
+            queries.wi[:, 2] < 0.0,
+            lambda part: in_chunks(part, partial(read_behind, _with_open_back(table)), 5)[:, :4],
+            lambda part: in_chunks(part, lambda rows: read_queries(table, rows).bounds),
+        )
+        return limited(result, bounds)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes and those of the table."""
         return self.method.bytes_stored(fabric) + nbytes(self._tables.of(fabric))
+
+
+def _with_open_back(table: SoftNodeTable) -> SoftNodeTable:
+    """Return a table of the front with which `read_behind` answers without shadows of the light.
+
+    Narrow footprints keep the ramp of a horizon in the fabric plane.
+    """
+    low = np.full_like(table.mean, _BELOW)
+    return table._replace(behind_mean=low, behind_sharpness=table.sharpness, behind_grid=np.zeros_like(table.grid))
 
 
 def limited(components: npt.NDArray[np.float32], bounds: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

@@ -2,9 +2,10 @@
 
     E(wo) = integral of f_P(wi, wo) over all wi on the viewer's side = 2 pi <f_P> over directions even in solid angle
 
-The directions are a shifted R2 sequence, the same for every method. Three figures, each the worst over positions,
-footprints and angles of the viewer: the diffuse components with k_d = 1, the specular ones with k_s = 1, the brightest
-channel of the fabric in its own colours.
+The directions are a shifted R2 sequence, the same for every method. Figures are the worst over positions, footprints
+and angles of the viewer: the diffuse components with k_d = 1, the specular ones with k_s = 1, the brightest channel of
+the fabric in its own colours. A method that answers light from behind has a fourth: the brightest channel of all that
+comes from both sides, with what goes straight through gaps and yarns.
 """
 
 from __future__ import annotations
@@ -15,10 +16,13 @@ from typing import Final
 
 import numpy as np
 
+from pipeline.compiled.arrays import Float64
+from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
 from pipeline.scenes.shade import colours
 from pipeline.truth.query import Queries
 from reports.record import Metric, Record
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 ANGLES: Final = (0.0, 30.0, 60.0, 80.0, 88.0)
@@ -32,7 +36,7 @@ DIRECTIONS: Final = 256
 
 _AZIMUTHS = (0.4, 2.1)
 _PLACES = 4
-_METRICS: Final[tuple[Metric, ...]] = ("furnace_diffuse", "furnace_specular", "furnace_colour")
+_METRICS: Final[tuple[Metric, ...]] = ("furnace_diffuse", "furnace_specular", "furnace_colour", "furnace_all")
 
 
 def furnace_queries(repeat: tuple[int, int]) -> Queries:
@@ -53,10 +57,25 @@ def furnace_queries(repeat: tuple[int, int]) -> Queries:
 
 
 def measure_furnace(method: Method, fabric: Fabric) -> list[Record]:
-    """Return the three worst figures of a method on a fabric."""
+    """Return the worst figures of a method on a fabric."""
     method.prepare(fabric)
-    values = method.predict(fabric, furnace_queries(fabric.weave.repeat), 0).astype(np.float64)
-    energy = 2.0 * math.pi * values.reshape(-1, DIRECTIONS, 4).mean(axis=1)
-    figures = (energy[:, 2:].sum(axis=1), energy[:, :2].sum(axis=1), (energy @ colours(fabric)).max(axis=1))
+    queries = furnace_queries(fabric.weave.repeat)
+    energy = _energy(method, fabric, queries)
+    coloured = energy @ colours(fabric)
+    figures = [energy[:, 2:].sum(axis=1), energy[:, :2].sum(axis=1), coloured.max(axis=1)]
+    try:
+        behind = _energy(method, fabric, queries._replace(wi=queries.wi * np.array([1.0, 1.0, -1.0], np.float32)))
+    except BadInput:
+        pass  # it knows light from the viewer's side only
+    else:
+        looks = queries.take(slice(None, None, DIRECTIONS))
+        straight = Fallback(method, ("behind",)).transparency(fabric, looks).astype(np.float64)
+        figures.append((coloured + behind @ colours(fabric, transmitted=True)).max(axis=1) + straight)
     subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, scene="queries")
-    return [subject.of(m, float(x.max()), len(x)) for m, x in zip(_METRICS, figures, strict=True)]
+    return [subject.of(m, float(x.max()), len(x)) for m, x in zip(_METRICS, figures, strict=False)]
+
+
+def _energy(method: Method, fabric: Fabric, queries: Queries) -> Float64:
+    """Return the share of an even sky that each component of a patch returns, (N, 4)."""
+    values = method.predict(fabric, queries, 0).astype(np.float64)
+    return np.asarray(2.0 * math.pi * values.reshape(-1, DIRECTIONS, 4).mean(axis=1))

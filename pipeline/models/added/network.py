@@ -196,5 +196,6 @@ def _built(method: Any, options: AddedMethod, root: Path, fabrics: Sequence[Fabr
 
 
 def _uncoloured(name: str, optics: Mapping[str, Any]) -> Fabric:
-    """Return the fabric of a name and of these optics, in the colours of a file that gives none."""
-    return Fabric.model_validate({**optics, "name": name, "draft": Matrix(rows=tuple(optics["draft"]))})
+    """Return the fabric of a name and of these optics, its diffuse colours black: legal at any optical thickness."""
+    yarns = {key: optics[key] | {"diffuse": (0.0, 0.0, 0.0)} for key in ("warp", "weft")}
+    return Fabric.model_validate({**optics, **yarns, "name": name, "draft": Matrix(rows=tuple(optics["draft"]))})

@@ -67,7 +67,7 @@ EDITS = {
     "training": ("steps = 10", "steps = 11", "woven|timing|^report"),
     "where and how often": ("steps = 10", 'steps = 10\ndevice = "cpu"\ncheckpoint_every = 7', "^$"),
     "network": ("hidden = 32", "hidden = 16", "woven|timing|^report"),
-    "colour": ('diffuse = "#804020"', 'diffuse = "#0000ff"', "^bench.* own|^report"),
+    "colour": ('diffuse = "#804020"', 'diffuse = "#0000cc"', "^bench.* own|^report"),
     "frames": ("frames = 4", "frames = 5", "frames|errors|noise|^report"),
     "runtimes": ("frames = 4", 'frames = 4\nruntimes = ["onnx"]', "errors of (woven|neumip)|timing|^report"),
     "repeats": ("frames = 4", "frames = 4\ntiming_repeats = 21", "timing|^report"),

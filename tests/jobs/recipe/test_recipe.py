@@ -88,6 +88,12 @@ def test_bad_input_is_one_sentence(files, old, new, words):
     refused(files.exchange(old, new), words)
 
 
+def test_the_bound_knows_light_from_behind_but_no_curved_cloth(files):
+    files.exchange("frames = 4", "frames = 4\nbounds = true").exchange("sigma = [0.05, 8.0]", "behind = 0.5")
+    refused(files, ["models.0.name = 'woven'", "queries with behind"])
+    refused(files.exchange("behind = 0.5", "curvature = [0.1, 0.4]"), ["bench.bounds = True", "with curvature"])
+
+
 def test_a_table_is_refused_for_cloth_of_too_many_cells(files):
     """A stripe that shifts by one pick an end in 9 of 10 picks: no translation carries it onto itself."""
     rows = ["#" + "." * 9, *["#." * 5] * 9]

@@ -137,7 +137,7 @@ def test_a_move_by_repeats_of_weave_and_colours_changes_nothing():
 
 
 def test_light_from_behind_takes_the_transmission_colours():
-    palette = {"red": {"diffuse": [0.4, 0.1, 0.2], "diffuse_transmission": [0.5, 0.3, 0.1]}}
+    palette = {"red": {"diffuse": [0.1, 0.1, 0.2], "diffuse_transmission": [0.5, 0.3, 0.1]}}
     fabric = coloured("voile", palette=palette, ends=[["red", 1]])
     found = footprint_colours(fabric, queries(2, np.random.default_rng(1), behind=True))
     assert found[:, 2] == pytest.approx(np.tile([0.5, 0.3, 0.1], (2, 1)))

@@ -30,15 +30,15 @@ def test_shade_applies_each_colour_to_its_component():
 
 def test_footprints_of_a_check_take_the_colours_of_their_own_threads():
     """A white end beside a black one: each footprint on one end has its colour, a wide one the mean of both."""
-    palette = {"white": {"diffuse": [1.0, 1.0, 1.0]}, "black": {"diffuse": [0.0, 0.0, 0.0]}}
+    palette = {"white": {"diffuse": [0.8, 0.8, 0.8]}, "black": {"diffuse": [0.0, 0.0, 0.0]}}
     order = {"palette": palette, "ends": [["white", 2], ["black", 2]]}
     fabric = Fabric.model_validate(load_fabric("denim").model_dump() | {"colours": order})
     places = np.array([1.0, 3.0, 5.0, 2.0])
     size = np.array([0.1, 0.1, 0.1, 50.0])
     queries = lit(np.ones(4))._replace(u=places, sigma=size, sigma_minor=size)
     rgb = shade(fabric, np.tile([0.0, 0.0, 1.0, 0.0], (4, 1)), queries)
-    assert rgb[:, 0] == pytest.approx([1.0, 0.0, 1.0, 0.5], abs=1e-3)
-    assert colours(fabric)[2] == pytest.approx([0.5] * 3)
+    assert rgb[:, 0] == pytest.approx([0.8, 0.0, 0.8, 0.4], abs=1e-3)
+    assert colours(fabric)[2] == pytest.approx([0.4] * 3)
 
 
 UP, SIDE, DOWN = [0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 0.6, -0.8]

@@ -16,7 +16,7 @@ def woven(name, rows=None, warp=(), weft=(), **changes):
     return fabric.model_copy(update=yarns | ({"draft": Matrix(rows=tuple(rows))} if rows else {}))
 
 
-PALETTE = {"red": {"diffuse": [0.9, 0.1, 0.2], "specular": [0.4, 0.2, 0.1]}, "blue": {"diffuse": [0.1, 0.2, 0.8]}}
+PALETTE = {"red": {"diffuse": [0.6, 0.1, 0.2], "specular": [0.4, 0.2, 0.1]}, "blue": {"diffuse": [0.1, 0.2, 0.5]}}
 
 
 def coloured(cloth, **order):

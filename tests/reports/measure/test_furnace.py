@@ -8,6 +8,7 @@ import pytest
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.bounded import Bounded
+from pipeline.models.method import refuse_other
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.measure.furnace import DIRECTIONS, furnace_queries, measure_furnace
@@ -29,6 +30,33 @@ def test_closed_forms():
     assert values["furnace_specular"] == pytest.approx(0.2 * math.pi, rel=1e-5)
 
 
+def test_both_sides_and_what_goes_straight_through_add_up():
+    """A quarter back, a third through, diffuse; half of what is behind is seen straight: in colours of one channel."""
+    denim = load_fabric("denim")
+    black, red = (0.0, 0.0, 0.0), (0.5, 0.0, 0.0)
+    warp = denim.warp.model_copy(update={"specular": black, "diffuse": red, "diffuse_transmission": red})
+    fabric = denim.model_copy(update={"warp": warp})
+
+    def both(queries):
+        share = np.where(queries.wi[:, 2] > 0.0, 1 / 4, 1 / 3)
+        return np.abs(queries.wi[:, 2:]) / math.pi * share[:, None] * [[0.0, 0.0, 1.0, 0.0]]
+
+    method = FakeMethod(both)
+    method.transparency = lambda fabric, looks, seed: np.full(len(looks.u), 0.5, np.float32)
+    values = {record.metric: record.value for record in measure_furnace(method, fabric)}
+    assert values["furnace_colour"] == pytest.approx(0.5 / 4, abs=2e-3)
+    assert values["furnace_all"] == pytest.approx(0.5 / 4 + 0.5 / 3 + 0.5, abs=4e-3)
+
+
+def test_a_method_that_knows_one_side_has_no_figure_of_both():
+    def front(queries):
+        refuse_other(queries, "fake answers")
+        return lambertian(queries)
+
+    metrics = [record.metric for record in measure_furnace(FakeMethod(front), load_fabric("denim"))]
+    assert metrics == ["furnace_diffuse", "furnace_specular", "furnace_colour"]
+
+
 def test_every_patch_sees_the_same_lights():
     queries = furnace_queries((4, 4))
     lights = queries.wi.reshape(-1, DIRECTIONS, 3)
@@ -47,12 +75,14 @@ def test_the_truth_makes_no_light():
 def test_the_brightest_method_returns_at_most_what_arrives_and_soft_nodes_no_more(name):
     """A network gone wrong answers a thousand times too much: what is left are the soft nodes without shadows.
 
-    At most 1 but for the error of 256 directions. Diffuse: exactly bounded. Specular, scattered once: far below.
+    At most 1 but for the error of 256 directions. Diffuse: exactly bounded. Specular, scattered once: far below. All
+    that comes from both sides, in legal colours: at most 1.
     """
     fabric = load_fabric(name)
     bright = FakeMethod(lambda queries: np.full((len(queries.u), 4), 1e3, np.float32))
     found = {r.metric: r.value for r in measure_furnace(Bounded(bright), fabric)}
     assert found["furnace_diffuse"] <= 1.005
     assert found["furnace_specular"] < 0.6
+    assert found["furnace_colour"] < found["furnace_all"] <= 1.005
     reading = read_queries(tabulate(fabric), furnace_queries(fabric.weave.repeat))
     assert (reading.components <= reading.bounds * 1.0001 + 1e-7).all()

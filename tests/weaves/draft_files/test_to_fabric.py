@@ -2,9 +2,11 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
+from weaves.colour import linear_rgb
 from weaves.draft_files.read import read_draft
 from weaves.draft_files.to_fabric import fabric_of
 from weaves.errors import BadInput
@@ -29,7 +31,7 @@ def test_a_twill_with_its_size_and_the_yarns_of_denim(imported, tmp_path):
     fabric = found.fabric
     assert fabric.weave.rows() == BALANCED_ROWS
     assert fabric.yarns_per_cm == (23.62, 3.937)
-    assert fabric.colours is None and (fabric.warp.diffuse, fabric.weft.diffuse) == ("#ffffff", "#aa1020")
+    assert fabric.colours is None
     assert (fabric.warp.width, fabric.weft.width) == (0.75, 0.5)
     assert fabric.warp.optics() | {"width": 1.0} == denim.warp.optics()
     assert fabric.weft.optics() | {"width": 1.0} == denim.weft.optics()
@@ -53,8 +55,10 @@ def test_a_draft_of_214_threads_with_nine_colours_is_plain(imported):
     assert fabric.colours is not None and len(fabric.colours.palette) == 9
     ends, picks = fabric.colours.threads("ends"), fabric.colours.threads("picks")
     assert len(ends) == len(picks) == 214 and ends == picks[::-1]
-    hexes = [fabric.colours.palette[name].diffuse for name in ends]
-    assert hexes == [f"#{25 * (k - 1):02x}{255 - 20 * (k - 1):02x}50" for k in colours]
+    # The greenest makes light: all are dimmed alike.
+    read = np.array([linear_rgb(fabric.colours.palette[name].diffuse) for name in ends])
+    stated = np.array([linear_rgb(f"#{25 * (k - 1):02x}{255 - 20 * (k - 1):02x}50") for k in colours])
+    np.testing.assert_allclose(read, stated * fabric.weft.most_diffuse(2.0)[1], atol=1.1e-6)
     assert (fabric.warp.width, fabric.weft.width) == (1.0, 1.0)
     assert sum("1.15 of the spacing" in sentence for sentence in found.assumed) == 2
 
@@ -78,7 +82,20 @@ def test_the_largest_draft_reads_back_from_its_fabric_file(imported, tmp_path):
 def test_stripes_in_the_ends_alone(imported):
     fabric = imported(wif(WARP_COLORS=numbered([1, 1, 1, 2] * 2))).fabric
     assert fabric.colours.ends == (("colour_1", 3), ("colour_2", 1)) and fabric.colours.picks == ()
-    assert fabric.warp.diffuse == "#ffffff" and fabric.weft.diffuse == "#aa1020"
+    assert fabric.warp.diffuse == fabric.colours.palette["colour_1"].diffuse != fabric.weft.diffuse
+
+
+def test_colours_that_would_make_light_are_dimmed_alike_and_others_stay(imported):
+    found = imported(wif())
+    warp, weft = found.fabric.warp, found.fabric.weft
+    factor = min(warp.most_diffuse(2.0))
+    np.testing.assert_allclose(warp.diffuse_rgb, [factor] * 3, atol=1e-6)
+    np.testing.assert_allclose(weft.diffuse_rgb, factor * np.array(linear_rgb("#aa1020")), atol=1e-6)
+    said = f"Colours as bright as the file's would send back more light than arrives: all are taken times {factor:.3f}"
+    assert any(sentence.startswith(said) for sentence in found.assumed)
+    dull = imported(wif(COLOR_TABLE="1=200,200,200\n2=170,16,32"))
+    assert (dull.fabric.warp.diffuse, dull.fabric.weft.diffuse) == ("#c8c8c8", "#aa1020")
+    assert not any("light than arrives" in sentence for sentence in dull.assumed)
 
 
 def test_everything_assumed_is_said_and_kept(imported):

@@ -68,7 +68,7 @@ matrices = st.integers(2, 12).flatmap(
 def test_any_cloth_reads_back(again, matrix, ends, picks, size):
     over = np.array(matrix)
     assume(over.any(0).all() and over.any(1).all() and (~over).any(0).all() and (~over).any(1).all())
-    palette = {"a": {"diffuse": "#102030"}, "b": {"diffuse": "#ff8000"}, "c": {"diffuse": [0.5, 0.25, 0.125]}}
+    palette = {"a": {"diffuse": "#102030"}, "b": {"diffuse": "#e88000"}, "c": {"diffuse": [0.5, 0.25, 0.125]}}
     table = denim.model_dump() | {"draft": {"family": "matrix", "rows": Draft(over).rows()}}
     table |= {"colours": {"palette": palette, "ends": ends, "picks": picks}, "name": "cloth"}
     table |= {"yarns_per_cm": tuple(float(f"{yarns:.3g}") for yarns in size)} if size else {}
@@ -93,7 +93,7 @@ def test_the_file_is_as_other_programs_want_it():
 
 
 def test_colours_that_never_fit_the_structure_are_refused():
-    colours = {"palette": {"a": {"diffuse": "#102030"}, "b": {"diffuse": "#ff8000"}}}
+    colours = {"palette": {"a": {"diffuse": "#102030"}, "b": {"diffuse": "#e88000"}}}
     fabric = validated(Fabric, denim.model_dump() | {"colours": colours | {"ends": [["a", 1], ["b", 1400]]}}, "cloth")
     with pytest.raises(BadInput, match="5,604 ends: at most 4,096"):
         wif_text(fabric)
