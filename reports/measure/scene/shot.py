@@ -61,7 +61,7 @@ class ClothQueries:
     colours : float32 (M, 4, 3)
         The truth's colours of the components. Methods have those of the footprint's threads (pipeline.scenes.shade).
     rims : Queries
-        Places at silhouettes, in all frames, whose view rays may leave the cloth again.
+        Places at silhouettes, in all frames, of which some view rays leave the cloth again.
     coverage : float32 (R,)
         The truth's coverage of each.
     """
@@ -185,7 +185,7 @@ def shoot(name: str, options: ShotOptions, path: Path) -> None:
             columns |= {"fallback_values": fallback_values(fabric, queries, seed)}
             if fabric.colours is not None:
                 columns |= {"colours": component_colours(fabric, queries, truth, seed).mean.astype(np.float32)}
-            sampled = doubt > 0.0  # the rest is certain
+            sampled = (doubt > 0.0) & (of_rims < 1.0)  # the rest is certain, or covered
             columns |= {_RIM + name: column[sampled] for name, column in rims._asdict().items()}
             columns |= {_RIM + "coverage": of_rims[sampled]}
             parts[key].append(columns)
