@@ -36,7 +36,7 @@ from pipeline.models.patch_bsdf import USUAL_METHOD, PatchBSDF, Sample
 from pipeline.scenes.gbuffer import reduced
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import TruthAnswers
-from pipeline.scenes.places import FLAT, tilted
+from pipeline.scenes.places import LEAST_CURVATURE, tilted
 from pipeline.scenes.scene import Yarns
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries
@@ -248,7 +248,7 @@ class Worn:
         """Return the curvature along the view ray, 1/yarn spacings; what is almost flat is flat."""
         per_length = np.hypot(*(hits.stride * yarns).T)
         kappa = hits.bend / np.where(per_length > 0.0, per_length, np.inf)
-        return np.where(kappa > FLAT, np.minimum(kappa, STEEPEST_CURVATURE), 0.0)
+        return np.where(kappa > LEAST_CURVATURE, np.minimum(kappa, STEEPEST_CURVATURE), 0.0)
 
     def _footprints(self, hits: RayHits, yarns: Float64) -> Footprints:
         if self.options.sigma is not None:

@@ -38,7 +38,7 @@ Floats = npt.NDArray[np.float64]
 _STEP = 0.1  # in yarn spacings
 _PROBES = 6
 _DEEPEST = 4.0  # yarn spacings by which the heights of a cloth differ at most
-FLAT: Final = 1e-4
+LEAST_CURVATURE: Final = 1e-4
 """Curvature that counts as 0, 1/yarn spacings: rounding makes it of planes; it drops .001 over four spacings."""
 
 
@@ -104,7 +104,7 @@ def curvature_of(loaded: Loaded, places: Places, wo: Floats) -> Floats:
         turns.append(np.where(near, hits.normal, normal))
     moved = dot(moves[0] - moves[1], tangent)
     bend = dot(turns[0] - turns[1], tangent) / np.where(moved > 0.0, moved, 1.0)
-    kappa = np.where(bend * spacing > FLAT, bend * spacing, 0.0)
+    kappa = np.where(bend * spacing > LEAST_CURVATURE, bend * spacing, 0.0)
     return np.asarray(np.minimum(kappa, STEEPEST_CURVATURE))
 
 
@@ -136,7 +136,7 @@ def least_curvature(loaded: Loaded, places: Places, wo: Floats, at_place: Floats
         bend = dot(hits.normal - turned, met - place) / np.where(near, square, 1.0) * spacing
         least = np.where(near, np.minimum(least, bend), least)
         place, turned = (np.where(near[:, None], new, old) for new, old in ((met, place), (hits.normal, turned)))
-    return np.where(least > FLAT, least, 0.0)
+    return np.where(least > LEAST_CURVATURE, least, 0.0)
 
 
 def rims_of(loaded: Loaded, places: Places, wo: Floats, curvature: Floats) -> npt.NDArray[np.int64]:
