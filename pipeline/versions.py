@@ -30,10 +30,10 @@ BOUND: Final = 2
 FALLBACK: Final = 8
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
-SCENES: Final = 1
+SCENES: Final = 2
 """The shipped scenes, and the queries of any scene."""
 
-SCENE_BENCH: Final = 4
+SCENE_BENCH: Final = 5
 """Measurements in scenes and the files they write (`reports.measure.scene`)."""
 
 VIEWER: Final = 1

@@ -4,8 +4,10 @@
 
 Properties are the fields of `pipeline.mitsuba.worn.ClothOptions`. A footprint is, in this order: the property
 `sigma`; the ray's partial derivatives (`si.duv_dx`, `si.duv_dy`), which the integrator `twillight_path` keeps at every
-bounce; the property `pixel_angle`. Components: 0 reflection, 1 transmission, 2 light straight through gaps and yarns,
-which neither `eval` nor `pdf` knows, because it is a delta lobe (Null). Cloth counts as flat across a footprint.
+bounce; the property `pixel_angle`. Components: 0 reflection, 1 transmission, 2 light straight through gaps and yarns
+and past silhouettes, which neither `eval` nor `pdf` knows, because it is a delta lobe (Null). Cloth curves along the
+view ray as the shading normal's derivatives say (`si.dn_du`, `si.dn_dv`), which that integrator sets; it counts as flat
+where they are 0.
 """
 
 from __future__ import annotations
@@ -117,7 +119,7 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
             return drawn, columns.to_mitsuba(mi.Spectrum, weight, rows)
 
         def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
-            """Return the share of light that goes straight through."""
+            """Return the share of light that goes straight through, or past a silhouette."""
             columns, rows, hits = _hits(mi, dr, si, active)
             share = self._worn.transparency(hits) if len(rows) else np.empty(0)
             return columns.to_mitsuba(mi.Spectrum, np.repeat(share[:, None], 3, axis=1), rows)
@@ -152,14 +154,15 @@ def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[RayValu
         raise BadInput(f"bsdf {BSDF}", "", "a recorded loop", allowed)
     normal, du = si.sh_frame.n, si.dp_du
     handed = dr.dot(dr.cross(du, si.dp_dv), normal)
+    stride, bend = _curved(dr, si)
     names = (si.uv, si.wi, si.to_local(si.n), si.duv_dx, si.duv_dy)
-    numbers = (handed, si.t, dr.norm(du))
+    numbers = (handed, si.t, dr.norm(du), *stride, bend)
     if not scalar:
         dr.eval(names, numbers, active)
     columns = RayValues(mi, 1 if scalar else dr.width((names, numbers, active, *others)))
     rows = columns.active(active)
     uv, viewer, outward, duv_dx, duv_dy = (columns.vector(value)[rows] for value in names)
-    handed, distance, length = (columns.number(value)[rows] for value in numbers)
+    handed, distance, length, along_u, along_v, bend = (columns.number(value)[rows] for value in numbers)
     seen, traced = np.abs(viewer[:, 2]) > 0.0, np.isfinite(distance) & (length > 0.0)
     hits = RayHits(
         uv,
@@ -168,8 +171,23 @@ def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[RayValu
         np.where(handed < 0.0, -1.0, 1.0),
         np.stack([duv_dx, duv_dy], axis=-1),
         np.where(traced, distance, 0.0) / np.where(traced, length, 1.0),
+        np.stack([along_u, along_v], axis=-1),
+        bend,
     )
     return columns, rows[seen], RayHits(*(column[seen] for column in hits))
+
+
+def _curved(dr: Any, si: Any) -> tuple[tuple[Any, Any], Any]:
+    """Return the change of u and v with the length towards the viewer, and the curvature that way; 0 if not known."""
+    du, dv, normal, viewer = si.dp_du, si.dp_dv, si.sh_frame.n, si.to_world(si.wi)
+    along = viewer - normal * dr.dot(viewer, normal)
+    tangent = along / dr.maximum(dr.norm(along), 1e-12)
+    first, mixed, second = dr.dot(du, du), dr.dot(du, dv), dr.dot(dv, dv)
+    area = first * second - mixed * mixed
+    scale = dr.select(area > 0.0, 1.0 / dr.maximum(area, 1e-30), 0.0)
+    on_u, on_v = dr.dot(tangent, du), dr.dot(tangent, dv)
+    stride = scale * (second * on_u - mixed * on_v), scale * (first * on_v - mixed * on_u)
+    return stride, dr.dot(si.dn_du * stride[0] + si.dn_dv * stride[1], tangent)
 
 
 def _component(hits: RayHits, light: Float64 | Float32) -> Index:

@@ -13,6 +13,10 @@ A footprint after a bounce is a disc across the ray, of deviation
 with `width` and `spread` of the camera's cone. `scatter` gathers earlier bounces: a direction of density p stands for
 the solid angle 1/p, a disc of variance 1/(4 pi p) along each axis [Bekaert2003Footprint]. Light straight through gaps
 and other delta lobes scatter nothing.
+
+Where a ray meets cloth, the shading normal's derivatives (`si.dn_du`, `si.dn_dv`) become those of a sphere that curves
+as the shape does along the view ray. That is measured by two more rays, as in `pipeline.scenes.places`; `_STEP` units
+of u are a tenth of a yarn spacing by default. A ray that leaves a silhouette again goes on where it leaves the shape.
 """
 
 from __future__ import annotations
@@ -40,6 +44,8 @@ MOST_RAYS: Final = 2**20
 
 MOST_SCATTER: Final = 0.5
 """Largest square of `scatter`, in radians squared: that of a direction drawn evenly from a hemisphere."""
+
+_STEP = 1e-3  # units of u
 
 FLAGS: Final = ("SymbolicCalls", "SymbolicLoops", "SymbolicConditionals")
 """Flags of Dr.Jit that are off inside."""
@@ -200,6 +206,7 @@ class _Path:
             if depth == self._options.max_depth or not dr.any(active):
                 break
             cone.meet(ray, si)
+            chord = self._bend(si, active)
             to_light, lobe, direction, end = sampler.next_2d(), sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
             self._evaluate(si, to_light, lobe, direction, end, active, cone.state)
             light += throughput * self._lit(si, to_light, active)
@@ -208,6 +215,7 @@ class _Path:
             before = _Bounce(si, drawn.pdf, mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta))
             cone.scatter(drawn.pdf, before.delta)
             ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
+            self._leave(ray, si, chord, active & before.delta)
             largest = dr.max(throughput)
             active = active & (largest > 0.0)
             if depth >= self._options.rr_depth:
@@ -216,6 +224,38 @@ class _Path:
                 throughput /= dr.maximum(kept, 1e-8)
             self._evaluate(light, throughput, active, ray, before.pdf, before.delta, cone.state)
         return light, valid
+
+    def _bend(self, si: Any, active: Any) -> Any:
+        """Set the normal's derivatives where rays meet cloth; return how long a ray is inside that leaves it again."""
+        mi, dr = self._mi, self._dr
+        cloth = active & mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Null)
+        normal, step = si.sh_frame.n, _STEP * dr.norm(si.dp_du)
+        viewer = si.to_world(si.wi)
+        along = viewer - normal * dr.dot(viewer, normal)
+        length = dr.norm(along)
+        tangent = dr.select(length > 1e-6, along / dr.maximum(length, 1e-6), si.sh_frame.s)
+        moved, turned = mi.Float(0.0), mi.Vector3f(0.0)
+        for sign in (1.0, -1.0):
+            hit = self._scene.ray_intersect(mi.Ray3f(si.p + step * (sign * tangent + normal), -normal), cloth)
+            near = hit.is_valid() & (hit.t < 3.0 * step) & (dr.dot(hit.sh_frame.n, normal) > 0.0)
+            near = near & (hit.shape == si.shape)
+            moved += dr.select(near, step, 0.0)
+            turned += sign * dr.select(near, hit.sh_frame.n, normal)
+        slope = si.wi.z / dr.maximum(length, 1e-6)
+        kappa = dr.dot(turned, tangent) / dr.maximum(moved, 1e-12)
+        kappa = dr.select(cloth & (kappa > 0.0) & (si.wi.z > 0.0) & (moved > 0.0), kappa, 0.0)
+        si.dn_du, si.dn_dv = kappa * si.dp_du, kappa * si.dp_dv
+        return dr.select(kappa > 0.0, 2.0 * slope / dr.maximum(kappa, 1e-12), 0.0)
+
+    def _leave(self, ray: Any, si: Any, chord: Any, straight: Any) -> None:
+        """Let rays that go straight on inside a bend start where they leave the shape, about a chord further on."""
+        dr, passing = self._dr, straight & (chord > 0.0)
+        if not dr.any(passing):
+            return
+        hit = self._scene.ray_intersect(ray, passing)
+        out = passing & hit.is_valid() & (hit.t < 2.0 * chord) & (dr.dot(ray.d, hit.n) > 0.0)
+        out = out & (hit.shape == si.shape)
+        ray.o = dr.select(out, hit.spawn_ray(ray.d).o, ray.o)
 
     def _emitted(self, si: Any, before: _Bounce, active: Any) -> Any:
         """Return the light of emitters that rays hit, weighted against `_lit`."""

@@ -26,7 +26,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from pydantic import Field
 
-from pipeline.analytic.importance.lobes import Lobes
+from pipeline.analytic.importance.lobes import HEIGHT, SHARE, STRAIGHT, Lobes
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.cores import cores
 from pipeline.models.fallback import Fallback
@@ -36,10 +36,10 @@ from pipeline.models.patch_bsdf import USUAL_METHOD, PatchBSDF, Sample
 from pipeline.scenes.gbuffer import reduced
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import TruthAnswers
-from pipeline.scenes.places import tilted
+from pipeline.scenes.places import LEAST_CURVATURE, tilted
 from pipeline.scenes.scene import Yarns
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
+from pipeline.truth.query import STEEPEST_CURVATURE, Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric
 from weaves.validation import Frozen
@@ -135,6 +135,10 @@ class RayHits(NamedTuple):
         d(uv)/d(pixel); 0 where the ray has no differentials.
     spread : float64 (N,)
         Change of u with the angle of the ray, across it, 1/radian.
+    stride : float64 (N, 2)
+        Change of u and v with the length along the surface towards the viewer.
+    bend : float64 (N,)
+        Curvature of the surface that way, 1/length; 0 if it is flat or not known.
     """
 
     uv: Float64
@@ -143,6 +147,8 @@ class RayHits(NamedTuple):
     handed: Float64
     jacobian: Float64
     spread: Float64
+    stride: Float64
+    bend: Float64
 
 
 class Worn:
@@ -163,7 +169,8 @@ class Worn:
     def eval(self, hits: RayHits, light: Float64) -> Float64:
         """Return the BSDF times the cosine to N lights, linear RGB (N, 3), 1/sr."""
         result = self._ask(self._queries(hits, light), lambda rows, seed, lobes: self._bsdf.eval(rows, seed))
-        return np.where(_lit(hits, light)[:, None], np.concatenate(result), 0.0)
+        values = np.where(_lit(hits, light)[:, None], np.concatenate(result), 0.0)
+        return values * self.coverage(hits)[:, None]
 
     def pdf(self, hits: RayHits, light: Float64) -> Float32:
         """Return the density with which `sample` draws N lights, (N,), 1/sr."""
@@ -182,13 +189,33 @@ class Worn:
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
         light = np.where(straight[:, None], -hits.viewer, _turned(wi.astype(np.float64), self._turn))
         weight[~straight & ~_lit(hits, light)] = 0.0
+        covered = self.coverage(hits)
+        if (covered < 1.0).any():
+            weight *= covered[:, None]
+            weight[straight] = (self.transparency(hits)[straight] / pdf[straight])[:, None]
         return Sample(light.astype(np.float32), pdf, straight, weight)
 
     def transparency(self, hits: RayHits) -> Float32:
-        """Return the share of light from straight behind that reaches the viewer of each hit, (N,)."""
-        method = self._bsdf.method
+        """Return the share of light from straight behind that reaches the viewer of each hit, (N,).
+
+        It goes through the cloth, or past a silhouette (`pipeline.scenes.shade.compose`).
+        """
+        method, covered = self._bsdf.method, self.coverage(hits)
         parts = self._ask(self._looks(hits), lambda rows, seed, lobes: method.transparency(self.fabric, rows, seed))
-        return np.concatenate(parts)
+        return 1.0 - covered + covered * np.concatenate(parts)
+
+    def coverage(self, hits: RayHits) -> Float32:
+        """Return the share of view rays that do not leave the cloth again, (N,)."""
+        result = np.ones(len(hits.uv), np.float32)
+        looks, method = self._looks(hits), self._bsdf.method
+        if (curved := np.flatnonzero(looks.curvature)).size:
+            wo = _turned(hits.viewer[curved], self._turn.T).astype(np.float32)
+            parts = self._ask(
+                looks.take(curved)._replace(wi=wo, wo=wo),
+                lambda rows, seed, lobes: method.coverage(self.fabric, rows, seed),
+            )
+            result[curved] = np.concatenate(parts)
+        return result
 
     def _queries(self, hits: RayHits, light: Float64) -> Queries:
         towards = _turned(light, self._turn.T)
@@ -214,8 +241,14 @@ class Worn:
             wo,
             footprints.sigma_minor,
             footprints.angle,
-            np.zeros(len(wo), np.float32),
+            np.where(side > 0.0, self._curvature(hits, own), 0.0).astype(np.float32),
         )
+
+    def _curvature(self, hits: RayHits, yarns: tuple[float, float]) -> Float64:
+        """Return the curvature along the view ray, 1/yarn spacings; what is almost flat is flat."""
+        per_length = np.hypot(*(hits.stride * yarns).T)
+        kappa = hits.bend / np.where(per_length > 0.0, per_length, np.inf)
+        return np.where(kappa > LEAST_CURVATURE, np.minimum(kappa, STEEPEST_CURVATURE), 0.0)
 
     def _footprints(self, hits: RayHits, yarns: Float64) -> Footprints:
         if self.options.sigma is not None:
@@ -239,6 +272,12 @@ class Worn:
         if known is not None and all(map(np.array_equal, known[0], looks)):
             return known[1]
         lobes = self._ask(looks, lambda rows, seed, _: self._bsdf.lobes(rows))
+        covered = self.coverage(hits)
+        for start, run in zip(range(0, len(covered), RUN), lobes, strict=True) if (covered < 1.0).any() else ():
+            share = covered[start : start + RUN, None]
+            run.flakes[:, [SHARE, HEIGHT]] *= share[:, None]
+            run.rest[:] *= share
+            run.rest[:, STRAIGHT] += 1.0 - share[:, 0]
         self._known = (looks, lobes) if len(looks.u) <= _KEPT else None
         return lobes
 

@@ -20,6 +20,7 @@ from typing import Final
 
 import numpy as np
 
+from pipeline.analytic.coverage import quick_coverage
 from pipeline.compiled.arrays import Float32, Mask
 from pipeline.models.domain import Domain
 from pipeline.models.method import Around, Method, row_by_row
@@ -123,6 +124,21 @@ class Fallback(Around):
             looks.wo[:, 2] < 0.0,
             lambda part: own(fabric.back(), self._nearest(part).turned(), seed),
             lambda part: own(fabric, self._nearest(part), seed),
+        )
+
+    def coverage(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
+        """Return the share of view rays that do not leave curved cloth again, (N,); wo.z may have any sign.
+
+        By the method's own `coverage` if it has one, up to the curvature that it was trained on, or by a few rays.
+        """
+        own: Callable[[Fabric, Queries], Float32] | None = getattr(self.method, "coverage", None)
+        if own is None:
+            return quick_coverage(fabric, looks)
+        known = (looks.curvature > 0.0) & (looks.wo[:, 2] > 0.0)
+        if self._domain is not None:
+            known &= looks.curvature <= self._domain.queries.curvature[1]
+        return row_by_row(
+            looks, known, lambda part: own(fabric, self._nearest(part)), lambda part: quick_coverage(fabric, part)
         )
 
     def colours(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:

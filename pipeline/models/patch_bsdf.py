@@ -7,7 +7,8 @@ exact whatever the method answers, and the weights make the estimate that of the
     L(wo) = integral over the sphere of f_P(wi, wo) L(wi) d(wi) + transparency L(-wo)
 
 A sample's weight times L(wi) has this mean. Light straight through is a delta lobe: `sample` chooses it with a
-probability of its own, and neither `eval` nor `pdf` knows it.
+probability of its own, and neither `eval` nor `pdf` knows it. On curved cloth all this is of view rays that do not
+leave it again; the coverage is the caller's part (`pipeline.mitsuba.worn`).
 """
 
 from __future__ import annotations

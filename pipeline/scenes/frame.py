@@ -26,7 +26,7 @@ import numpy.typing as npt
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.lights import fibonacci
 from pipeline.scenes.loading import Camera, FilmWindow, Loaded
-from pipeline.scenes.places import Places, curvature_of, dot, places_of, tilted, unit
+from pipeline.scenes.places import Places, curvature_of, dot, least_curvature, places_of, rims_of, tilted, unit
 from pipeline.scenes.rays import aovs_of, first_hits, in_sight, off
 from pipeline.scenes.scene import Cloth
 from weaves.errors import BadInput
@@ -103,15 +103,22 @@ def _gbuffer(
     sigma = np.clip(options.pixel_sigma * sizes, _LEAST_SIGMA, options.largest_sigma)
     viewer = camera.to_viewer(places.position)
     side = np.where(dot(places.outward, viewer) < 0.0, -1.0, 1.0)
-    wo = tilted(np.einsum("nij,nj->ni", places.frame, viewer), side, options.largest_angle)
-    curvature = np.zeros(len(wo))
-    front = side > 0.0
-    if options.curvature == "at_point" and front.any():
+    straight = np.einsum("nij,nj->ni", places.frame, viewer)
+    wo = tilted(straight, side, options.largest_angle)
+    curvature, rim = np.zeros(len(wo)), np.zeros(0, np.int64)
+    front = np.flatnonzero(side > 0.0)
+    if options.curvature != "none" and front.size:
         seen = Places(*(column[front] for column in places))
         curvature[front] = curvature_of(loaded, seen, wo[front])
+        if options.curvature == "minimum":
+            curvature[front] = least_curvature(loaded, seen, straight[front], curvature[front])
+        rim = front[rims_of(loaded, seen, straight[front], curvature[front])]
     (u, v), (sigma_major, sigma_minor) = places.uv.T, sigma.T
     angle = np.arctan2(axes[:, 1, 0], axes[:, 0, 0])
-    return GBuffer(mask, pixel, u, v, sigma_major, sigma_minor, angle, curvature, wo, *_lit(loaded, places))
+    lit = _lit(loaded, places)
+    return GBuffer(
+        mask, pixel, u, v, sigma_major, sigma_minor, angle, curvature, wo, *lit, rim=rim, rim_wo=straight[rim]
+    )
 
 
 def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats, Floats]:

@@ -8,7 +8,7 @@ places under several lights are M queries, and one light that reaches every plac
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
@@ -45,6 +45,10 @@ class GBuffer:
         Unit vectors to the light, in the place's local frame.
     irradiance : float64 (M, 3)
         Linear RGB irradiance that the light would bring to a surface facing it there.
+    rim : int64 (R,)
+        Places at a silhouette: curved cloth whose view rays may leave it again and show what is behind it.
+    rim_wo : float64 (R, 3)
+        Unit vectors from them to the viewer, tilted nowhere; z may have any sign.
     """
 
     mask: npt.NDArray[np.bool_]
@@ -59,6 +63,8 @@ class GBuffer:
     place: npt.NDArray[np.int64]
     wi: Floats
     irradiance: Floats
+    rim: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    rim_wo: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def lit(self) -> npt.NDArray[np.bool_]:
@@ -77,10 +83,21 @@ class GBuffer:
         return self.looks(repeat).take(self.place)._replace(wi=self.wi.astype(np.float32))
 
     def looks(self, repeat: tuple[int, int]) -> Queries:
-        """Return one query a place, lit from the viewer: for transparency and opacity, which no light changes."""
+        """Return one query a place, lit from the viewer: for the transparency, which no light changes."""
         u, v = reduced(self.u, repeat[0]), reduced(self.v, repeat[1])
         columns = (self.sigma, self.wo, self.wo, self.sigma_minor, self.angle, self.curvature)
         return Queries(u, v, *(column.astype(np.float32) for column in columns))
+
+    def rims(self, repeat: tuple[int, int]) -> Queries:
+        """Return one query for each place at a silhouette: for the coverage, which no light changes."""
+        wo = self.rim_wo.astype(np.float32)
+        return self.looks(repeat).take(self.rim)._replace(wi=wo, wo=wo)
+
+    def coverage(self, of_rims: npt.ArrayLike) -> Floats:
+        """Return the coverage of each place, (N,), from those of the rims, (R,): cloth covers all other places."""
+        result = np.ones(len(self.pixel))
+        result[self.rim] = of_rims
+        return result
 
 
 def reduced(coordinate: Floats, period: int) -> npt.NDArray[np.float32]:

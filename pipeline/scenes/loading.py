@@ -112,7 +112,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
     """Load a scene.
 
     BadInput if it is no Mitsuba scene, lacks a file, wears no fabric or an unknown one, has cloth without uv
-    coordinates, a light or camera of another kind, or no light or camera.
+    coordinates or bent cloth without normals, a light or camera of another kind, or no light or camera.
     """
     options = options or SceneOptions()
     mi, where = mitsuba(options.variant), str(scene.source) if isinstance(scene.source, Path) else f"scene {scene.name}"
@@ -127,6 +127,9 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
             dressed.setdefault(key, []).append(shape)
             if shape.is_mesh() and not has_uv(mi, shape):
                 allowed = "a shape that wears a fabric needs uv coordinates"
+                raise BadInput(where, "shape", shape.id() or shape.class_name(), allowed)
+            if options.curvature != "none" and shape.is_mesh() and _faceted(mi, shape):
+                allowed = "a bent mesh that wears a fabric needs vertex normals, which tell its curvature"
                 raise BadInput(where, "shape", shape.id() or shape.class_name(), allowed)
     if not worn:
         allowed = f'a shape must wear a fabric: a bsdf with an id such as "{PREFIX}denim"'
@@ -180,6 +183,15 @@ def has_uv(mi: Any, mesh: Any) -> bool:
     if "vertex_texcoords" not in found:  # Mitsuba's rectangle and cube, whose uv are known
         return True
     return bool((np.ptp(np.asarray(found["vertex_texcoords"]).reshape(-1, 2), axis=0) > 0.0).all())
+
+
+def _faceted(mi: Any, mesh: Any) -> bool:
+    """Return whether a mesh has facets in several planes, and no normals of its vertices."""
+    if mesh.has_vertex_normals():
+        return False
+    place = np.asarray(mi.traverse(mesh)["vertex_positions"], np.float64).reshape(-1, 3)
+    sizes = np.linalg.svd(place - place.mean(axis=0), compute_uv=False)
+    return bool(sizes[-1] > 1e-5 * sizes[0])
 
 
 def _camera(mi: Any, world: Any, where: str) -> Camera:

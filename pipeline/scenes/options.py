@@ -21,8 +21,9 @@ class PixelOptions(Frozen):
     """Footprints are cut here, in yarn spacings; a Gaussian of one repeat already is the repeat's average to 4e-16."""
     largest_angle: float = Field(default=88.0, gt=0, le=89.9)
     """Most grazing view of the cloth, in degrees to the normal: beyond, the truth needs too many points. A view shows
-    no cloth there, and the plane ends with the last whole row. In a scene such rays are tilted up to it, so that no
-    silhouette has holes; so are those that an interpolated normal would show the wrong side of the cloth."""
+    no cloth there, and the plane ends with the last whole row. In a scene such rays are tilted up to it, for the
+    light alone: coverage is that of the ray itself. So are those that an interpolated normal would show the wrong side
+    of the cloth."""
 
 
 class ViewOptions(PixelOptions):
@@ -52,9 +53,10 @@ class SceneOptions(PixelOptions):
     largest_shear: float = Field(default=90.0, gt=0, le=90)
     """A scene is refused if u and v cross anywhere in sight further from a right angle than this, in degrees. What is
     left of shear is ignored: yarns are taken to cross at right angles, the weft along dp_du. 90: nothing is refused."""
-    curvature: Literal["at_point", "none"] = "at_point"
+    curvature: Literal["minimum", "at_point", "none"] = "minimum"
     """Curvature of the cloth along the view ray: from the shading normal's derivative `at_point`, concave places being
-    flat; or `none`, for a benchmark of flat materials."""
+    flat; the `minimum` of it over the ray's way past the point, where a ray may leave the cloth again; or `none`, for a
+    benchmark of flat materials."""
     environment_directions: int = Field(default=64, ge=4, le=16384)
     """Directions of the quadrature of an environment light: a Fibonacci lattice of equal solid angles."""
     environment_samples: int = Field(default=64, ge=1, le=1024)

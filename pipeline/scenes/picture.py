@@ -29,6 +29,7 @@ from pipeline.scenes.loading import FilmWindow, Loaded
 from pipeline.scenes.shade import coloured, compose
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
+from pipeline.truth.geometry.opacity import coverage
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
@@ -57,6 +58,9 @@ class PictureMethod(Protocol):
     def transparency(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
         """Return the transparency of N footprints, (N,)."""
 
+    def coverage(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
+        """Return the share of view rays that do not leave curved cloth again, (N,); wo.z may have any sign."""
+
     def colours(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
         """Return the colours of the components of N queries, (N, 4, 3)."""
 
@@ -80,6 +84,10 @@ class TruthAnswers:
         """Return the transparency of N footprints, (N,)."""
         return estimate(fabric, looks, self._options, seed).transparency
 
+    def coverage(self, fabric: Fabric, looks: Queries, seed: int) -> Float32:
+        """Return the share of view rays that do not leave curved cloth again, (N,)."""
+        return coverage(fabric, looks, self._options, seed)[0]
+
     def colours(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
         """Return the colours of the components of N queries, (N, 4, 3): those of their own threads."""
         return component_colours(fabric, queries, self._options, seed).mean.astype(np.float32)
@@ -91,7 +99,7 @@ class PicturePart(NamedTuple):
     window: FilmWindow
     planes: dict[str, Plane]
     """``rgb`` (H, W, 3); with layers also ``backdrop`` and each of `COMPONENTS`, which sum to it, ``cloth``, the share
-    of a pixel's rays that meet cloth, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
+    of a pixel that cloth covers, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
     ``fabric``, the number of the cloth in the scene from 1 on."""
     queries: int
     fallback: int
@@ -161,6 +169,8 @@ class _UnderWay:
         queries = {key: gbuffer.queries(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
         self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
+        rims = {key: gbuffer.rims(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
+        self._coverage = {key: self._ask(answerer.coverage, key, asked, "rim") for key, asked in rims.items()}
 
     def part(self, side: int, layers: bool) -> PicturePart:
         """Return the finished window, when its queries are answered."""
@@ -168,18 +178,22 @@ class _UnderWay:
         answers = {key: _gathered(asked, (0, 5)) for key, asked in self._asked.items()}
         colours = {key: _gathered(asked, (0, 4, 3)) for key, asked in self._colours.items()}
         through = {key: self._transparency(key, answers[key][:, 4]) for key in answers}
+        covered = {key: frame.gbuffers[key].coverage(_gathered(rims, (0,))) for key, rims in self._coverage.items()}
         planes = {"backdrop": frame.backdrop.astype(np.float32)}
         for key, gbuffer in frame.gbuffers.items():
             dark = np.zeros((len(gbuffer.place), 3))
-            planes["backdrop"] = compose(gbuffer, dark, planes["backdrop"], transparency=through[key])
+            planes["backdrop"] = compose(gbuffer, dark, planes["backdrop"], through[key], covered[key])
         kept = {name: np.arange(4) == index for index, name in enumerate(COMPONENTS)} if layers else {"light": True}
         for name, chosen in kept.items():
             planes[name] = np.zeros(frame.backdrop.shape, np.float32)
             for key, gbuffer in frame.gbuffers.items():
                 own = np.where(chosen, answers[key][:, :4], np.float32(0.0))
-                planes[name] = compose(gbuffer, coloured(own, colours[key]), planes[name])
+                planes[name] = compose(gbuffer, coloured(own, colours[key]), planes[name], coverage=covered[key])
         if layers:
-            planes["cloth"] = np.any([gbuffer.mask for gbuffer in frame.gbuffers.values()], axis=0)[..., None]
+            planes["cloth"] = np.zeros((*frame.backdrop.shape[:2], 1), np.float32)
+            for key, gbuffer in frame.gbuffers.items():
+                planes["cloth"][gbuffer.mask] = 1.0
+                planes["cloth"].reshape(-1)[gbuffer.pixel] = covered[key]
         planes = {name: _mean(plane, side) for name, plane in planes.items()}
         planes["rgb"] = np.sum([planes["backdrop"], *(planes[name] for name in kept)], axis=0)
         if layers:

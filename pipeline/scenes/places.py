@@ -8,18 +8,27 @@ Curvature along the view ray: with t the unit tangent towards the viewer, kappa 
 that lie `_STEP` yarn spacings off along t and -t, n being the shading normal: Euler's k1 cos^2 + k2 sin^2, exact on a
 cylinder. Mitsuba's own derivative of the normal is by uv on its analytic shapes and by barycentric coordinates on its
 meshes, so it is not used. It is 0 in concave places and for a viewer behind the cloth.
+
+The parabola of a view ray takes this curvature for that of its whole way. Where a bend ends, a ray would then leave the
+boundary that in truth sinks into it. `least_curvature` is the least on that way [Kuznetsov2022Curved]: over a stretch
+of the surface past the place, in the plane of ray and normal, as long as the ray takes to come up again, or to sink by
+a yarn spacing if that is shorter. It is kappa = dn.dp / dp.dp from each of `_PROBES` places to the next, exact on a
+cylinder; it is sought where a view ray may leave the boundary again.
+
+Such a place is at a silhouette if past it the ray meets no other cloth: cloth behind cloth is not seen past a
+silhouette.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.scenes.loading import Loaded
-from pipeline.scenes.rays import first_hits
+from pipeline.scenes.rays import first_hits, in_sight
 from pipeline.scenes.scene import Cloth
 from pipeline.truth.query import STEEPEST_CURVATURE
 from weaves.errors import BadInput
@@ -27,7 +36,10 @@ from weaves.errors import BadInput
 Floats = npt.NDArray[np.float64]
 
 _STEP = 0.1  # in yarn spacings
-_FLAT = 1e-4  # 1/yarn spacings; less, which is what rounding makes of a plane, drops a thousandth over four spacings
+_PROBES = 6
+_DEEPEST = 4.0  # yarn spacings by which the heights of a cloth differ at most
+LEAST_CURVATURE: Final = 1e-4
+"""Curvature that counts as 0, 1/yarn spacings: rounding makes it of planes; it drops .001 over four spacings."""
 
 
 class Places(NamedTuple):
@@ -80,11 +92,7 @@ def tilted(wo: Floats, side: Floats, largest_angle: float) -> Floats:
 
 def curvature_of(loaded: Loaded, places: Places, wo: Floats) -> Floats:
     """Return the curvature along the view ray in 1/yarn spacings."""
-    # A viewer on the normal looks along x.
-    flat = np.where(np.linalg.norm(wo[:, :2], axis=-1, keepdims=True) > 1e-6, wo[:, :2], [1.0, 0.0])
-    tangent = unit(np.einsum("ni,nij->nj", flat, places.frame[:, :2]))
-    yarns = np.linalg.norm(np.einsum("nij,nj->ni", np.linalg.pinv(places.tangents), tangent), axis=-1)
-    spacing = 1.0 / np.maximum(yarns, 1e-12)
+    tangent, spacing = _along_view(places, wo)
     step, normal = _STEP * spacing[:, None], places.frame[:, 2]
     moves, turns = [], []
     for sign in (1.0, -1.0):
@@ -96,8 +104,65 @@ def curvature_of(loaded: Loaded, places: Places, wo: Floats) -> Floats:
         turns.append(np.where(near, hits.normal, normal))
     moved = dot(moves[0] - moves[1], tangent)
     bend = dot(turns[0] - turns[1], tangent) / np.where(moved > 0.0, moved, 1.0)
-    kappa = np.where(bend * spacing > _FLAT, bend * spacing, 0.0)
+    kappa = np.where(bend * spacing > LEAST_CURVATURE, bend * spacing, 0.0)
     return np.asarray(np.minimum(kappa, STEEPEST_CURVATURE))
+
+
+def least_curvature(loaded: Loaded, places: Places, wo: Floats, at_place: Floats) -> Floats:
+    """Return the least curvature along the view ray past N places, which have `at_place`, (N,).
+
+    `wo` are tilted nowhere. Where no ray leaves the boundary, it is that at the place.
+    """
+    slope, shallow = _shallow(wo, at_place)
+    if not shallow.all():
+        least = at_place.copy()
+        if shallow.any():
+            part = Places(*(column[shallow] for column in places))
+            least[shallow] = least_curvature(loaded, part, wo[shallow], at_place[shallow])
+        return least
+    tangent, spacing = _along_view(places, wo)
+    slope = np.maximum(slope, 1e-6)
+    stretch = np.maximum(np.minimum(2.0 * slope / at_place, 1.0 / slope), _PROBES * _STEP)
+    normal = places.frame[:, 2]
+    place, turned, least = places.position, normal, at_place
+    for probe in range(1, _PROBES + 1):
+        along = (stretch * spacing * probe / _PROBES)[:, None] * -tangent
+        start = places.position + along + (_STEP * spacing)[:, None] * normal
+        hits = first_hits(loaded.mi, loaded.dressed, start, -normal)
+        met = start - hits.distance[:, None] * normal
+        square = dot(met - place, met - place)
+        # What is missed, or lies on another surface, says nothing.
+        near = (hits.distance < (stretch + 2.0 * _STEP) * spacing) & (dot(hits.normal, normal) > 0.0) & (square > 0.0)
+        bend = dot(hits.normal - turned, met - place) / np.where(near, square, 1.0) * spacing
+        least = np.where(near, np.minimum(least, bend), least)
+        place, turned = (np.where(near[:, None], new, old) for new, old in ((met, place), (hits.normal, turned)))
+    return np.where(least > LEAST_CURVATURE, least, 0.0)
+
+
+def rims_of(loaded: Loaded, places: Places, wo: Floats, curvature: Floats) -> npt.NDArray[np.int64]:
+    """Return which of N places are at a silhouette, as indices; `wo` are tilted nowhere."""
+    slope, shallow = _shallow(wo, curvature)
+    # Past the place where a ray comes up again.
+    _, spacing = _along_view(places, wo)
+    chord = 2.0 * np.maximum(slope, 0.0) / np.where(shallow, curvature, 1.0)
+    away = -np.einsum("nij,ni->nj", places.frame, wo)
+    start = places.position + ((2.0 * chord + 1.0) * spacing)[:, None] * away
+    return in_sight(loaded.mi, loaded.dressed, start, away, np.full(len(wo), np.inf), shallow)
+
+
+def _shallow(wo: Floats, curvature: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Return the slopes of view rays to the tangent plane, (N,), and whether they may leave the cloth again."""
+    slope = wo[:, 2] / np.maximum(np.linalg.norm(wo[:, :2], axis=-1), 1e-12)
+    return slope, (curvature > 0.0) & ((slope <= 0.0) | (slope * slope < 2.0 * _DEEPEST * curvature))
+
+
+def _along_view(places: Places, wo: Floats) -> tuple[Floats, Floats]:
+    """Return the unit tangents towards the viewer, (N, 3), and the world's length of a yarn spacing along them."""
+    # A viewer on the normal looks along x.
+    flat = np.where(np.linalg.norm(wo[:, :2], axis=-1, keepdims=True) > 1e-6, wo[:, :2], [1.0, 0.0])
+    tangent = unit(np.einsum("ni,nij->nj", flat, places.frame[:, :2]))
+    yarns = np.linalg.norm(np.einsum("nij,nj->ni", np.linalg.pinv(places.tangents), tangent), axis=-1)
+    return tangent, 1.0 / np.maximum(yarns, 1e-12)
 
 
 def _refuse_shear(loaded: Loaded, key: str, du: Floats, dv: Floats) -> None:

@@ -53,11 +53,15 @@ def compose(
     rgb: npt.ArrayLike,
     background: npt.ArrayLike = 0.0,
     transparency: npt.ArrayLike = 0.0,
+    coverage: npt.ArrayLike = 1.0,
 ) -> npt.NDArray[np.float32]:
     """Lay a fabric over a background, in linear RGB (H, W, 3); several fabrics one after the other.
 
-    A place shows L + transparency background, L the sum of irradiance times f_P over its lights. The background is
-    `SceneFrame.backdrop`: cloth behind cloth is not seen through gaps.
+    A place shows C (L + T background) + (1 - C) background: C the coverage, T the transparency, L the sum of
+    irradiance times f_P over its lights. The share 1 - C of the view rays leaves curved cloth again; the others meet a
+    yarn or run into a gap. f_P and T are means over just these: gaps are dark in f_P and clear in T. So gaps count
+    once, opacity is C (1 - gaps), and flat cloth has C = 1. The background is `SceneFrame.backdrop`: cloth behind
+    cloth is not seen through gaps, nor past a silhouette.
 
     Parameters
     ----------
@@ -69,14 +73,18 @@ def compose(
         What is seen beside the fabric and through it: a number, or a picture (H, W, 3).
     transparency : array_like
         Share of the background that comes through the fabric's gaps and yarns: a number or (N,).
+    coverage : array_like
+        Share of the view rays that do not leave the cloth again: a number or (N,).
     """
     light = np.zeros((len(gbuffer.pixel), 3))
     np.add.at(light, gbuffer.place, gbuffer.irradiance * np.asarray(rgb))
     picture = np.empty((*gbuffer.mask.shape, 3))
     picture[:] = background
     flat = picture.reshape(-1, 3)
-    behind = flat[gbuffer.pixel] * np.broadcast_to(transparency, len(light))[:, None]
+    covered = np.broadcast_to(coverage, len(light))[:, None]
+    through = 1.0 - covered + covered * np.broadcast_to(transparency, len(light))[:, None]
+    behind = flat[gbuffer.pixel] * through
     # Pixels of the fabric that no place speaks for are black.
     picture[gbuffer.mask] = 0.0
-    flat[gbuffer.pixel] = light + behind
+    flat[gbuffer.pixel] = covered * light + behind
     return picture.astype(np.float32)

@@ -20,7 +20,18 @@ Floats = npt.NDArray[np.float64]
 DRAPE_YARNS: Final = 80.0
 """Yarns along a unit of uv of the scene `drape`."""
 
+HEM_YARNS: Final = 100.0
+"""Yarns along a unit of uv of the scene `hem`."""
+
 _SIZE: Final = (256, 192)
+_HEM_FOCAL, _HEM_RADIUS = 1200.0, 8.0 / HEM_YARNS  # in pixels; in the scene's lengths
+_HEMS: Final = (  # pixels of a yarn; in the picture, from its centre: left and right, height of the axis, tilt
+    (40.0, -300, -110, -190, 5.0),
+    (40.0 / 3.0, -95, 25, -60, -8.0),
+    (40.0 / 9.0, 40, 120, 30, 11.0),
+    (40.0 / 27.0, 135, 190, 80, -7.0),
+    (0.5, 205, 250, 110, 9.0),
+)
 _PLANE_SIDE: Final = 1200.0
 _ROLL_RADIUS, _ROLL_LENGTH = 0.5, 4.0
 _ROLL_AROUND: Final = 128  # yarns: whole repeats, so that there is no seam
@@ -174,6 +185,37 @@ def _swatch(mi: Any) -> dict[str, Any]:
     }
 
 
+def _hem(mi: Any) -> dict[str, Any]:
+    """Return strips of denim that hang over lines, bent against the sky: yarns of 40, 13, 4.5, 1.5 and .5 pixels.
+
+    The radius of every hem is eight yarn spacings. Lines are tilted in the picture, so that a hem crosses pixels.
+    """
+    turn = np.linspace(math.pi, 0.0, 513)
+    lines = {}
+    for number, (pixels, left, right, height, tilt) in enumerate(_HEMS):
+        away = _HEM_FOCAL / (pixels * HEM_YARNS)
+        pixel, hang = away / _HEM_FOCAL, 0.5 * away
+        profile = _HEM_RADIUS * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        profile = np.concatenate([[[-_HEM_RADIUS, -hang]], profile, [[_HEM_RADIUS, -hang]]])
+        length, along = developed(profile)
+        along[[0, 1, -2, -1]] = [[0, 1], [0, 1], [0, -1], [0, -1]]
+        x = np.linspace(left * pixel, right * pixel, 3)
+        sheets = np.broadcast_arrays(x, away + profile[:, :1], height * pixel + profile[:, 1:])
+        normal = np.stack([np.zeros(len(along)), -along[:, 1], along[:, 0]], axis=-1)[:, None]
+        sine, cosine = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
+        roll = np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]])
+        points = np.stack(sheets, axis=-1) @ roll.T
+        uv = np.stack(np.broadcast_arrays(x, length[:, None]), axis=-1)
+        lines[f"strip_{number}"] = sheet(mi, "denim", points, np.broadcast_to(normal @ roll.T, points.shape), uv)
+    return {
+        "type": "scene",
+        **lines,
+        "sun": sun([-0.6, -0.7, 0.55], 3.0),
+        "sky": _sky(0.25, 0.32, 0.43),
+        "camera": camera(mi, [0, 0, 0], [0, 1, 0], 2.0 * math.degrees(math.atan(0.5 * 512 / _HEM_FOCAL)), (512, 512)),
+    }
+
+
 def _waves(mi: Any, cloth: str, x: Floats, y: Floats, z: Floats) -> Any:
     """Return a strip with the waves z(y), swept along x."""
     length, along = developed(np.stack([y, z], axis=-1))
@@ -221,14 +263,16 @@ def wears(cloth: str) -> dict[str, Any]:
     return {"type": "diffuse", "id": f"fabric_{cloth}"}
 
 
-def camera(mi: Any, place: list[float], target: list[float], fov: float) -> dict[str, Any]:
-    """Return a pinhole camera with z upwards."""
+def camera(
+    mi: Any, place: list[float], target: list[float], fov: float, size: tuple[int, int] = _SIZE
+) -> dict[str, Any]:
+    """Return a pinhole camera with z upwards and a film of some pixels."""
     return {
         "type": "perspective",
         "fov": fov,
         "fov_axis": "x",
         "to_world": mi.ScalarTransform4f().look_at(place, target, [0, 0, 1]),
-        "film": {"type": "hdrfilm", "width": _SIZE[0], "height": _SIZE[1]},
+        "film": {"type": "hdrfilm", "width": size[0], "height": size[1]},
     }
 
 
@@ -269,6 +313,7 @@ _SCENES: Final = (
         runner=Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
         napkin=Cloth(fabric="denim", yarns=(36.0, math.dist(_NEAR, _FAR) / _SPACING)),
     ),
+    _scene(_hem, (0.0001, 0.00005, 0.0), denim=Cloth(yarns=(HEM_YARNS, HEM_YARNS), turn=24.0)),
     _scene(_swatch, (0.001, 0.0005, 0.0), swatch=Cloth(fabric="herringbone", yarns=(48.0, 48.0))),
 )
 

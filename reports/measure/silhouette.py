@@ -2,11 +2,12 @@
 
 An orthographic camera looks at right angles at a cylinder of radius r; its picture is the strip along one edge, from
 `depth` inside the boundary's outline to the outline. A pixel at the distance d from the axis sees the boundary under
-the cosine sqrt(1 - (d/r)^2), with the curvature 1/r. Its coverage is the opacity: what the cloth hides of the ground
-[Kuznetsov2022Curved]. Its light is coverage times patch BSDF times pi, as under a directional light of irradiance pi.
+the cosine sqrt(1 - (d/r)^2), with the curvature 1/r. Its coverage is the share of view rays that do not leave the cloth
+again [Kuznetsov2022Curved]. Its light is coverage times patch BSDF times pi, as under a directional light of irradiance
+pi.
 
-A method without `missed` knows no curved cloth. It is evaluated as a flat material is on a curved surface: the
-same queries with curvature 0, opaque everywhere, and 0 where the light is behind the tangent plane.
+A method without `coverage` knows no curved cloth. It is evaluated as a flat material is on a curved surface: the
+same queries with curvature 0, covered everywhere, and 0 where the light is behind the tangent plane.
 
 The camera looks along the plane of the normals: all queries have the curvature 1/r, by Euler's k1 cos^2 + k2 sin^2.
 """
@@ -23,7 +24,7 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.models.method import Method
 from pipeline.scenes.shade import shade
 from pipeline.truth.estimator import estimate
-from pipeline.truth.geometry.opacity import opacity
+from pipeline.truth.geometry.opacity import coverage
 from pipeline.truth.query import Queries
 from reports.images.exr import read_exr, write_exr
 from reports.options import EdgeOptions
@@ -32,18 +33,18 @@ from weaves.fabric import Fabric
 
 
 @runtime_checkable
-class SeesThrough(Protocol):
-    """A method that knows which share of camera rays misses a curved cloth."""
+class KnowsRims(Protocol):
+    """A method that knows which share of view rays leaves a curved cloth again."""
 
-    def missed(self, fabric: Fabric, queries: Queries) -> Float32:
-        """Return the share of each footprint's camera rays that meet no yarn, float32 (N,)."""
+    def coverage(self, fabric: Fabric, looks: Queries) -> Float32:
+        """Return the share of each footprint's view rays that do not leave the cloth again, float32 (N,)."""
 
 
 class Edge(NamedTuple):
     """Pictures of the strip, the outline at the right."""
 
     coverage: Float64
-    """Share of a pixel that the cloth hides, (H, W)."""
+    """Share of a pixel that the cloth covers, (H, W)."""
     light: Float64
     """Linear RGB, (H, W, 3)."""
 
@@ -77,17 +78,17 @@ def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
 def true_edge(fabric: Fabric, options: EdgeOptions) -> Edge:
     """Return the truth's pictures."""
     queries = edge_queries(options, fabric.weave.repeat)
-    coverage, _ = opacity(fabric, queries, options.truth, options.seed)
-    return _edge(fabric, queries, coverage, estimate(fabric, queries, options.truth, options.seed).mean, options)
+    covered, _ = coverage(fabric, queries, options.truth, options.seed)
+    return _edge(fabric, queries, covered, estimate(fabric, queries, options.truth, options.seed).mean, options)
 
 
 def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
     """Return a method's pictures."""
     queries = edge_queries(options, fabric.weave.repeat)
     method.prepare(fabric)
-    if isinstance(method, SeesThrough):
-        coverage = 1.0 - method.missed(fabric, queries)
-        return _edge(fabric, queries, coverage, method.predict(fabric, queries, options.seed), options)
+    if isinstance(method, KnowsRims):
+        covered = method.coverage(fabric, queries)
+        return _edge(fabric, queries, covered, method.predict(fabric, queries, options.seed), options)
     front = np.flatnonzero(queries.wi[:, 2] > 0)
     flat = queries._replace(curvature=np.zeros_like(queries.curvature)).take(front)
     components = np.zeros((len(queries.u), 4), np.float32)
@@ -128,7 +129,7 @@ def measure_silhouette(method: Method, fabric: Fabric, options: EdgeOptions, tru
     ]
 
 
-def _edge(fabric: Fabric, queries: Queries, coverage: Float32, components: Float32, options: EdgeOptions) -> Edge:
+def _edge(fabric: Fabric, queries: Queries, covered: Float32, components: Float32, options: EdgeOptions) -> Edge:
     colour = shade(fabric, components, queries)
-    cover = coverage.astype(np.float64).reshape(options.rows, -1)
+    cover = covered.astype(np.float64).reshape(options.rows, -1)
     return Edge(cover, math.pi * cover[..., None] * colour.reshape(*cover.shape, 3))

@@ -100,6 +100,12 @@ class SoftNodes(Analytic["SoftNodeTable"]):
         """Return the transparency of N footprints, float32 (N,), of a viewer in front; no light changes it."""
         return self.behind(fabric, looks._replace(wi=-looks.wo))[:, 4]
 
+    def coverage(self, fabric: Fabric, looks: Queries) -> Float32:
+        """Return the share of view rays that do not leave curved cloth again, float32 (N,)."""
+        from pipeline.analytic.coverage import quick_coverage
+
+        return quick_coverage(fabric, looks)
+
     def table_for(self, fabric: Fabric, queries: Queries) -> SoftNodeTable:
         """Return the smallest table that knows all queries; every table answers what it knows by the same bits."""
         if (queries.curvature > 0.0).any():

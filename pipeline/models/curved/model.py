@@ -217,14 +217,17 @@ def _axes(options: CurvedOptions) -> int:
 class Curved(NetworkMethod[CurvedNetwork]):
     """Trained materials for curved surfaces, one network for each fabric."""
 
-    def missed(self, fabric: Fabric, queries: Queries) -> Float32:
-        """Return the share of each footprint's camera rays that meet no yarn, float32 (N,): 1 - opacity."""
+    def coverage(self, fabric: Fabric, looks: Queries) -> Float32:
+        """Return the share of each footprint's view rays that do not leave the cloth again, float32 (N,).
+
+        It is the opacity; for open cloth that is less, unless `silhouette = "grazing"`, which takes gaps for filled.
+        """
         network = self.network_of(fabric)
 
-        def through(*inputs: Tensor) -> Tensor:
-            return (1.0 - network.cover(View(*inputs[:-1]))).unsqueeze(-1)
+        def cover(*inputs: Tensor) -> Tensor:
+            return network.cover(View(*inputs[:-1])).unsqueeze(-1)
 
-        return self.per_query(fabric).answered(queries, through, 1)[:, 0]
+        return self.per_query(fabric).answered(looks, cover, 1)[:, 0]
 
     def refuse(self, queries: Queries) -> None:
         """Refuse queries of kinds not trained on, and those of cloth that bends more than any trained on."""

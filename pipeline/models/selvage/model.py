@@ -226,6 +226,10 @@ class _OverNodes:
         """Return the transparency of N footprints, float32 (N,), by the soft nodes."""
         return self.nodes.transparency(fabric, looks)
 
+    def coverage(self, fabric: Fabric, looks: Queries) -> Float32:
+        """Return the share of view rays that do not leave curved cloth again, float32 (N,), as the soft nodes do."""
+        return self.nodes.coverage(fabric, looks)
+
 
 class Selvage(_OverNodes):
     """A trained network that answers for any fabric; it tabulates each once.

@@ -5,6 +5,9 @@ with direction -wo, and the cloth falls away below it by kappa s^2 / 2 at distan
 the cloth, the ray is a parabola. It hits a yarn, or rises and leaves the boundary again, or passes through a gap to the
 other side. Every point of the footprint is taken to see the viewer under the same angle to its own normal.
 
+Opacity is the share of rays that hit a yarn, coverage the share that do not leave the boundary again. They differ at
+gaps alone: what the patch BSDF and the transparency say of the cloth already counts gaps, coverage does not.
+
 In the fabric plane a gap is open. A ray that crosses the plane there runs on beneath, where it is followed in steps of
 `_STEP`, until it meets the back of a yarn, leaves the cloth behind it, or comes up again through a gap. One that
 crosses the plane anywhere else has hit the yarn there.
@@ -107,10 +110,14 @@ def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray
 
 @allocating_kernel
 def _opacity_rows(
-    cloth: ClothSide, columns: WideQueries, index: Index, limits: Limits, seed: np.uint64
+    cloth: ClothSide, columns: WideQueries, index: Index, limits: Limits, seed: np.uint64, filled: bool
 ) -> tuple[Float64, Float64]:
-    """Return opacities and their standard errors (N,): ratios of randomisations' sums, doubled up to the tolerance."""
+    """Return opacities and their standard errors (N,): ratios of randomisations' sums, doubled up to the tolerance.
+
+    With gaps `filled` a ray that would pass through one has hit the cloth.
+    """
     rows = len(index)
+    open_cloth = has_gaps(cloth.front) and not filled
     means, errors = np.zeros(rows), np.zeros(rows)
     sums = np.zeros((RANDOMISATIONS, 2))
     for row in range(rows):
@@ -119,7 +126,7 @@ def _opacity_rows(
             continue
         towards = ray(-wo[0], -wo[1], -wo[2], columns.curvature[row])
         fall = cloth.front.highest - cloth.front.lowest
-        if not has_gaps(cloth.front) and towards.rise * towards.rise >= 2.0 * towards.bend * fall:
+        if not open_cloth and towards.rise * towards.rise >= 2.0 * towards.bend * fall:
             means[row] = 1.0  # the ray sinks below every yarn
             continue
         key = derive(seed, index[row])
@@ -132,7 +139,11 @@ def _opacity_rows(
                     first, second = owen_pair(randomisation, k)
                     x, y, weight = place_point(columns, row, cloth, first, second)
                     sums[r, 1] += weight
-                    if hits(cloth.front, cloth.back, x, y, towards):
+                    if filled:
+                        met = not visible(cloth.front, x, y, cloth.front.highest, UNDER, towards)
+                    else:
+                        met = hits(cloth.front, cloth.back, x, y, towards)
+                    if met:
                         sums[r, 0] += weight
                         hit += 1
             done = target
@@ -163,13 +174,29 @@ def opacity(
     wo.z <= 0 a ray leaves the boundary where it enters, which is an opacity of 0. Seed, start and errors are as in
     `pipeline.truth.estimator.estimate`.
     """
+    return _shares(fabric, queries, options, seed, start, filled=False)
+
+
+def coverage(
+    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0
+) -> tuple[Float32, Float32]:
+    """Return the share of a footprint's camera rays that do not leave the boundary again, and its error.
+
+    As `opacity`, from the same rays, but gaps count as filled: it is 1 for flat cloth.
+    """
+    return _shares(fabric, queries, options, seed, start, filled=True)
+
+
+def _shares(
+    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int, filled: bool
+) -> tuple[Float32, Float32]:
     # Viewers at or beyond the horizon are no fault here, so they are lifted above it for the check.
     lifted = queries.wo.copy()
     lifted[:, 2] = np.maximum(np.abs(lifted[:, 2]), np.float32(1e-30))
     validate(queries._replace(wi=lifted, wo=lifted))
     index = start + np.arange(len(queries.u))
     columns = columns_of(queries._replace(wi=lifted))
-    mean, error = _opacity_rows(cloth_side(fabric, options), columns, index, options.limits, np.uint64(seed))
+    mean, error = _opacity_rows(cloth_side(fabric, options), columns, index, options.limits, np.uint64(seed), filled)
     return mean.astype(np.float32), error.astype(np.float32)
 
 

@@ -94,6 +94,8 @@ def measure_scene(
         records.append(_colour(subject, shot, answers, image))
         own, truth, noise = (values @ np.array(LUMINANCE) for values in (shown, truths, noises))
         records += _over_time(subject, own, truth, noise, np.asarray(lit.all(axis=0)), image)
+        if (rims := shot.rim_errors(method, options.seed)).size:
+            records.append(subject.of("rim_coverage", float(np.sqrt(np.square(rims).mean())), rims.size))
         outside = [method.out_of_domain(cloth.fabric, cloth.queries) for cloth in shot.cloths]
         records.append(subject.of("fallback_share", float(np.concatenate(outside).mean()), sum(map(len, outside))))
     return records

@@ -2,8 +2,8 @@
 
 The file, NumPy's npz, holds every query of all frames with the truth's answer, and the pictures without the light
 that the cloth scatters: the backdrop, and what of it comes straight through the cloth. A method's picture is that plus
-the sum over queries of irradiance times f_P. So methods differ in the patch BSDF alone; what passes straight through
-cloth is the truth's for all of them, and cloth hides what its mesh covers.
+the sum over queries of irradiance times coverage and f_P. So methods differ in the patch BSDF alone; what passes
+straight through cloth is the truth's for all of them, and so is the coverage at silhouettes.
 """
 
 from __future__ import annotations
@@ -28,12 +28,14 @@ from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.loading import load
 from pipeline.scenes.shade import coloured, colours_of, compose, shade
 from pipeline.truth.estimator import estimate
+from pipeline.truth.geometry.opacity import coverage
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
 from reports.options import ShotOptions
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
+_RIM = "rim."
 _COLUMNS = ("frame", "pixel", "weight", "mean", "standard_error", "fallback_values")
 
 
@@ -50,7 +52,7 @@ class ClothQueries:
     frame, pixel : int64 (M,)
         Index of the frame, and of the pixel in it, below H W.
     weight : float32 (M, 3)
-        Linear RGB irradiance.
+        Linear RGB irradiance times the truth's coverage.
     mean, standard_error : float32 (M, 4)
         The truth's answers.
     fallback_values : float32 (M, 4)
@@ -58,6 +60,10 @@ class ClothQueries:
         elsewhere.
     colours : float32 (M, 4, 3)
         The truth's colours of the components. Methods have those of the footprint's threads (pipeline.scenes.shade).
+    rims : Queries
+        Places at silhouettes, in all frames, of which some view rays leave the cloth again.
+    coverage : float32 (R,)
+        The truth's coverage of each.
     """
 
     fabric: Fabric
@@ -69,6 +75,8 @@ class ClothQueries:
     standard_error: Float32
     fallback_values: Float32
     colours: npt.NDArray[np.floating]
+    rims: Queries
+    coverage: Float32
 
     def light(self, components: npt.ArrayLike | None = None) -> Float64:
         """Return the light of each query, (M, 3), from a method's components (M, 4); the truth's if left out."""
@@ -139,6 +147,11 @@ class Shot:
             found.append(values)
         return found
 
+    def rim_errors(self, method: Fallback, seed: int) -> Float64:
+        """Return the errors of a method's coverage at the silhouettes of all cloths and frames, (R,)."""
+        parts = (method.coverage(cloth.fabric, cloth.rims, seed) - cloth.coverage for cloth in self.cloths)
+        return np.concatenate(list(parts)).astype(np.float64)
+
 
 def shoot(name: str, options: ShotOptions, path: Path) -> None:
     """Work out a scene's frames with the truth's answers and write them to `path`.
@@ -161,14 +174,20 @@ def shoot(name: str, options: ShotOptions, path: Path) -> None:
             queries = gbuffer.queries(fabric.repeat)
             answers = estimate(fabric, queries, truth, seed)
             dark = np.zeros((len(gbuffer.place), 3))
-            base = compose(gbuffer, dark, base, transparency=_transparency(gbuffer, answers.transparency))
+            rims = gbuffer.rims(fabric.repeat)
+            of_rims, doubt = coverage(fabric, rims, truth, seed)
+            covered = gbuffer.coverage(of_rims)
+            base = compose(gbuffer, dark, base, _transparency(gbuffer, answers.transparency), covered)
             columns = {"frame": np.full(len(gbuffer.place), frame), "pixel": gbuffer.pixel[gbuffer.place]}
             columns |= queries._asdict()
-            columns |= {"weight": gbuffer.irradiance.astype(np.float32)}
+            columns |= {"weight": (gbuffer.irradiance * covered[gbuffer.place, None]).astype(np.float32)}
             columns |= {"mean": answers.mean, "standard_error": answers.standard_error}
             columns |= {"fallback_values": fallback_values(fabric, queries, seed)}
             if fabric.colours is not None:
                 columns |= {"colours": component_colours(fabric, queries, truth, seed).mean.astype(np.float32)}
+            sampled = (doubt > 0.0) & (of_rims < 1.0)  # the rest is certain, or covered
+            columns |= {_RIM + name: column[sampled] for name, column in rims._asdict().items()}
+            columns |= {_RIM + "coverage": of_rims[sampled]}
             parts[key].append(columns)
         bases.append(base)
     arrays = {"base": np.array(bases, np.float32)}
@@ -194,7 +213,9 @@ def read_shot(path: Path) -> Shot:
             cloth = Fabric.model_validate(fabric)
             columns = {column: file[f"{key}.{column}"] for column in _COLUMNS}
             colours = colours_of(cloth, queries) if cloth.colours is None else file[f"{key}.colours"]
-            cloths.append(ClothQueries(cloth, queries, **columns, colours=colours))
+            rims = Queries(*(file[f"{key}.{_RIM}{column}"] for column in Queries._fields))
+            covered = file[f"{key}.{_RIM}coverage"]
+            cloths.append(ClothQueries(cloth, queries, **columns, colours=colours, rims=rims, coverage=covered))
         return Shot(about["name"], file["base"], cloths)
 
 

@@ -38,6 +38,8 @@ def hits_of(viewer, count=1, uv=UV, **other):
         "handed": np.ones(count),
         "jacobian": np.zeros((count, 2, 2)),
         "spread": np.zeros(count),
+        "stride": np.tile([1.0, 0.0], (count, 1)),
+        "bend": np.zeros(count),
     }
     return RayHits(**{**columns, **other})
 

@@ -5,14 +5,19 @@ import math
 import numpy as np
 import pytest
 
+from pipeline.analytic.coverage import quick_coverage
+from pipeline.mitsuba import worn
 from pipeline.mitsuba.integrator import MOST_SCATTER, _Cone, evaluated, ray_deviation
 from pipeline.mitsuba.worn import PIXEL, Footprints
 from pipeline.scenes.frame import render
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
-from pipeline.scenes.shipped import SHIPPED
+from pipeline.scenes.picture import sharpened
+from pipeline.scenes.scene import Cloth, Scene
+from pipeline.scenes.shipped import SHIPPED, wears
 from tests.pipeline.mitsuba.conftest import NEEDS_LLVM
 from weaves.errors import BadInput
+from weaves.fabric import load_fabric
 
 
 def floor(mi, side=1.0, height=0.0):
@@ -181,3 +186,48 @@ def test_a_mesh_without_uv_is_one_sentence(scalar):
     scene = mi.load_dict({"type": "scene", "mesh": mesh, "sky": {"type": "constant"}, "sensor": sensor(mi)})
     with pytest.raises(BadInput, match=r"needs uv coordinates"):
         mi.render(scene, integrator=path(mi), spp=1)
+
+
+@pytest.mark.external
+@NEEDS_LLVM
+def test_rays_pass_a_silhouette_and_the_shape_behind_it(llvm, monkeypatch):
+    """A tube of black cloth, too thick to shine through, before a white sky: a row shows 1 less its coverage.
+
+    Coverage is that of the scene's renderer with 16 rays a pixel; a row has 24 pixels of 64 samples, 0 or 1 each.
+    """
+    denim, radius, spacing, size = load_fabric("denim"), 0.5, 0.0625, 24
+    black = {"specular": (0.0,) * 3, "diffuse": (0.0,) * 3, "diffuse_transmission": (0.0,) * 3}
+    yarns = {side: getattr(denim, side).model_copy(update=black) for side in ("warp", "weft")}
+    monkeypatch.setattr(worn, "load_fabric", lambda name: denim.model_copy(update={**yarns, "optical_thickness": 50.0}))
+    cloth = Cloth(yarns=(2.0 * math.pi * radius / spacing, 8.0 / spacing))
+
+    def scene(mi, bsdf):
+        look = mi.ScalarTransform4f().look_at([0, -3, radius], [0, 0, radius], [0, 0, 1])
+        film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
+        return {
+            "type": "scene",
+            "sky": {"type": "constant", "radiance": 1.0},
+            "roll": {"type": "cylinder", "p0": [-4, 0, 0], "p1": [4, 0, 0], "radius": radius, "bsdf": bsdf},
+            "camera": {
+                "type": "orthographic",
+                "to_world": look @ mi.ScalarTransform4f().scale([0.1, 0.1, 1]),
+                "film": film,
+                "sampler": {"type": "independent", "sample_count": 64},
+            },
+        }
+
+    def source(mi):
+        return scene(mi, wears("denim"))
+
+    options = SceneOptions(variant="llvm_ad_rgb", environment_directions=4)
+    loaded = sharpened(load(Scene(name="tube", source=source, cloths={"denim": cloth}), options), 4)
+    gbuffer = render(loaded, size=(4 * size, 4 * size)).gbuffers["denim"]
+    covered = np.zeros(gbuffer.mask.size)
+    covered[gbuffer.pixel] = gbuffer.coverage(quick_coverage(denim, gbuffer.rims(denim.repeat)))
+    expected = 1.0 - covered.reshape(size, -1).mean(axis=1)
+
+    plugin = {"type": "twillight", "fabric": "denim", "yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1]}
+    world = llvm.load_dict(scene(llvm, plugin))
+    shown = np.asarray(llvm.render(world, integrator=path(llvm, max_depth=8)))[..., 0].mean(axis=1)
+    assert ((expected > 0.1) & (expected < 0.9)).any()
+    np.testing.assert_allclose(shown, expected, atol=4.0 * 0.5 / math.sqrt(24 * 64) + 0.01)

@@ -34,7 +34,7 @@ def sunlit(name, variant, sky=False):
         return {key: part for key, part in scene.source(mi).items() if key not in left_out}
 
     # A box filter adds 1/12 to the variance of a ray's footprint.
-    options = SceneOptions(variant=variant, curvature="none", pixel_sigma=math.sqrt(PIXEL**2 - 1 / 12))
+    options = SceneOptions(variant=variant, curvature="at_point", pixel_sigma=math.sqrt(PIXEL**2 - 1 / 12))
     return load(scene.model_copy(update={"source": build}), options)
 
 

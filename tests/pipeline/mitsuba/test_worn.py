@@ -154,3 +154,50 @@ def test_round_footprints_are_cut_too():
     found = Footprints.round(np.array([0.5, 1e9, 0.0]))
     np.testing.assert_array_equal(found.sigma, found.sigma_minor)
     assert found.sigma[0] == 0.5 and found.sigma[1] == LARGEST_FOOTPRINT and found.sigma[2] > 0.0
+
+
+def at_a_rim(count=1, azimuth=0.0):
+    """Return hits on a tube of ten yarn spacings' radius, seen where its rays may leave it again."""
+    viewer = unit(86.0, azimuth)
+    stride = np.tile([math.cos(math.radians(azimuth)), math.sin(math.radians(azimuth))], (count, 1))
+    return hits_of(viewer, count, stride=stride, bend=np.full(count, 0.1 * 100.0))
+
+
+def test_a_rim_covers_what_the_method_says_and_lets_the_rest_pass():
+    """100 yarns a unit: curvature .1. Values are the patch BSDF's times the coverage."""
+    hits, light, cloth = at_a_rim(), unit(50.0, 200.0), worn_of("denim")
+    bsdf = PatchBSDF(load_fabric("denim"))
+    query = Queries.round([0.62], [0.57], [0.3], light[None], hits.viewer)._replace(curvature=np.float32([0.1]))
+    covered = bsdf.method.coverage(bsdf.fabric, query)
+    assert 0.05 < covered[0] < 0.95
+    np.testing.assert_allclose(cloth.coverage(hits), covered, rtol=1e-6)
+    np.testing.assert_allclose(cloth.eval(hits, light[None]), covered[0] * bsdf.eval(query), rtol=1e-5)
+    through = bsdf.method.transparency(bsdf.fabric, query._replace(wi=query.wo), 0)
+    np.testing.assert_allclose(cloth.transparency(hits), 1 - covered + covered * through, rtol=1e-5)
+    flat = hits._replace(bend=np.zeros(1))
+    assert cloth.coverage(flat) == 1.0
+    assert cloth.coverage(hits._replace(viewer=hits.viewer * [1, 1, -1])) == 1.0
+
+
+def test_samples_at_a_rim_have_the_density_and_the_weight_of_their_lobe():
+    """The density integrates to what does not go straight on; each weight is its value over its density."""
+    cloth, wi = worn_of("denim"), sphere(96, 192)
+    many = at_a_rim(len(wi), 20.0)
+    straight = 1.0 - cloth.pdf(many, wi).mean() * 4.0 * math.pi
+    covered = cloth.coverage(many)[0]
+    flat = 1.0 - cloth.pdf(many._replace(bend=np.zeros(len(wi))), wi).mean() * 4.0 * math.pi
+    assert straight == pytest.approx(1.0 - covered + covered * flat, abs=1e-3) and 0.1 < covered < 0.9
+    count = 4000
+    hits = at_a_rim(count, 20.0)
+    sample = cloth.sample(hits, np.random.default_rng(3).random((count, 3)))
+    share = sample.straight.mean()
+    assert abs(share - straight) < 0.01 + 3.3 * math.sqrt(share * (1 - share) / count)
+    light = sample.wi.astype(np.float64)
+    rest, through = ~sample.straight, cloth.transparency(hits)
+    np.testing.assert_allclose(sample.pdf[rest], cloth.pdf(hits, light)[rest], rtol=2e-3)
+    np.testing.assert_allclose(
+        sample.weight[rest], cloth.eval(hits, light)[rest] / sample.pdf[rest, None], rtol=5e-3, atol=1e-6
+    )
+    expected = (through / sample.pdf)[sample.straight, None]
+    np.testing.assert_allclose(sample.weight[sample.straight], np.repeat(expected, 3, axis=1), rtol=1e-5)
+    assert expected.max() < 1.1

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.analytic.coverage import quick_coverage
 from pipeline.fingerprint import fingerprint
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.curved.model import Curved, CurvedNetwork
@@ -53,6 +54,25 @@ def test_a_method_is_asked_in_the_nearest_form_that_it_knows():
     np.testing.assert_array_equal(asked({"behind"}, "major").sigma, own.sigma)
     for known, expected in zip(asked({"behind", "stretch", "curvature"}), own, strict=True):
         np.testing.assert_array_equal(known, expected)
+
+
+def test_coverage_is_the_methods_own_up_to_its_curvature_and_that_of_a_few_rays_else():
+    """The method says .5 of curved cloth; flat cloth is covered, and nothing below the tangent plane."""
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(curvature=(0.01, 0.5)), fabric.repeat, 5, 0, 40)
+    low = queries._replace(wo=queries.wo * np.float32([1, 1, -1]))
+    flat = queries._replace(curvature=np.zeros(40, np.float32))
+    about = {"queries": QueryOptions(curvature=(0.01, 0.2)).model_dump(mode="json")}
+    fallback = fallback_of(fabric, about, {"curvature"})
+    np.testing.assert_array_equal(fallback.coverage(fabric, queries), quick_coverage(fabric, queries))
+    method = fallback.method
+    method.coverage = lambda fabric, looks: np.full(len(looks.u), 0.5, np.float32)
+    fallback = Fallback(method, {"curvature"})
+    own = queries.curvature <= np.float32(0.2)
+    assert 5 < own.sum() < 35
+    expected = np.where(own, np.float32(0.5), quick_coverage(fabric, queries))
+    np.testing.assert_array_equal(fallback.coverage(fabric, queries), expected)
+    assert (fallback.coverage(fabric, low) == 0).all() and (fallback.coverage(fabric, flat) == 1).all()
 
 
 def test_what_no_form_stands_for_is_answered_by_quadrature():

@@ -9,7 +9,7 @@ from pipeline.scenes.frame import render
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import Cloth, Scene
-from pipeline.scenes.shipped import SHIPPED
+from pipeline.scenes.shipped import SHIPPED, developed, sheet
 from pipeline.scenes.variant import llvm_works
 from pipeline.truth.query import faults
 
@@ -19,7 +19,7 @@ WEARS = {"type": "diffuse", "id": "fabric_denim"}
 SUN = {"type": "directional", "direction": [0.3, 0.2, -1.0]}
 
 
-def framed(parts, eye=(0.0, -3.0, 2.0), camera=None, cloth=None, frame=0.0):
+def framed(parts, eye=(0.0, -3.0, 2.0), camera=None, cloth=None, frame=0.0, options=SCALAR):
     """Return a frame of the cloth `denim` in a scene of some parts, given as a function of mitsuba."""
 
     def build(mi):
@@ -29,7 +29,7 @@ def framed(parts, eye=(0.0, -3.0, 2.0), camera=None, cloth=None, frame=0.0):
         return {"type": "scene", "camera": {**(camera(mi) if camera else sensor), "film": film}, **parts(mi)}
 
     scene = Scene(name="test", source=build, cloths={"denim": cloth or Cloth()}, step=(0.1, 0.0, 0.0))
-    return render(load(scene, SCALAR), frame)
+    return render(load(scene, options), frame)
 
 
 def shot(parts, **choices):
@@ -131,6 +131,68 @@ def test_a_cylinders_curvature_is_eulers(turn, askew):
     assert gbuffer.curvature[sure & (expected < 0.9e-4)] == pytest.approx(0.0)
     sure &= expected > 1.1e-4
     np.testing.assert_allclose(gbuffer.curvature[sure], expected[sure], atol=2e-4 * spacing / radius)
+
+
+@pytest.mark.parametrize("wall", [False, True])
+def test_the_rim_of_a_tube_is_seen_against_what_is_no_cloth(wall):
+    """Rays may leave again up to tan^2 = 8 kappa; where cloth is behind, none is asked."""
+    radius, spacing = 0.7, 0.05
+
+    def camera(mi):
+        return {"type": "orthographic", "to_world": mi.ScalarTransform4f().look_at([0, -3, 0], [0, 0, 0], [0, 0, 1])}
+
+    def parts(mi):
+        tube = {"type": "cylinder", "p0": [-2, 0, 0], "p1": [2, 0, 0], "radius": radius}
+        behind = mi.ScalarTransform4f().translate([0, 2, 1]).rotate([1, 0, 0], 90)
+        board = (
+            {"board": {"type": "rectangle", "to_world": behind, "b": {**WEARS, "id": "fabric_gauze"}}} if wall else {}
+        )
+        return {"tube": {**tube, "b": WEARS}, **board, "s": SUN}
+
+    gbuffer = shot(parts, camera=camera, cloth=Cloth(yarns=(2 * math.pi * radius / spacing, 4 / spacing)))
+    _, row = pixels(gbuffer)
+    height = (SIZE[1] / 2 - row) * 2 / SIZE[0]  # the film is two wide
+    on_tube = np.abs(height) < radius - 1e-3
+    cosine = np.sqrt(np.clip(1 - (height / radius) ** 2, 0, 1))
+    slope = cosine / np.maximum(np.abs(height) / radius, 1e-12)
+    expected = on_tube & (slope**2 < 8 * spacing / radius)
+    if wall:  # it reaches down to the axis
+        expected &= height < 0
+    sure = np.abs(slope**2 - 8 * spacing / radius) > 0.01
+    asked = np.zeros(len(row), bool)
+    asked[gbuffer.rim] = True
+    assert (asked[sure] == expected[sure]).all() and asked.sum() > 100
+    np.testing.assert_allclose(gbuffer.rim_wo[:, 2], cosine[gbuffer.rim], atol=2e-3)
+
+
+@pytest.mark.parametrize(("curvature", "rims"), [("at_point", True), ("minimum", False)])
+def test_the_end_of_a_bend_is_no_silhouette(curvature, rims):
+    """A quarter of a tube that goes over into a plane: by its curvature alone rays would leave the last of the tube.
+
+    The camera looks slightly down on the plane, so every ray sinks into it; it is too short to be met by those rays.
+    """
+    radius, spacing = 0.4, 0.05
+
+    def camera(mi):
+        look = mi.ScalarTransform4f().look_at([0, -3, 0.03], [0, 0, 0], [0, 0, 1])
+        return {"type": "orthographic", "to_world": look @ mi.ScalarTransform4f().scale([0.1, 0.1, 1])}
+
+    def parts(mi):
+        turn = np.linspace(-math.pi / 2, 0, 201)
+        y, z = np.append(radius * np.sin(turn), 0.3), np.append(radius * np.cos(turn) - radius, 0.0)
+        length, _ = developed(np.stack([y, z], axis=-1))
+        tilt = np.append(turn, 0.0)
+        x = np.linspace(-1, 1, 3)
+        points = np.stack(np.broadcast_arrays(x, y[:, None], z[:, None]), axis=-1)
+        normal = np.stack([0 * tilt, np.sin(tilt), np.cos(tilt)], axis=-1)[:, None]
+        uv = np.stack(np.broadcast_arrays(x, length[:, None]), axis=-1)
+        return {"bend": sheet(mi, "denim", points, np.broadcast_to(normal, points.shape), uv), "s": SUN}
+
+    options = SCALAR.model_copy(update={"curvature": curvature})
+    gbuffer = shot(parts, camera=camera, cloth=Cloth(yarns=(1 / spacing, 1 / spacing)), options=options)
+    assert gbuffer.curvature.max() == pytest.approx(spacing / radius, rel=0.02)
+    low = gbuffer.rim_wo[:, 2] < 0.2
+    assert low.sum() > 60 if rims else not low.any()
 
 
 def test_a_hollow_is_flat_and_so_is_the_back():

@@ -126,6 +126,26 @@ def test_a_camera_inside_the_cloth_is_refused(x, inside, tmp_path):
         assert len(render(loaded).gbuffers["denim"].pixel)
 
 
+def test_a_bent_mesh_without_normals_has_no_curvature(tmp_path):
+    """Mitsuba computes normals that a file lacks, unless its facets are wanted; a plane needs none."""
+    (tmp_path / "bent.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nvt 0 0\nvt 1 0\nvt 0 1\nvt 1 1\nf 1/1 2/2 3/3\nf 2/2 4/4 3/3\n"
+    )
+    facets = '<boolean name="face_normals" value="true"/>'
+    mesh = (
+        f'<shape type="obj"><string name="filename" value="bent.obj"/>{facets}<bsdf type="diffuse" id="fabric_denim"/>'
+    )
+    body = mesh + "</shape>" + SUN + CAMERA
+    path = written(tmp_path, body)
+    assert "needs vertex normals, which tell its curvature" in refused(lambda: load(load_scene(path), OPTIONS))
+    load(load_scene(path), OPTIONS.model_copy(update={"curvature": "none"}))
+    path.write_text(path.read_text().replace(facets, ""))
+    load(load_scene(path), OPTIONS)
+    path.write_text(path.read_text().replace('value="bent.obj"/>', f'value="bent.obj"/>{facets}'))
+    (tmp_path / "bent.obj").write_text((tmp_path / "bent.obj").read_text().replace("1 1 0.5", "1 1 0"))
+    load(load_scene(path), OPTIONS)
+
+
 def test_uv_that_do_not_vary_are_refused_and_shear_where_that_is_an_option(tmp_path):
     path = written(tmp_path, next(body for body in BROKEN if "bare.obj" in body))
     (tmp_path / "bare.obj").write_text(TRIANGLE.replace("f 1 2 3", "vt 0 0\nf 1/1 2/1 3/1"))

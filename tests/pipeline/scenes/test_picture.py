@@ -29,6 +29,9 @@ class Flat:
     def transparency(self, fabric, looks, seed):
         return np.full(len(looks.u), 0.25, np.float32)
 
+    def coverage(self, fabric, looks, seed):
+        return np.ones(len(looks.u), np.float32)
+
     def colours(self, fabric, queries, seed):
         return colours_of(fabric, queries).astype(np.float32)
 
@@ -111,6 +114,30 @@ def test_what_comes_through_is_the_transparency_times_what_is_behind():
     behind = frame.backdrop.reshape(-1, 3)[gbuffer.pixel]
     assert behind.min() > 0
     np.testing.assert_allclose(layers["backdrop"].reshape(-1, 3)[gbuffer.pixel], 0.25 * behind, rtol=1e-6)
+
+
+class Gauze(Flat):
+    """The same, of which a rim covers a quarter."""
+
+    def coverage(self, fabric, looks, seed):
+        return np.full(len(looks.u), 0.25, np.float32)
+
+
+def test_a_rim_shows_what_is_behind_in_the_share_that_it_leaves_free():
+    """C (L + T background) + (1 - C) background at silhouettes; all else is as before."""
+    roll = load(SHIPPED["roll"], OPTIONS)
+    full, thin = (whole(roll, answerer, layers=True)[0] for answerer in (Flat(), Gauze()))
+    (gbuffer,) = render(roll, 0.0, SIZE).gbuffers.values()
+    rim = np.zeros(gbuffer.mask.size, bool)
+    rim[gbuffer.pixel[gbuffer.rim]] = True
+    rim = rim.reshape(gbuffer.mask.shape)
+    assert 5 < rim.sum() < 0.5 * gbuffer.mask.sum()
+    assert (thin["cloth"][rim] == 0.25).all() and (full["cloth"][rim] == 1).all()
+    background = full["backdrop"][rim] / 0.25
+    light = full["rgb"][rim] - full["backdrop"][rim]
+    expected = 0.25 * (light + 0.25 * background) + 0.75 * background
+    np.testing.assert_allclose(thin["rgb"][rim], expected, rtol=1e-5)
+    np.testing.assert_array_equal(thin["rgb"][~rim], full["rgb"][~rim])
 
 
 @pytest.mark.parametrize("side", [2, 3, 8])

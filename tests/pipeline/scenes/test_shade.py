@@ -1,5 +1,7 @@
 """From places to queries, and from components to pictures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -67,6 +69,16 @@ def test_queries_repeat_their_places(gbuffer):
     assert looks.u.tolist() == [3.0, 0.0, 1.0] and (looks.wi == looks.wo).all()
 
 
+def test_places_at_a_silhouette_are_asked_as_they_are_seen(gbuffer):
+    """Their directions are not tilted; all other places are covered."""
+    assert len(gbuffer.rims((4, 4)).u) == 0 and gbuffer.coverage([]).tolist() == [1.0, 1.0, 1.0]
+    low = np.array([[0.8, 0.0, -0.6]])
+    seen = replace(gbuffer, rim=np.array([2]), rim_wo=low)
+    (look,) = zip(*seen.rims((4, 4)), strict=True)
+    assert look[0] == 1.0 and look[4] == pytest.approx(low[0]) and look[3] == pytest.approx(low[0])
+    assert seen.coverage([0.25]).tolist() == [1.0, 1.0, 0.25]
+
+
 def test_lights_add_up_over_what_is_seen_through(gbuffer):
     rgb = np.array([[0.1, 0.1, 0.1], [0.2, 0.4, 0.6], [0.01, 0.02, 0.03]])
     background = np.arange(18.0).reshape(2, 3, 3)
@@ -75,5 +87,9 @@ def test_lights_add_up_over_what_is_seen_through(gbuffer):
     assert picture[0, 2] == pytest.approx(rgb[1] + 0.5 * background[0, 2])
     assert picture[1, 1] == pytest.approx(0.25 * background[1, 1])
     assert picture[~gbuffer.mask] == pytest.approx(background[~gbuffer.mask])
+    covered = compose(gbuffer, rgb, background, [0.0, 0.5, 0.25], [1.0, 0.25, 0.0])
+    assert (covered[0, 0] == picture[0, 0]).all()
+    assert covered[0, 2] == pytest.approx(0.25 * rgb[1] + (0.75 + 0.25 * 0.5) * background[0, 2])
+    assert covered[1, 1] == pytest.approx(background[1, 1])
     dark = compose(gbuffer, np.zeros((3, 3)), background=0.5)
     assert dark.dtype == np.float32 and (dark[gbuffer.mask] == 0).all() and (dark[~gbuffer.mask] == 0.5).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.truth.estimator import estimate
-from pipeline.truth.geometry.opacity import opacity
+from pipeline.truth.geometry.opacity import coverage
 from pipeline.truth.options import TruthOptions
 from reports.measure.silhouette import edge_of, edge_queries, measure_silhouette, read_edge, render_edge, true_edge
 from reports.options import EdgeOptions
@@ -28,8 +28,8 @@ class Truth(FakeMethod):
     def predict(self, fabric, queries, seed=0):
         return estimate(fabric, queries, TINY.truth, TINY.seed).mean
 
-    def missed(self, fabric, queries):
-        return 1 - opacity(fabric, queries, TINY.truth, TINY.seed)[0]
+    def coverage(self, fabric, looks):
+        return coverage(fabric, looks, TINY.truth, TINY.seed)[0]
 
 
 def test_pixels_see_the_cylinder_as_the_camera_does():

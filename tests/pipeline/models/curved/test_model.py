@@ -78,7 +78,7 @@ def test_curvature_enters_as_asked(way):
 def test_neither_opacity_nor_offset_knows_the_light():
     method, queries = _method(), _queries(50)
     other = queries._replace(wi=-queries.wi)
-    np.testing.assert_array_equal(method.missed(DENIM, queries), method.missed(DENIM, other))
+    np.testing.assert_array_equal(method.coverage(DENIM, queries), method.coverage(DENIM, other))
     assert (method.predict(DENIM, queries) != method.predict(DENIM, other)).any()
 
 
@@ -155,15 +155,15 @@ def test_silhouettes_at_extremes_are_shares_and_what_was_not_taught_is_refused()
     for behind in (False, True):
         queries = _queries(40, behind=behind)
         queries = queries._replace(u=queries.u * np.float32(1e6), sigma=queries.sigma * np.float32(1e-4))
-        prediction, through = method.predict(DENIM, queries), method.missed(DENIM, queries)
+        prediction, covered = method.predict(DENIM, queries), method.coverage(DENIM, queries)
         assert np.isfinite(prediction).all() and (prediction >= 0).all()
-        assert ((through >= 0) & (through <= 1)).all()
+        assert ((covered >= 0) & (covered <= 1)).all()
     assert method.predict(DENIM, queries.take(slice(0))).shape == (0, 4)
     with pytest.raises(BadInput, match=r"curvature\[3\].*trained up to 0.5"):
         method.predict(DENIM, _queries(4)._replace(curvature=np.float32([0, 0.1, 0.5, 0.6])))
     taught = _method(Domain.of({"queries": {"curvature": [0.01, 0.2], "behind": 0.0}}, [DENIM]))
     with pytest.raises(BadInput, match=r"trained up to 0\.2"):
-        taught.missed(DENIM, _queries(4, curvature=0.3))
+        taught.coverage(DENIM, _queries(4, curvature=0.3))
     with pytest.raises(BadInput, match="wi"):
         taught.predict(DENIM, _queries(4, behind=True))
 

@@ -8,7 +8,7 @@ import pytest
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.geometry.march import ray
-from pipeline.truth.geometry.opacity import grazing_cosine, hits, opacity
+from pipeline.truth.geometry.opacity import coverage, grazing_cosine, hits, opacity
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from tests.pipeline.truth.cloths import woven
@@ -204,6 +204,18 @@ def test_gaps_let_rays_through(width, curvature, depth):
     assert (found != hit).mean() < 0.006
     mean, error = opacity(fabric, _queries(wo, curvature), TruthOptions(relative_error=1e-2, max_count=1 << 13), 1)
     assert abs(mean[0] - hit.mean()) < 4 * math.hypot(0.5 / math.sqrt(len(x)), error[0])
+
+
+def test_coverage_is_opacity_with_gaps_filled():
+    """The same bits without gaps; with them, flat cloth covers all, and of rays that stay a share meets yarns."""
+    options, wo = TruthOptions(min_count=1024, max_count=1024), _wo(np.linspace(0.02, 0.98, 20), 0.3)
+    solid, holed = load_fabric("denim"), woven("denim", width=0.8)
+    for fabric in (solid, holed):
+        covered, _ = coverage(fabric, _queries(wo, 0.3), options, 3)
+        met, _ = opacity(fabric, _queries(wo, 0.3), options, 3)
+        assert (covered == met).all() if fabric is solid else ((covered >= met).all() and (covered > met).any())
+    mean, error = coverage(holed, _queries(wo, 0.0), options, 3)
+    assert (mean == 1).all() and (error == 0).all()
 
 
 def test_bad_input_is_one_sentence():

@@ -105,6 +105,23 @@ def test_a_picture_is_the_base_and_the_light_of_its_queries(frames):
     assert len(frames.cloths) == 4
 
 
+@pytest.mark.slow
+def test_silhouettes_have_the_truths_light_and_an_error_of_their_own(tmp_path):
+    """Hems: 32 rays are near the truth's coverage; all that is called covered errs by what is not."""
+    options = SCENES.model_copy(update={"names": ("hem",), "size": (40, 40)})
+    shoot("hem", options, tmp_path / "hem.npz")
+    (cloth,) = (shot := read_shot(tmp_path / "hem.npz")).cloths
+    assert 10 < len(cloth.coverage) == len(cloth.rims.u) and 0 < cloth.coverage.mean() < 1
+    quick, whole = Answers(1.0), Answers(2.0)
+    whole.coverage = lambda fabric, looks: np.ones(len(looks.u), np.float32)
+    records = measure_scene(
+        [Fallback(one, {"behind", "stretch", "curvature"}) for one in (quick, whole)], shot, options, {}
+    )
+    errors = [record.value for record in records if record.metric == "rim_coverage"]
+    assert errors[0] < 0.1
+    assert errors[1] == pytest.approx(np.sqrt(np.square(1 - cloth.coverage.astype(float)).mean()))
+
+
 def test_noise_of_many_lights_adds_in_quadrature(frames):
     cloth = frames.cloths[0]
     pixel = np.bincount(cloth.pixel[cloth.frame == 0]).argmax()
