@@ -60,6 +60,7 @@ if TYPE_CHECKING:
 
     from pipeline.models.method import Method
     from pipeline.models.patch_bsdf import PatchBSDF
+    from pipeline.scenes.bounces import Bounces
     from pipeline.shards.manifest import Role, Split
     from pipeline.training.dataset import RowStream
     from pipeline.truth.query import Answers
@@ -161,7 +162,9 @@ def load_model(name_or_folder: str | Path) -> Method:
     return AllCores(own_method(str(name_or_folder), "load_model", "name_or_folder"))
 
 
-def to_rgb(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.NDArray[np.float64]:
+def to_rgb(
+    fabric: Fabric, components: npt.ArrayLike, queries: Queries, bounces: Bounces = 1
+) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear sRGB: the components times the colours of a fabric's yarns.
 
     Parameters
@@ -172,6 +175,9 @@ def to_rgb(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.N
         Components from `evaluate` or a model.
     queries : Queries
         Their N queries: light from behind takes other colours.
+    bounces : 1 or "all"
+        All adds the light that yarns give to each other: up to a quarter more for white cloth. The first call for a
+        cloth takes seconds, and colours change nothing of it.
 
     Returns
     -------
@@ -187,7 +193,7 @@ def to_rgb(fabric: Fabric, components: npt.ArrayLike, queries: Queries) -> npt.N
     """
     from pipeline.scenes.shade import shade
 
-    return shade(fabric, components, queries)
+    return shade(fabric, components, queries, bounces)
 
 
 def patch_bsdf(fabric: Fabric, method: str = "soft_nodes:2") -> PatchBSDF:

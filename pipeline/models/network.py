@@ -20,7 +20,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain, domain_of
 from pipeline.models.method import Method, in_chunks, in_repeat
 from pipeline.models.options import Options
-from pipeline.models.per_fabric import PerFabric
+from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 

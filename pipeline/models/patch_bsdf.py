@@ -24,6 +24,7 @@ from pipeline.analytic.importance.surface import LobeSurface, tabulate_surface
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
 from pipeline.models.named import named_method
+from pipeline.scenes.bounces import Bounces, check_bounces, later_bounces
 from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.shade import coloured
 from pipeline.truth.footprint.mixture import footprints
@@ -79,6 +80,8 @@ class PatchBSDF:
         Points of the footprint that have a lobe each, at least 1; 1 has its exact lobe.
     widening : float
         Factor on the widening of a lobe by the spread of the tangents, >= 0.
+    bounces : 1 or "all"
+        All adds the light that yarns give to each other (`pipeline.scenes.bounces`).
 
     Raises
     ------
@@ -105,12 +108,14 @@ class PatchBSDF:
         method: str | Fallback | TruthAnswers = USUAL_METHOD,
         points: int = 8,
         widening: float = 2.0,
+        bounces: Bounces = 1,
     ) -> None:
+        check_bounces(bounces, "PatchBSDF")
         if points < 1:
             raise BadInput("PatchBSDF", "points", points, "must be 1 or more")
         if not 0.0 <= widening < np.inf:
             raise BadInput("PatchBSDF", "widening", widening, "must be a number from 0 on")
-        self.fabric = fabric
+        self.fabric, self.bounces = fabric, bounces
         self.method = named_method(method, "PatchBSDF", "method") if isinstance(method, str) else method
         self._widening = np.float32(widening)
         self._places = point_places(points)
@@ -190,7 +195,9 @@ class PatchBSDF:
     def eval(self, queries: Queries, seed: int = 0) -> Float64:
         """Return f_P of each query in linear RGB, (N, 3), 1/sr, with the incident cosine inside."""
         components = self.method.predict(self.fabric, queries, seed)
-        return coloured(components, self.method.colours(self.fabric, queries, seed))
+        colours = self.method.colours(self.fabric, queries, seed)
+        rgb = coloured(components, colours)
+        return rgb if self.bounces == 1 else rgb + later_bounces(self.fabric, queries, colours).sum(axis=1)
 
     def eval_pdf(self, queries: Queries, lobes: Lobes | None = None, seed: int = 0) -> tuple[Float64, Float32]:
         """Return `eval` and `pdf` of each query."""

@@ -32,7 +32,7 @@ from torch import Tensor, nn
 
 from pipeline.models.method import Around, Method
 from pipeline.models.network import PerQuery, Portable
-from pipeline.models.per_fabric import PerFabric
+from pipeline.per_fabric import PerFabric
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.errors import WorkFailed

@@ -24,7 +24,7 @@ from pipeline.models.added.guarded import Guarded, MethodFailed, faults_of, impo
 from pipeline.models.domain import domain_of
 from pipeline.models.method import Method
 from pipeline.models.network import Batch, Trainable, Trained
-from pipeline.models.per_fabric import PerFabric
+from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.draft import Matrix
 from weaves.fabric import Fabric

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.method import Method, refuse_other
 from pipeline.models.options import Gaussian, Options, setting_of
-from pipeline.models.per_fabric import PerFabric
+from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
-from pipeline.models.per_fabric import PerFabric
+from pipeline.per_fabric import PerFabric
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from pydantic import Field, model_validator
 from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
 from pipeline.models.method import Method
-from pipeline.models.per_fabric import PerFabric
+from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from pydantic import Field
 
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
-from pipeline.models.per_fabric import PerFabric
+from pipeline.per_fabric import PerFabric
 
 if TYPE_CHECKING:
     from pipeline.analytic.prefiltered import PrefilteredMaps

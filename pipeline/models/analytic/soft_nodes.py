@@ -17,7 +17,7 @@ from pydantic import Field
 from pipeline.compiled.arrays import Float32
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
 from pipeline.models.method import in_chunks, row_by_row
-from pipeline.models.per_fabric import PerFabric
+from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 

@@ -51,9 +51,9 @@ from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import CHUNK_ROWS, Around, refuse_other, row_by_row
 from pipeline.models.network import Answering, Batch, Columns, PerQuery, Trainable, Trained, restored
 from pipeline.models.networks.layers import SLOPE, LinearLayer
-from pipeline.models.per_fabric import PerFabric
 from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.error_network import FINEST, FLOOR, OWN, ErrorNetwork, colour_weights
+from pipeline.per_fabric import PerFabric
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput

@@ -1,10 +1,11 @@
-"""The point of the cloth that a view ray meets first, found without a step size.
+"""The point of the cloth that a ray meets first, found without a step size.
 
-The ray sinks from the height of the highest yarn, cell by cell, as the rays of `visibility` rise. Over the yarn on top,
-height minus ray is concave along the ray: it lies below its tangents, so Newton's steps from a place where the ray is
-above the yarn never pass the first meeting, and converge to it. A ray that is below a piece where it enters it has met
-the wall between this piece and the last. In gaps nothing stops a ray; it goes on to yarns further down, or leaves the
-cloth below. On a base that falls away by kappa s^2 / 2 it may rise again and leave above.
+A view ray sinks from the height of the highest yarn, cell by cell, as the rays of `visibility` rise. Over the yarn on
+top, height minus ray is concave along the ray: it lies below its tangents, so Newton's steps from a place where the ray
+is above the yarn never pass the first meeting, and converge to it. A ray that is below a piece where it enters it has
+met the wall between this piece and the last. In gaps nothing stops a ray; it goes on to yarns further down, or leaves
+the cloth below. On a base that falls away by kappa s^2 / 2 it may rise again and leave above. A ray from one yarn to
+the next may rise too; the float that it leaves cannot stop it (`pipeline.truth.geometry.visibility`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,17 @@ from typing import NamedTuple
 
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER, HeightField, surface_at
-from pipeline.truth.geometry.march import Cell, Ray, first_cell, height_along, next_cell, span_on_top, span_over, wrap
+from pipeline.truth.geometry.march import (
+    Cell,
+    Ray,
+    first_cell,
+    float_on_top,
+    height_along,
+    next_cell,
+    span_on_top,
+    span_over,
+    wrap,
+)
 
 ON_YARN, ON_WALL, MISSED = 0, 1, 2
 """Ends of a ray."""
@@ -155,21 +166,45 @@ def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) ->
     """
     picks, ends = field.top.shape
     x, y = wrap(x, ends), wrap(y, picks)
-    rise, bend = towards.rise, towards.bend
-    cell = first_cell(x, y, towards)
-    distance = 0.0
-    if rise == -math.inf:
+    if towards.rise == -math.inf:
+        cell = first_cell(x, y, towards)
         family, _, _, _, _, _, _, _, _ = surface_at(field, x, y, cell.end, cell.pick)
         return Hit(MISSED if family == GAP else ON_YARN, x, y, cell.end, cell.pick, 0.0)
+    return _end_of(field, x, y, z, UNDER, towards)
+
+
+@kernel
+def next_hit(field: HeightField, x: float, y: float, z: float, side: int, towards: Ray) -> Hit:
+    """Return what a ray meets first that leaves the cloth's own point (x, y, z), above its tangent plane.
+
+    0 <= x < ends, 0 <= y < picks; `side` is TOP if the point is on the yarn on top. The ray may rise or sink; the cloth
+    is flat.
+    """
+    if towards.rise == math.inf:
+        return Hit(MISSED, x, y, int(x), int(y), 0.0)
+    return _end_of(field, x, y, z, side, towards)
+
+
+@inlined_kernel
+def _end_of(field: HeightField, x: float, y: float, z: float, side: int, towards: Ray) -> Hit:
+    """Return where a ray that is not vertical ends; `side` is TOP if it leaves the float on top at (x, y)."""
+    rise, bend = towards.rise, towards.bend
+    cell = first_cell(x, y, towards)
+    own_family, own_yarn, own_centre = float_on_top(field, cell)
+    distance = 0.0
     bottom = _level_at(towards, z - field.lowest)
     for _ in range(_MAX_CELLS):
         leave = min(cell.next_x, cell.next_y, bottom)
-        # A ray is lowest where it leaves the cell, unless it rises again.
-        lowest = min(max(-rise / bend, distance), leave) if bend > 0.0 else leave
+        # A ray is lowest where it leaves the cell, unless it rises, or will again.
+        lowest = min(max(-rise / bend, distance), leave) if bend > 0.0 else (distance if rise > 0.0 else leave)
         if leave > distance and field.crown[cell.pick, cell.end] >= z + lowest * (rise + 0.5 * bend * lowest):
+            is_own = False
+            if side == TOP:
+                family, yarn, centre = float_on_top(field, cell)
+                is_own = family == own_family and yarn == own_yarn and centre == own_centre
             enter, exit_ = span_on_top(field, cell, x, y, towards, distance, leave)
             what, s = _ends_in(field, UNDER, x, y, z, towards, distance, enter, cell)
-            if what == MISSED:
+            if what == MISSED and not is_own:
                 what, s = _ends_in(field, TOP, x, y, z, towards, enter, exit_, cell)
             if what == MISSED:
                 what, s = _ends_in(field, UNDER, x, y, z, towards, exit_, leave, cell)

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from pipeline.analytic.bounces.table import bounce_table
 from pipeline.models.named import named_method
 from pipeline.models.patch_bsdf import PatchBSDF
+from pipeline.scenes import bounces
+from pipeline.scenes.shade import shade
 from pipeline.truth.query import Queries
 from tests.directions import sphere, unit
 from tests.presets import slow
@@ -183,3 +186,16 @@ def test_bad_settings_are_refused():
             PatchBSDF(bsdf.fabric, **settings)
     with pytest.raises(BadInput, match="lobes"):
         bsdf.pdf(looks_of("front", 3), bsdf.lobes(looks_of("front", 2)))
+
+
+def test_all_bounces_are_those_of_the_cloth(monkeypatch):
+    """What a method answers changes nothing of them; another number of bounces is refused."""
+    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
+    denim, up = load_fabric("denim"), np.float32([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
+    queries = Queries.round(np.array([0.3, 0.7]), np.array([0.2, 0.9]), np.array([0.1, 3.0]), up[::-1], up)
+    one, every = (PatchBSDF(denim, "prefiltered", bounces=number) for number in (1, "all"))
+    added = every.eval(queries) - one.eval(queries)
+    assert added == pytest.approx(shade(denim, np.zeros((2, 4)), queries, "all"), rel=1e-4)
+    assert added.min() > 0.0
+    with pytest.raises(BadInput, match=r'bounces.*must be 1 or "all"'):
+        PatchBSDF(denim, bounces=2)

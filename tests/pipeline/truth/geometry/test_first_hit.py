@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, ON_YARN, first_hit, sinking
-from pipeline.truth.geometry.heightfield import height_field, surface_at
+from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, ON_YARN, first_hit, next_hit, sinking
+from pipeline.truth.geometry.heightfield import GAP, height_field, surface_at
 from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.pieces import reference_plane
 from tests.pipeline.truth.cloths import LOPSIDED, cylinders, direction, woven
@@ -83,3 +83,30 @@ def test_the_reference_plane_is_the_mean_height(fabric):
     height = oracle(fabric, *np.meshgrid(x, y)).height
     expected = height[np.isfinite(height)].mean()
     assert reference_plane(height_field(fabric)) == pytest.approx(expected, abs=2e-4)
+
+
+@pytest.mark.parametrize("fabric", [LOPSIDED, woven("silk_charmeuse"), woven("voile")], ids=["narrow", "satin", "open"])
+def test_rays_from_yarn_to_yarn_are_those_of_a_march(fabric):
+    """Directions above the tangent plane of points of the cloth, rising and sinking: hits as of a march, to a step."""
+    field, random = height_field(fabric), np.random.default_rng(3)
+    ends, picks = fabric.weave.repeat
+    wrong, met, rising = 0, 0, 0
+    for _ in range(400):
+        x, y = random.random() * ends, random.random() * picks
+        family, side, z, nx, ny, nz, _, _, _ = surface_at(field, x, y, int(x), int(y))
+        w = random.normal(size=3)
+        w /= np.linalg.norm(w)
+        w *= math.copysign(1.0, w @ (nx, ny, nz))
+        if family == GAP or abs(w[2]) > 0.999 or w @ (nx, ny, nz) < 0.02:
+            continue
+        towards = ray(*w, 0.0)
+        hit = next_hit(field, x, y, z, side, towards)
+        s = STEP * np.arange(1, 4000)
+        altitude = z + s * towards.rise
+        within = (altitude > field.lowest) & (altitude < field.highest)
+        below = (oracle(fabric, x + s * towards.dx, y + s * towards.dy).height > altitude) & within
+        marched = s[np.argmax(below)] if below.any() else NEVER
+        distance = hit.distance if hit.what != MISSED else NEVER
+        wrong += not -1e-6 <= marched - distance <= STEP + 1e-6
+        met, rising = met + (hit.what != MISSED), rising + (hit.what != MISSED and w[2] > 0.0)
+    assert wrong <= 4 and met > 30 and rising > 10

@@ -1,0 +1,68 @@
+"""The table of bounces: it returns what was tabulated, and no cloth makes light."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.bounces.table import bounce_table, bounced
+from pipeline.analytic.bounces.walks import transport
+from pipeline.truth.estimator import estimate
+from pipeline.truth.geometry.heightfield import height_field
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from tests.directions import sphere, unit
+from tests.pipeline.truth.cloths import LOPSIDED, woven
+
+CLOSED = woven("polyester_lining", width=1.0, blend=1.0)
+WAYS = np.float32([unit(*angles) for angles in ((10, 40), (35, 130), (50, 300), (65, 200))])
+LIGHTS, VIEWERS = (np.float32(w) for w in (np.repeat(WAYS, 4, axis=0), np.tile(WAYS, (4, 1))))
+
+
+@pytest.fixture(scope="module")
+def closed():
+    return bounce_table(CLOSED)
+
+
+def test_a_table_has_the_second_bounce_of_walks(closed):
+    """Dark colours leave the second bounce alone; other walks, between the nodes of the grid, and of each family."""
+    sums = transport(height_field(CLOSED), 1 << 17, WAYS.astype(float), WAYS.astype(float))
+    expected = (sums.second / sums.seen[:, None, None, None]).transpose(3, 0, 1, 2).reshape(16, 2, 2)
+    scale = expected.sum(axis=(1, 2)).mean()
+    for family in range(2):
+        dark = np.zeros((2, 1))
+        dark[family] = 1e-6
+        table = bounced(closed, LIGHTS, VIEWERS, dark)[..., 0] * 1e6
+        assert np.sqrt(np.mean((table - expected[:, :, family]) ** 2)) < 0.02 * scale
+
+
+def test_a_table_is_small(closed):
+    assert sum(array.nbytes for array in closed) < 200_000
+
+
+def test_bounces_grow_with_every_colour(closed):
+    """Channels do not mix: grey of each albedo alone, and the three together."""
+    albedos = np.array([0.3, 0.6, 0.9])
+    together = bounced(closed, LIGHTS, VIEWERS, np.tile(albedos, (2, 1)))
+    alone = [bounced(closed, LIGHTS, VIEWERS, np.full((2, 1), albedo)) for albedo in albedos]
+    assert together == pytest.approx(np.concatenate(alone, axis=2))
+    assert (np.diff(together, axis=2) > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("fabric", "least"),
+    [(CLOSED, 0.98), (woven("silk_charmeuse", width=1.0, blend=1.0), 0.98), (LOPSIDED, 0.3), (woven("voile"), 0.2)],
+    ids=["closed", "satin", "narrow", "open"],
+)
+def test_white_cloth_in_a_furnace_makes_no_light(fabric, least):
+    """All bounces of white diffuse yarns: closed Lambertian cloth returns all light, others return less."""
+    above = np.float32(sphere(48, 32))
+    above = above[above[:, 2] > 0.0]
+    table, ones = bounce_table(fabric), np.ones(len(above))
+    for viewer in np.float32([unit(0.1, 0), unit(35, 100), unit(65, 250)]):
+        wo = np.tile(viewer, (len(above), 1))
+        queries = Queries.round(0.3 * ones, 0.7 * ones, 50.0 * ones, above, wo)
+        first = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean[:, 2:].sum(axis=1)
+        later = bounced(table, above, wo, np.ones((2, 1))).sum(axis=(1, 2))
+        total = (first + later).sum() * 2.0 * math.pi / len(above)
+        assert least < total < 1.01

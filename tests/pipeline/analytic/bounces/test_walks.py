@@ -1,0 +1,60 @@
+"""Walks between yarns against closed forms, and what they keep: reciprocity and energy."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.bounces.walks import starting_points, transport
+from pipeline.truth.geometry.heightfield import height_field
+from pipeline.truth.geometry.pieces import different_cells
+from tests.directions import sphere, unit
+from tests.pipeline.truth.cloths import LOPSIDED, cylinders, woven
+
+CLOSED = woven("silk_charmeuse", width=1.0, blend=1.0)
+
+
+@pytest.mark.parametrize("fabric", [LOPSIDED, woven("satin_8"), woven("voile")], ids=["narrow", "satin", "open"])
+def test_starting_points_cover_what_is_seen_from_above(fabric):
+    """Their areas sum to the plane less the gaps, of one cell of each kind."""
+    field = height_field(fabric)
+    start = starting_points(field, 4096)
+    gap = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width)
+    assert start.area.sum() == pytest.approx(different_cells(field) * (1.0 - gap), rel=2e-3)
+
+
+def test_round_yarns_side_by_side_give_each_other_what_lines_of_sight_say():
+    """Cylinders of diameter 1: from a point at the angle v, the neighbour fills angles from its tangent line down.
+
+    Of what a point sends across, the share between two angles to its normal is half the difference of their sines.
+    What reaches the neighbour leaves the cloth, or reaches another yarn.
+    """
+    sine = (np.arange(4000) + 0.5) / 2000 - 1.0
+    v = np.arcsin(sine)
+    x, y = 1.0 - 0.5 * sine, -0.5 * np.cos(v)
+    upper = np.arctan2(y, x) + np.arcsin(0.5 / np.hypot(x, y))
+    expected = 2.0 * np.mean(0.5 * (1.0 - np.sin(np.minimum(0.5 * math.pi - v - upper, 0.5 * math.pi))))
+    above = sphere(32, 32)
+    above = above[above[:, 2] > 0.0]
+    sums = transport(height_field(cylinders(blend=1.0)), 1 << 14, unit(0, 0)[None], above)
+    leaves = sums.second[0].sum() * 2.0 * math.pi / len(above)
+    assert (leaves + sums.reached[0].sum()) / sums.seen[0] == pytest.approx(expected, rel=0.02)
+
+
+def test_light_takes_each_way_in_both_directions():
+    """Lambertian yarns without walls, of which viewers see nothing: sun and viewer may change places."""
+    ways = np.array([unit(*angles) for angles in ((20, 40), (55, 130), (70, 300), (40, 200))])
+    sums = transport(height_field(cylinders(blend=1.0)), 1 << 16, ways, ways)
+    there, back = sums.second, sums.second.transpose(3, 2, 1, 0)
+    assert np.linalg.norm(there - back) < 0.03 * np.linalg.norm(there)
+
+
+def test_light_that_is_not_sent_on_leaves():
+    """White closed cloth: of what comes from third yarns, the share that leaves and the share that goes on are 1."""
+    above = sphere(16, 16)
+    above = above[above[:, 2] > 0.0]
+    sums = transport(height_field(CLOSED), 1 << 16, above[:1], above)
+    count = sums.later[:, -1]
+    leaves = sums.later[:, :-1].sum(axis=1) * 2.0 * math.pi / len(above)
+    known = count > 0.02 * count.sum()
+    assert (leaves + sums.transfers.sum(axis=1))[known] == pytest.approx(count[known], rel=0.03)

@@ -1,0 +1,76 @@
+"""Light between yarns in the colours of a cloth."""
+
+import numpy as np
+import pytest
+
+from pipeline.analytic.bounces import table
+from pipeline.scenes import bounces
+from pipeline.scenes.shade import colours_of, shade
+from pipeline.truth.query import Queries
+from tests.directions import unit
+from tests.pipeline.truth.cloths import coloured, woven
+from weaves.errors import BadInput
+
+CLOTH = woven("polyester_lining", diffuse=(0.9, 0.5, 0.0))
+WI, WO = (np.float32([unit(*angles) for angles in ways]) for ways in (((30, 20), (60, 140)), ((50, 250), (10, 0))))
+NONE = np.zeros((2, 4))
+
+
+def _queries(wi=WI, wo=WO):
+    return Queries.round(np.array([0.3, 0.7]), np.array([0.2, 0.9]), np.array([0.1, 3.0]), wi, wo)
+
+
+@pytest.fixture(autouse=True)
+def few_walks(monkeypatch):
+    """Make small tables, and count them."""
+    made = []
+
+    def small(fabric):
+        made.append(fabric)
+        return table.bounce_table(fabric, 1 << 10)
+
+    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(small))
+    return made
+
+
+def test_all_bounces_are_added_to_the_first():
+    """By default nothing is; a channel that no yarn reflects gets no light, and a white one most."""
+    components, queries = np.random.default_rng(1).random((2, 4)), _queries()
+    once, every = shade(CLOTH, components, queries), shade(CLOTH, components, queries, "all")
+    added = every - once
+    assert added == pytest.approx(shade(CLOTH, NONE, queries, "all"))
+    assert (added[:, 2] == 0.0).all() and (added[:, 0] > 2.0 * added[:, 1]).all() and (added[:, 1] > 0.0).all()
+
+
+def test_colours_change_no_table(few_walks):
+    for albedo in (0.2, 0.4, 0.8):
+        shade(woven("denim", diffuse=(albedo,) * 3), NONE, _queries(), "all")
+    assert len(few_walks) == 1
+
+
+def test_a_thread_sends_on_light_in_its_own_colour():
+    """The yarns further back have the mean colours of the cloth: light on the seen thread is that of the mean cloth."""
+    cloth, queries = coloured("denim", ends=[["red", 1], ["blue", 1]]), _queries()
+    own, mean = colours_of(cloth, queries), colours_of(cloth.average(), queries)
+    light = bounces.later_bounces(cloth.average(), queries, mean) / mean[:, 2:]
+    assert bounces.later_bounces(cloth, queries, own) == pytest.approx(light * own[:, 2:])
+    assert np.ptp(own[:, 2], axis=0).max() > 0.1
+
+
+def test_cloth_seen_from_behind_is_the_cloth_of_its_back():
+    flip = np.float32([1.0, 1.0, -1.0])
+    behind = shade(CLOTH, NONE, _queries(WI * flip, WO * flip), "all")
+    assert behind == pytest.approx(shade(CLOTH.back(), NONE, _queries(), "all"))
+    assert behind.max() > 0.0
+
+
+def test_transmitted_light_has_one_bounce():
+    """All bounces of it are not known: nothing is added."""
+    queries = _queries(WI * np.float32([1.0, 1.0, -1.0]))
+    assert shade(CLOTH, NONE, queries, "all").max() == 0.0
+
+
+@pytest.mark.parametrize("number", [0, 2, "none"])
+def test_other_numbers_of_bounces_are_refused(number):
+    with pytest.raises(BadInput, match=r'bounces.*must be 1 or "all"'):
+        shade(CLOTH, NONE, _queries(), number)
