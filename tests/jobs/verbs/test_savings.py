@@ -188,6 +188,8 @@ def write_frames(path, fabric):
     columns = queries._asdict() | {"frame": np.zeros(64, np.int64), "pixel": np.arange(64)}
     columns |= {"weight": np.ones((64, 3), np.float32)}
     columns |= dict.fromkeys(("mean", "standard_error", "fallback_values"), np.zeros((64, 4), np.float32))
+    columns |= {f"rim.{name}": column[:0] for name, column in queries._asdict().items()}
+    columns |= {"rim.coverage": np.zeros(0, np.float32)}
     about = {"name": "sphere", "cloths": {"a": fabric.model_dump(mode="json")}}
     path.parent.mkdir(parents=True, exist_ok=True)
     arrays = {f"a.{name}": column for name, column in columns.items()}
