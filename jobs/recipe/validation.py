@@ -166,14 +166,14 @@ def _check_models(recipe: Recipe, where: str) -> None:
         for kind in (kind for kind in drawn if kind not in options.kinds):
             allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
             raise BadInput(where, f"models.{index}.name", options.name, allowed)
-        for name in () if options.any_physics else _LEARNT:
-            if (value := getattr(truth, name)) != (own := getattr(options, name, getattr(_PLAIN, name))):
+        for name in () if options.any_physics else (name for name in _LEARNT if not hasattr(options, name)):
+            if (value := getattr(truth, name)) != (own := getattr(_PLAIN, name)):
                 allowed = f"{options.name} (models.{index}) knows {name} = {own!r} only"
                 raise BadInput(where, f"dataset.truth.{name}", value, allowed)
-        footprint = getattr(options, "footprint", truth.footprint)
-        if footprint != truth.footprint:
-            key = f"models.{index}.footprint"
-            raise BadInput(where, key, footprint, f"must be that of dataset.truth, {truth.footprint!r}")
+        for name in ("footprint", "parallax"):
+            wanted = getattr(truth, name)
+            if (own := getattr(options, name, wanted)) != wanted:
+                raise BadInput(where, f"models.{index}.{name}", own, f"must be that of dataset.truth, {wanted!r}")
         largest = getattr(options, "largest_curvature", queries.curvature[1])
         if largest < queries.curvature[1]:
             allowed = f"must not be below that of dataset.queries.curvature, {queries.curvature[1]:g}"

@@ -125,7 +125,7 @@ def constants() -> dict[str, float | int]:
         "INVERSE_PI": 1.0 / math.pi,
         "RIGHT": 0.5 * math.pi,
         "ROOT_3": math.sqrt(3.0),
-        "GAUSS_COLUMNS": vars(footprint_nodes)["_GAUSS_PLACES"].shape[1],
+        "GAUSS_COLUMNS": footprint_nodes.GAUSS_PLACES.shape[1],
         "WAVES_TOGETHER": waves.TOGETHER,
         "LINE_STEP": line.step,
         "LINE_REACH": line.reach,

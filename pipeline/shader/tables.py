@@ -324,7 +324,7 @@ def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np
 def _rules() -> dict[str, Float32]:
     """Return places and weights of the rules of Gauss and Legendre, (7, 8), and of the rule of Hermite, (4,)."""
     own = vars(footprint_nodes)
-    rules = {f"gauss_{part}": own[f"_GAUSS_{part.upper()}"] for part in ("places", "weights")}
+    rules = {f"gauss_{part}": own[f"GAUSS_{part.upper()}"] for part in ("places", "weights")}
     return rules | {
         f"hermite_{part}": own[f"_HERMITE_{part.upper()}"][: footprint_nodes.HERMITE] for part in ("places", "weights")
     }

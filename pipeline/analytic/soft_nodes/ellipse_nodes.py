@@ -150,7 +150,7 @@ def in_grid(box: Float32, family: int, radius: np.float32, x: np.float32, y: np.
 
 
 @kernel
-def write_node(
+def _write_node(
     nodes: Float32,
     k: int,
     piece: Float32,
@@ -240,7 +240,7 @@ def place_ellipse(
                 k = stops[kind]
                 box_x = np.float32(0.5 * (length * abs(dx) + shape.apart * abs(dy)))
                 box_y = np.float32(0.5 * (length * abs(dy) + shape.apart * abs(dx)))
-                write_node(nodes[kind], k, box, family, radius, in_x, in_y, box_x, box_y, weight)
+                _write_node(nodes[kind], k, box, family, radius, in_x, in_y, box_x, box_y, weight)
                 cells[kind, k] = place
                 stops[kind] = k + 1
     return gaps

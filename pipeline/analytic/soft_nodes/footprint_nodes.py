@@ -56,10 +56,10 @@ MOST_ACROSS: Final = 6
 HERMITE: Final = 4
 """Gauss-Hermite nodes along an axis where a piece covers the whole footprint."""
 
-_GAUSS_PLACES = np.zeros((MOST_ACROSS + 1, 8), np.float32)
-_GAUSS_WEIGHTS = np.zeros((MOST_ACROSS + 1, 8), np.float32)
+GAUSS_PLACES = np.zeros((MOST_ACROSS + 1, 8), np.float32)
+GAUSS_WEIGHTS = np.zeros((MOST_ACROSS + 1, 8), np.float32)
 for _n in range(1, MOST_ACROSS + 1):
-    _GAUSS_PLACES[_n, :_n], _GAUSS_WEIGHTS[_n, :_n] = np.polynomial.legendre.leggauss(_n)
+    GAUSS_PLACES[_n, :_n], GAUSS_WEIGHTS[_n, :_n] = np.polynomial.legendre.leggauss(_n)
 
 _HERMITE_PLACES, _HERMITE_WEIGHTS = (np.zeros(8, np.float32) for _ in range(2))
 _HERMITE_PLACES[:HERMITE], _HERMITE_WEIGHTS[:HERMITE] = np.polynomial.hermite_e.hermegauss(HERMITE)
@@ -153,13 +153,13 @@ def place_nodes(
         half_v, middle_v = _HALF * (v_high - v_low), _HALF * (v_high + v_low)
         area = half_v * radius * inverse_a * _INVERSE_ROOT
         for k in range(8):
-            v = middle_v + half_v * _GAUSS_PLACES[across, k]
+            v = middle_v + half_v * GAUSS_PLACES[across, k]
             sv, cv = sine_cosine(v)
             da = (radius * sv - centre_a) * inverse_a
             line[0, k], line[1, k] = sv, cv
-            line[2, k] = area * _GAUSS_WEIGHTS[across, k] * cv * remaining(_HALF * da * da)
+            line[2, k] = area * GAUSS_WEIGHTS[across, k] * cv * remaining(_HALF * da * da)
             line[3, k] = min(max((v * _INVERSE_PI + _HALF) * count + UPPER, _0), last)
-            line[4, k] = half_v * _GAUSS_WEIGHTS[across, k] * _HALF
+            line[4, k] = half_v * GAUSS_WEIGHTS[across, k] * _HALF
 
     # Along: place from the middle of the float, share of the footprint, cell, half a box.
     if (b_high - b_low) * inverse_b >= _WHOLE:
@@ -174,12 +174,12 @@ def place_nodes(
         half_b, middle_b = _HALF * (b_high - b_low), _HALF * (b_high + b_low)
         area = half_b * inverse_b * _INVERSE_ROOT
         for k in range(8):
-            place = middle_b + half_b * _GAUSS_PLACES[along, k]
+            place = middle_b + half_b * GAUSS_PLACES[along, k]
             db = (place - centre_b) * inverse_b
             line[5, k] = place - _HALF + bounds[SHIFT]
-            line[6, k] = area * _GAUSS_WEIGHTS[along, k] * remaining(_HALF * db * db)
+            line[6, k] = area * GAUSS_WEIGHTS[along, k] * remaining(_HALF * db * db)
             line[7, k] = min(max((place - low) / length * count + UPPER, _0), last)
-            line[8, k] = half_b * _GAUSS_WEIGHTS[along, k] * _HALF
+            line[8, k] = half_b * GAUSS_WEIGHTS[along, k] * _HALF
 
     # Every pair, a line of nodes at a time.
     for i in range(8):
@@ -192,10 +192,10 @@ def place_nodes(
         fill_eight(nodes[ALONG], k, line[5, j] if warp else -line[5, j])
         write_eight(nodes[HALF_V], k, line[4])
         fill_eight(nodes[HALF_ALONG], k, line[8, j])
-        write_eight_times(nodes[WEIGHT], k, line[2], line[6, j])
+        _write_eight_times(nodes[WEIGHT], k, line[2], line[6, j])
         fill_eight(nodes[TURN], k, bounds[CURVE])
         fill_eight(nodes[LIMIT], k, bounds[BOUND])
-        shift_eight(scratch.cells[kind], k, offsets, np.uint32(first + int(line[7, j]) * step_b))
+        _shift_eight(scratch.cells[kind], k, offsets, np.uint32(first + int(line[7, j]) * step_b))
         k += across
     scratch.stops[kind] = k
 
@@ -211,7 +211,7 @@ def write_eight(row: Float32, k: int, values: Float32) -> None:
 
 
 @inlined_fast_kernel
-def write_eight_times(row: Float32, k: int, values: Float32, f: np.float32) -> None:
+def _write_eight_times(row: Float32, k: int, values: Float32, f: np.float32) -> None:
     """Write eight numbers times a factor from `k` on."""
     v0, v1, v2, v3 = f * values[0], f * values[1], f * values[2], f * values[3]
     v4, v5, v6, v7 = f * values[4], f * values[5], f * values[6], f * values[7]
@@ -229,7 +229,7 @@ def fill_eight(row: Float32, k: int, value: np.float32) -> None:
 
 
 @inlined_fast_kernel
-def shift_eight(row: npt.NDArray[np.uint32], k: int, values: npt.NDArray[np.uint32], shift: np.uint32) -> None:
+def _shift_eight(row: npt.NDArray[np.uint32], k: int, values: npt.NDArray[np.uint32], shift: np.uint32) -> None:
     """Write eight numbers plus another one from `k` on."""
     v0, v1, v2, v3 = values[0] + shift, values[1] + shift, values[2] + shift, values[3] + shift
     v4, v5, v6, v7 = values[4] + shift, values[5] + shift, values[6] + shift, values[7] + shift
@@ -271,15 +271,15 @@ def gap_area(
     per_y = count / (bounds[Y_HIGH] - bounds[Y_LOW])
     total = _0
     for j in range(rows):
-        place_y = middle_y + half_y * _GAUSS_PLACES[rows, j]
+        place_y = middle_y + half_y * GAUSS_PLACES[rows, j]
         dy = (place_y - at.y) * inverse_y
         row = first + size * min(max(int((place_y - bounds[Y_LOW]) * per_y + UPPER), 0), size - 1)
         for i in range(columns):
-            place_x = middle_x + half_x * _GAUSS_PLACES[columns, i]
+            place_x = middle_x + half_x * GAUSS_PLACES[columns, i]
             dx = (place_x - at.x) * inverse_x
             cell = row + min(max(int((place_x - bounds[X_LOW]) * per_x + UPPER), 0), size - 1)
             low, high = np.float32(viewer.grid[cell + viewer.low]), np.float32(viewer.grid[cell + viewer.high])
             density = remaining(_HALF * (dx * dx + dy * dy))
-            share = _GAUSS_WEIGHTS[rows, j] * _GAUSS_WEIGHTS[columns, i]
+            share = GAUSS_WEIGHTS[rows, j] * GAUSS_WEIGHTS[columns, i]
             total += share * density * ramp(above(oz * _LEVELS, low, high, viewer.turn, sharpness / _LEVELS))
     return total * half_x * half_y * inverse_x * inverse_y * _INVERSE_TURN * oz

@@ -64,6 +64,11 @@ _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 EVEN: Final = 0.42
 """Of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %."""
 
+_NO_RAYS: Final[dict[str, Any]] = {
+    "floats": np.zeros((0, 4)), "crowns": np.zeros(0), "heights": np.zeros((0, 8)), "highest": 0.0, "lowest": 0.0,
+    "plane": 0.0, "spots": np.zeros((0, 4, COLUMNS), np.float32), "shown": np.zeros(0, np.float32),
+}  # fmt: skip
+
 _SHARPEST = 0.02  # least spread of a horizon
 
 # Columns of `SoftNodeTable.groups`.
@@ -144,7 +149,7 @@ class SoftNodeTable(NamedTuple):
     view_lines : float
         Deviation below which a footprint of rays places its nodes on lines.
     parallax : bool
-        Whether footprints are patches of view rays.
+        Whether footprints are patches of view rays; without, columns that only these need have no rows.
     """
 
     repeat: Index
@@ -277,7 +282,7 @@ def tabulate(
         waves=waves.periods,
         wave_size=waves.size,
         wave_nodes=_together(waves.nodes),
-        **_piece_columns(front, located),
+        **_piece_columns(located),
         grid=grid,
         behind_mean=_in_blocks(behind_mean),
         behind_sharpness=_in_blocks(_sharpness(behind_variance)),
@@ -286,7 +291,7 @@ def tabulate(
         grid_falls=grid_falls,
         legendre=detail.legendre,
         narrow=np.float32(detail.narrow),
-        **_ray_columns(model, groups, rules, first_nodes, stop),
+        **(_ray_columns(model, located, groups, rules, first_nodes, stop) if parallax else _NO_RAYS),
         view_lines=detail.lines, parallax=parallax,
     )  # fmt: skip
 
@@ -311,12 +316,19 @@ def _horizon_grids(
 
 
 def _ray_columns(
-    model: ClothSide, groups: list[PieceGroup], rules: list[tuple[Rule, Rule]], first_nodes: list[int], stop: int
+    model: ClothSide,
+    located: _Located,
+    groups: list[PieceGroup],
+    rules: list[tuple[Rule, Rule]],
+    first_nodes: list[int],
+    stop: int,
 ) -> dict[str, Any]:
     """Return the columns of `SoftNodeTable` by which view rays meet heights."""
     front, spots = model.front, _spots(model.front, groups, rules, first_nodes, stop)
     shown = spots[:, 3][spots[:, 2] > 0.0]
     return {
+        "floats": np.array([front.floats[pick, end, piece.side] for (end, pick), piece, _ in located.pieces]),
+        "crowns": np.array([front.crown[pick, end] for (end, pick), _, _ in located.pieces]),
         "heights": front.yarn,
         "highest": front.highest,
         "lowest": front.lowest,
@@ -362,7 +374,7 @@ def tabulate_pieces(model: ClothSide, size: int) -> dict[str, Any]:
     located = _locate(model.front)
     x, y, gap = _grid_places(located.samples, size)
     grid = _grids(horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS), size)
-    return _piece_columns(model.front, located) | {"grid": grid}
+    return _piece_columns(located) | {"grid": grid}
 
 
 class _Located(NamedTuple):
@@ -389,14 +401,12 @@ def _locate(front: HeightField) -> _Located:
     return found
 
 
-def _piece_columns(front: HeightField, located: _Located) -> dict[str, Any]:
+def _piece_columns(located: _Located) -> dict[str, Any]:
     """Return the columns of `SoftNodeTable` about pieces."""
     return {
         "piece_starts": np.array(located.starts, np.int64),
         "pieces": np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
         "bounds": np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
-        "floats": np.array([front.floats[pick, end, piece.side] for (end, pick), piece, _ in located.pieces]),
-        "crowns": np.array([front.crown[pick, end] for (end, pick), _, _ in located.pieces]),
     }
 
 

@@ -142,6 +142,7 @@ def scratch_for(table: SoftNodeTable, most: int) -> Scratch:
     kinds = table.kinds[0] + table.kinds[1]
     ends, picks, fixed = table.repeat[0], table.repeat[1], table.starts[kinds + 1]
     room = most + 2 * BLOCK_NODES
+    on_lines = MOST_ON_LINES if table.parallax else 0
     weight = np.zeros((fixed, BLOCK_NODES), np.float32)
     return Scratch(
         weight,
@@ -167,8 +168,8 @@ def scratch_for(table: SoftNodeTable, most: int) -> Scratch:
         np.zeros((2, fixed, BLOCK_NODES), np.float32),
         np.zeros(2 * room, np.float32),
         np.arange(room).astype(np.uint32),
-        np.zeros((2, 512)),
-        np.ones((kinds, DRAFT_ROWS, MOST_ON_LINES), np.float32),
-        np.zeros((kinds, MOST_ON_LINES), np.uint32),
-        np.zeros((len(table.spots), 2, COLUMNS), np.float32),
+        np.empty((2, 512)),
+        np.empty((kinds, DRAFT_ROWS, on_lines), np.float32),
+        np.empty((kinds, on_lines), np.uint32),
+        np.empty((len(table.spots), 2, COLUMNS), np.float32),
     )

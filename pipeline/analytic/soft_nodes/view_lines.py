@@ -20,8 +20,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import AZIMUTHS, above, ramp, sharpness_of_points
-from pipeline.analytic.soft_nodes.ellipse_nodes import next_cut, piece_at
-from pipeline.analytic.soft_nodes.footprint_nodes import fill_eight, write_eight
+from pipeline.analytic.soft_nodes.ellipse_nodes import in_grid, next_cut, piece_at
+from pipeline.analytic.soft_nodes.footprint_nodes import (
+    GAUSS_PLACES,
+    GAUSS_WEIGHTS,
+    MOST_ACROSS,
+    fill_eight,
+    write_eight,
+)
 from pipeline.analytic.soft_nodes.line_nodes import (
     ACROSS,
     ALONG_FROM,
@@ -75,7 +81,6 @@ _COARSEST: Final = 1.2  # the same in deviations
 _FOOTPRINT_ENDS: Final = 2.6  # where the footprint ends, in deviations
 _LENGTH: Final = 0.2  # yarn spacings of an interval for each node beyond the first
 _DEVIATIONS: Final = 1.2  # and deviations
-_MOST_IN_INTERVAL: Final = 6
 _NEAREST: Final = 1e-5  # least length of a segment
 _CREST_STEPS: Final = 8
 _CREST_CLOSE: Final = 1e-2
@@ -85,10 +90,6 @@ _WHERE_IT_ENDS: Final = 0.3  # and where the footprint ends
 _NEVER: Final = 1e9
 _FARTHEST: Final = 200.0  # yarn spacings that a line is followed
 _STEEP: Final = 0.05  # of a radius, across the yarn: shorter intervals take places even along the line
-_PLACES = np.zeros((_MOST_IN_INTERVAL + 1, 8), np.float32)
-_WEIGHTS = np.zeros((_MOST_IN_INTERVAL + 1, 8), np.float32)
-for _n in range(1, _MOST_IN_INTERVAL + 1):
-    _PLACES[_n, :_n], _WEIGHTS[_n, :_n] = np.polynomial.legendre.leggauss(_n)
 _0, _HALF, _LEVELS = np.float32(0.0), np.float32(0.5), np.float32(LEVELS)
 _SMEARED: Final = 0.2  # yarn spacings across, in which a line crosses the border of a yarn
 
@@ -252,13 +253,13 @@ def _lines_across(
     # At w across the azimuth the line has x = x - w dy, or y = y + w dx.
     centre, factor, radius = (y, ray.dx, weft_radius) if along_x else (x, -ray.dy, warp_radius)
     place, stop, n = centre - _FOOTPRINT_ENDS * sigma, centre + _FOOTPRINT_ENDS * sigma, 0
-    while place < stop - _NEAREST and n < lines.shape[1] - _MOST_IN_INTERVAL:
+    while place < stop - _NEAREST and n < lines.shape[1] - MOST_ACROSS:
         after = min(next_cut(place, True, radius), stop)
         half, middle = 0.5 * (after - place), 0.5 * (after + place)
-        count = min(1 + int(max(2.0 * half / _BETWEEN, 2.0 * half / (_COARSEST * sigma))), _MOST_IN_INTERVAL)
+        count = min(1 + int(max(2.0 * half / _BETWEEN, 2.0 * half / (_COARSEST * sigma))), MOST_ACROSS)
         for i in range(count):
-            lines[0, n] = (middle + half * _PLACES[count, i] - centre) / factor
-            lines[1, n] = half * _WEIGHTS[count, i]
+            lines[0, n] = (middle + half * GAUSS_PLACES[count, i] - centre) / factor
+            lines[1, n] = half * GAUSS_WEIGHTS[count, i]
             n += 1
         place = after
     return n
@@ -341,7 +342,7 @@ def _write_draft(
         last = arcsine(np.float32((curve.across + stop * curve.by_across) * curve.per_radius))
     half, middle = _HALF * (last - first), _HALF * (last + first) + (_0 if turned else ON_LINE)
     for i in range(8):
-        line[0, i], line[1, i] = middle + half * _PLACES[count, i], abs(half) * _WEIGHTS[count, i]
+        line[0, i], line[1, i] = middle + half * GAUSS_PLACES[count, i], abs(half) * GAUSS_WEIGHTS[count, i]
     write_eight(draft[AT], k, line[0])
     write_eight(draft[LENGTH], k, line[1])
     fill_eight(draft[ACROSS], k, np.float32(curve.across))
@@ -374,16 +375,11 @@ def _fill_block(draft: Float32, firsts: npt.NDArray[np.uint32], stop: int) -> in
 
 
 @inlined_kernel
-def _gap_seen(table: SoftNodeTable, look: SoftQuery, box: Float32, first: int, x: float, y: float) -> np.float32:
-    """Return the share of a place in a gap, from the corner of its cell, through which the viewer sees."""
-    size = table.grid.shape[2]
-    grid = table.grid.reshape(table.grid.size)
-    row = min(max(int((y - box[Y_LOW]) / (box[Y_HIGH] - box[Y_LOW]) * size), 0), size - 1)
-    column = min(max(int((x - box[X_LOW]) / (box[X_HIGH] - box[X_LOW]) * size), 0), size - 1)
-    at = first + size * row + column
-    low, high = np.float32(grid[at + look.low_o * size * size]), np.float32(grid[at + look.high_o * size * size])
-    # What hides a gap is a step.
-    return ramp(above(look.oz * _LEVELS, low, high, look.turn_o, sharpness_of_points(_0) / _LEVELS))
+def _gap_seen(scratch: Scratch, look: SoftQuery, at: int, per_azimuth: int) -> np.float32:
+    """Return the share of a cell of a gap's grid through which the viewer sees; what hides it is a step."""
+    low, high = scratch.grid[at + look.low_o * per_azimuth], scratch.grid[at + look.high_o * per_azimuth]
+    sharp = sharpness_of_points(_0) / _LEVELS
+    return ramp(above(look.oz * _LEVELS, np.float32(low), np.float32(high), look.turn_o, sharp))
 
 
 @inlined_kernel
@@ -422,8 +418,9 @@ def _place_line(
             if q_high > q_low:
                 q = 0.5 * (q_low + q_high)
                 share = view_line.density * (q_high - q_low) * math.exp(-0.5 * (q / sigma) ** 2)
-                at_x, at_y = x0 + (q + of_gap) * ex - column, y0 + (q + of_gap) * ey - row
-                gaps += share * float(_gap_seen(table, look, bounds, first, at_x, at_y))
+                at_x, at_y = np.float32(x0 + (q + of_gap) * ex - column), np.float32(y0 + (q + of_gap) * ey - row)
+                at = first + in_grid(bounds, family, _HALF, at_x, at_y, size)
+                gaps += share * float(_gap_seen(scratch, look, at, size * size))
             continue
         if low - sunk(ray, table.crowns[p])[0] >= covered:
             continue
@@ -433,7 +430,7 @@ def _place_line(
         k = stops[kind]
         if stop <= start or k >= limit:
             continue
-        count = min(1 + int(max((stop - start) / _LENGTH, seen / (_DEVIATIONS * sigma))), _MOST_IN_INTERVAL)
+        count = min(1 + int(max((stop - start) / _LENGTH, seen / (_DEVIATIONS * sigma))), MOST_ACROSS)
         _write_draft(
             scratch.drafts[kind], k, start, stop, count, curve, view_line, bounds, family, size, scratch.line
         )  # fmt: skip

@@ -36,8 +36,11 @@ from pipeline.truth.geometry.heightfield import ALPHA, BLEND, WEFT
 NARROW: Final = 0.25
 """Deviation, in yarn spacings, below which fixed nodes are too far apart: a footprint places its own."""
 
+RESOLVED: Final = 0.12
+"""Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
+
 _REACH = np.float32(REACH)
-_RESOLVED, _SHORTEST_RUN = np.float32(0.12), np.float32(1e-6)
+_SHORTEST_RUN = np.float32(1e-6)
 _0, _HALF, _1, _2 = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
 
 
@@ -203,7 +206,7 @@ def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -
     ex, ey = (look.ox / run, look.oy / run) if run > _SHORTEST_RUN else (_1, _0)
     run = run / look.oz
     bent, plane = _2 * look.bend_o * run * run, np.float32(table.plane)
-    dx, dy, rho = max(look.dx, _RESOLVED), max(look.dy, _RESOLVED), look.rho
+    dx, dy, rho = max(look.dx, np.float32(RESOLVED)), max(look.dy, np.float32(RESOLVED)), look.rho
     scale = _1 / (_1 - rho * rho)
     of_xx, of_yy, of_xy = _HALF * scale / (dx * dx), _HALF * scale / (dy * dy), -rho * scale / (dx * dy)
     nearest, farthest = table.shown[0] - plane, table.shown[1] - plane
@@ -236,9 +239,6 @@ def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -
         for k in range(COLUMNS):
             weight[line, k] *= table.spots[line, 2, k]
 
-
-RESOLVED: Final = 0.12
-"""Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
 
 _POINTS: Final = COARSE_LINE.points
 # Nanoseconds, of which only the ratios count: of waves, of each in a block of nodes; of densities, of each in a cell of

@@ -58,6 +58,11 @@ def refused(files, words):
             ["models.1.truth.estimator = 'node_table'", "footprints from 0.0391 yarn spacings on"],
         ),
         ("relative_error = 0.05", 'footprint = "box"', ["models.2.footprint = 'gaussian'", "'box'"]),
+        (
+            "relative_error = 0.05",
+            "parallax = true",
+            ["models.2.parallax = False", "of dataset.truth, True"],
+        ),
         ('model = "woven"', 'model = "wovn"', ["models.0.model = 'wovn'", "did you mean 'woven'"]),
         ('model = "woven"', 'model = "gauss_nodes"', ["models.0.model = 'gauss_nodes'", "gone: take 'soft_nodes'"]),
         ("relative_error = 0.05", 'estimator = "jittered"', ["truth.estimator = 'jittered'", "gone: take 'r2'"]),
