@@ -54,6 +54,9 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(twillight, mon
     options = WovenOptions().model_dump(mode="json", context=IDENTITY)
     write_model(tmp_path / "woven", b"", {"options": options, "version": {"model": 1}})
     refused(twillight, CLOTH, *shader, str(tmp_path / "woven"))
+    assert "selvage was trained on footprints of the fabric plane" in refused(
+        twillight, CLOTH, *shader, "selvage", "--kind", "parallax"
+    )
     monkeypatch.setattr(verb, "no_onnx", lambda: "not installed: onnxscript")
     assert "not installed: onnxscript" in refused(twillight, CLOTH, *shader, "selvage", "--language", "onnx")
     monkeypatch.setattr(verb, "covering_model", lambda *_: object())
