@@ -170,7 +170,7 @@ def _check_models(recipe: Recipe, where: str) -> None:
             if (value := getattr(truth, name)) != (own := getattr(_PLAIN, name)):
                 allowed = f"{options.name} (models.{index}) knows {name} = {own!r} only"
                 raise BadInput(where, f"dataset.truth.{name}", value, allowed)
-        for name in ("footprint", "parallax"):
+        for name in ("footprint", "parallax", "walls"):
             wanted = getattr(truth, name)
             if (own := getattr(options, name, wanted)) != wanted:
                 raise BadInput(where, f"models.{index}.{name}", own, f"must be that of dataset.truth, {wanted!r}")

@@ -139,7 +139,7 @@ def _sum_rows(
             turn_i, low_o, high_o, turn_o, bend_i, bend_o,
         )  # fmt: skip
         if table.parallax and not _rises(table, wo[n], bend_o):
-            if narrowest < table.view_lines and nodes_on_lines(dx, dy, narrowest) <= MOST_ON_LINES:
+            if narrowest < table.view_lines and nodes_on_lines(dx, dy, narrowest, table.spacing) <= MOST_ON_LINES:
                 gaps[n] = sum_view_lines(table, scratch, look, result[n])
             else:
                 gaps[n] = sum_fixed(table, scratch, look, widest, result[n])

@@ -42,7 +42,7 @@ FLOAT_BEND, FLOAT_HALF, FLOAT_DROP, BENDING, STEEPEST_SINE, ROWS_FROM, ROWS_PER 
 `SoftNodeTable.bounds`; row of the grid for b = 0 and rows for each unit of b."""
 
 ON_LINE: Final = np.float32(1000.0)
-"""Added to places along a line, so that they differ from angles across a yarn."""
+"""Added to places along a line, so that they differ from angles across a yarn; the sum is negative at a rim."""
 
 Falls = npt.NDArray[np.uint8] | None
 
@@ -93,8 +93,8 @@ def _node(
     """Return a drafted node."""
     # Place across and along the yarn.
     at, across, by_across = draft[AT, k], draft[ACROSS, k], draft[BY_ACROSS, k]
-    turned, on_line = at < _RIGHT, at - ON_LINE
-    of_angle, _ = sine_cosine(min(at, _RIGHT))
+    turned, on_line, rim = abs(at) < _RIGHT, abs(at) - ON_LINE, at < -_RIGHT
+    of_angle, _ = sine_cosine(min(max(at, -_RIGHT), _RIGHT))
     sine = of_angle if turned else min(max((across + on_line * by_across) / radius, -_VERTICAL), _VERTICAL)
     cosine = np.sqrt((_1 - sine) * (_1 + sine))
     part_a, part_b = abs(by_across), abs(draft[BY_ALONG, k])
@@ -118,6 +118,7 @@ def _node(
     # A(wo) is that of straight rays: dq / ds of the bent ones in its place.
     steep = -(nx * by_across + ny * draft[BY_ALONG, k]) / nz * rays.run
     weight *= (fall - steep) / (fall * max(_1 - steep, _GRAZING)) if rays.bent > _0 else _1
+    weight = draft[DENSITY, k] / max(_1 - steep, _GRAZING) if rim else weight
     t = tangent(angles, fibre)
     by_u, by_v = turning(d.ix + d.ox, d.iy + d.oy, d.iz + d.oz, t, angles, fibre)
     half_v = min(_HALF * (length * part_a + draft[APART, k] * part_b) / (radius * cosine), _HALF)

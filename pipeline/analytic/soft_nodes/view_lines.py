@@ -5,7 +5,8 @@ s is displaced to q = s - d, with d the distance in which a ray sinks from h to 
 displaced. So a footprint is cut into lines in that azimuth, and each line is a curve h(s). Going away from the viewer,
 a point is seen if its q is less than all q before it. On a torus h is concave, so q(s) falls to its least at the crest
 that the viewer sees and rises from there: what is seen of a piece is one interval, found by its two ends. Gauss's rule
-is used in it, with the density at q; across the lines the trapezoidal rule.
+is used in it, with the density at q; across the lines the trapezoidal rule. Rays between what is covered and the near
+end of a piece meet the wall below it: with `SoftNodeTable.rims` they see the surface at this end, which is one node.
 
 Over a cloth of curvature kappa the ray is a parabola: with T = |o_xy| / o_z and g the height over the plane,
 d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) [Kuznetsov2022Curved].
@@ -76,11 +77,11 @@ from pipeline.truth.geometry.heightfield import (
     WEFT,
 )
 
-_BETWEEN: Final = 0.2  # yarn spacings: distance of the lines
-_COARSEST: Final = 1.2  # the same in deviations
-_FOOTPRINT_ENDS: Final = 2.6  # where the footprint ends, in deviations
+_BETWEEN: Final = 0.25  # yarn spacings: distance of the lines at level 2
+_COARSEST: Final = 0.9  # the same in deviations
+_FOOTPRINT_ENDS: Final = 2.4  # where the footprint ends, in deviations
 _LENGTH: Final = 0.2  # yarn spacings of an interval for each node beyond the first
-_DEVIATIONS: Final = 1.2  # and deviations
+_DEVIATIONS: Final = 0.6  # and deviations
 _NEAREST: Final = 1e-5  # least length of a segment
 _CREST_STEPS: Final = 8
 _CREST_CLOSE: Final = 1e-2
@@ -227,36 +228,39 @@ def _at_place(
 
 
 @kernel
-def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float) -> float:
+def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float, spacing: float) -> float:
     """Return a bound of the nodes that a footprint places on lines, given its least deviation of any direction."""
     widest = math.sqrt(max(deviation_x**2 + deviation_y**2 - narrowest**2, narrowest**2))
-    # Parts between borders of yarns have a node more than their length takes.
-    density = 2.0 * _FOOTPRINT_ENDS * (1.0 / _BETWEEN + 1.0)
-    return 2.0 * (3.0 + density * narrowest) * (3.0 + density * widest)
+    # Parts between borders of yarns, and rims, have a node more than their length takes.
+    lines = 3.0 + 2.0 * _FOOTPRINT_ENDS * (1.0 / (_COARSEST * spacing) + narrowest * (1.0 / (_BETWEEN * spacing) + 1.0))
+    nodes = 3.0 + 2.0 * _FOOTPRINT_ENDS * (1.0 / (_DEVIATIONS * spacing) + widest * (1.0 / (_LENGTH * spacing) + 2.0))
+    return lines * nodes
 
 
 @kernel
 def _lines_across(
-    ray: ViewRay, x: float, y: float, sigma: float, warp_radius: float, weft_radius: float, reach: float, lines: Float64
+    ray: ViewRay, x: float, y: float, sigma: float, radii: tuple[float, float], reach: float, spacing: float,
+    lines: Float64,
 ) -> int:  # fmt: skip
     """Write places of lines across the azimuth and the widths that they stand for, (2, most); return their number.
 
     Lines that run along yarns have places by Gauss's rule between the borders of yarns.
     """
     along_x = abs(ray.dy) < abs(ray.dx)
+    distance = spacing * min(_BETWEEN, _COARSEST * sigma)
     if reach * min(abs(ray.dx), abs(ray.dy)) >= _SMEARED:
-        count = math.ceil(_FOOTPRINT_ENDS * sigma / min(_BETWEEN, _COARSEST * sigma))
+        count = math.ceil(_FOOTPRINT_ENDS * sigma / distance)
         apart = _FOOTPRINT_ENDS * sigma / count
         for j in range(2 * count + 1):
             lines[0, j], lines[1, j] = (j - count) * apart, apart
         return 2 * count + 1
     # At w across the azimuth the line has x = x - w dy, or y = y + w dx.
-    centre, factor, radius = (y, ray.dx, weft_radius) if along_x else (x, -ray.dy, warp_radius)
+    centre, factor, radius = (y, ray.dx, radii[WEFT]) if along_x else (x, -ray.dy, radii[WARP])
     place, stop, n = centre - _FOOTPRINT_ENDS * sigma, centre + _FOOTPRINT_ENDS * sigma, 0
     while place < stop - _NEAREST and n < lines.shape[1] - MOST_ACROSS:
         after = min(next_cut(place, True, radius), stop)
         half, middle = 0.5 * (after - place), 0.5 * (after + place)
-        count = min(1 + int(max(2.0 * half / _BETWEEN, 2.0 * half / (_COARSEST * sigma))), MOST_ACROSS)
+        count = min(1 + int(2.0 * half / distance), MOST_ACROSS)
         for i in range(count):
             lines[0, n] = (middle + half * GAUSS_PLACES[count, i] - centre) / factor
             lines[1, n] = half * GAUSS_WEIGHTS[count, i]
@@ -303,18 +307,19 @@ def _curve_of(table: SoftNodeTable, p: int, ray: ViewRay, x: float, y: float) ->
 @inlined_kernel
 def _interval(
     curve: YarnCurve, ray: ViewRay, low: float, high: float, sigma: float, covered: float
-) -> tuple[float, float, float, float]:
+) -> tuple[float, float, float, float, float]:
     """Return from where to where a piece between two places is seen, how long that seems, and what is covered then.
 
     Rays from `covered` on meet something nearer to the viewer. The interval is empty if its end is not behind its
-    start, and cut where the footprint ends.
+    start, and cut where the footprint ends. Returned last is the displaced place of the piece's near end: rays from
+    there to `covered` meet the wall below it. It is `covered` if this end faces away from the viewer.
     """
     crest, left, right = low, -_FOOTPRINT_ENDS * sigma, _FOOTPRINT_ENDS * sigma
     q_crest, at_low = _seen(curve, ray, low)
     q_high, at_high = _seen(curve, ray, high)
     if at_low < 0.0:
         if at_high <= 0.0:
-            return low, low, 0.0, min(covered, q_high)
+            return low, low, 0.0, min(covered, q_high), covered
         crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, q_high)
     q_from, q_to = max(q_crest, left), min(q_high, right, covered)
     start, stop = crest, high
@@ -326,7 +331,7 @@ def _interval(
             stop = _at_place(curve, ray, crest, high, q_crest, q_high, q_to, near)
     else:
         stop = start
-    return start, stop, q_to - q_from, min(covered, q_crest)
+    return start, stop, q_to - q_from, min(covered, q_crest), q_high
 
 
 @inlined_kernel
@@ -334,7 +339,10 @@ def _write_draft(
     draft: Float32, k: int, start: float, stop: float, count: int, curve: YarnCurve, of_line: ViewLine, bounds: Float32,
     family: int, size: int, line: Float32,
 ) -> None:  # fmt: skip
-    """Write the nodes of an interval from `k` on: even along the line, or in the angle across the yarn."""
+    """Write the nodes of an interval from `k` on: even along the line, or in the angle across the yarn.
+
+    An interval of no length is a rim, whose density is its whole weight.
+    """
     turned = abs(curve.by_across) * (stop - start) > _STEEP * curve.radius
     first, last = np.float32(start), np.float32(stop)
     if turned:
@@ -343,6 +351,8 @@ def _write_draft(
     half, middle = _HALF * (last - first), _HALF * (last + first) + (_0 if turned else ON_LINE)
     for i in range(8):
         line[0, i], line[1, i] = middle + half * GAUSS_PLACES[count, i], abs(half) * GAUSS_WEIGHTS[count, i]
+    if stop <= start:
+        line[0] = -middle
     write_eight(draft[AT], k, line[0])
     write_eight(draft[LENGTH], k, line[1])
     fill_eight(draft[ACROSS], k, np.float32(curve.across))
@@ -383,6 +393,12 @@ def _gap_seen(scratch: Scratch, look: SoftQuery, at: int, per_azimuth: int) -> n
 
 
 @inlined_kernel
+def _under_bell(low: float, high: float) -> float:
+    """Return the integral of exp(-x^2 / 2)."""
+    return math.sqrt(0.5 * math.pi) * (math.erf(high * math.sqrt(0.5)) - math.erf(low * math.sqrt(0.5)))
+
+
+@inlined_kernel
 def _place_line(
     table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay, view_line: ViewLine
 ) -> float:  # fmt: skip
@@ -393,6 +409,7 @@ def _place_line(
     warp_radius, weft_radius = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
     x0, y0, ex, ey, sigma = view_line.x, view_line.y, ray.dx, ray.dy, view_line.sigma
     of_gap, gaps, covered, limit = sunk(ray, 0.0)[0], 0.0, _NEVER, scratch.drafts.shape[2] - 2 * BLOCK_NODES
+    stopped = 0.0
     left, right = -_FOOTPRINT_ENDS * sigma, _FOOTPRINT_ENDS * sigma
     low = right + sunk(ray, table.highest)[0]
     last = max(left + sunk(ray, table.lowest)[0], low - _FARTHEST)
@@ -420,17 +437,31 @@ def _place_line(
                 share = view_line.density * (q_high - q_low) * math.exp(-0.5 * (q / sigma) ** 2)
                 at_x, at_y = np.float32(x0 + (q + of_gap) * ex - column), np.float32(y0 + (q + of_gap) * ey - row)
                 at = first + in_grid(bounds, family, _HALF, at_x, at_y, size)
-                gaps += share * float(_gap_seen(scratch, look, at, size * size))
+                through = float(_gap_seen(scratch, look, at, size * size))
+                gaps += share * through
+                stopped += share * (1.0 - through)
             continue
         if low - sunk(ray, table.crowns[p])[0] >= covered:
             continue
         curve = _curve_of(table, p, ray, x0 - column, y0 - row)
-        start, stop, seen, covered = _interval(curve, ray, low, high, sigma, covered)
+        wall_to = min(covered, right)
+        start, stop, seen, covered, wall_from = _interval(curve, ray, low, high, sigma, covered)
         kind = column % of_warp if family == WARP else of_warp + row % of_weft
-        k = stops[kind]
+        k, wall_from = stops[kind], max(wall_from, left)
+        if table.rims and wall_to - wall_from > _NEAREST and k < limit:
+            rim = stopped + view_line.density * _under_bell(wall_from / sigma, wall_to / sigma) * sigma
+            of_rim, stopped = ViewLine(x0, y0, rim, sigma, view_line.apart), 0.0
+            _write_draft(
+                scratch.drafts[kind], k, high, high, 1, curve, of_rim, bounds, family, size, scratch.line
+            )  # fmt: skip
+            for i in range(8):
+                scratch.firsts[kind, k + i] = first
+            k += 1
+            stops[kind] = k
         if stop <= start or k >= limit:
             continue
-        count = min(1 + int(max((stop - start) / _LENGTH, seen / (_DEVIATIONS * sigma))), MOST_ACROSS)
+        count = 1 + int(max((stop - start) / _LENGTH, seen / (_DEVIATIONS * sigma)) / table.spacing)
+        count = min(count, MOST_ACROSS)
         _write_draft(
             scratch.drafts[kind], k, start, stop, count, curve, view_line, bounds, family, size, scratch.line
         )  # fmt: skip
@@ -457,7 +488,8 @@ def place_on_view_lines(
     drift = (ex * ey * (yy - xx) + xy * (ex * ex - ey * ey)) / (across * across)
     sigma = math.sqrt(float(max(xx * yy - xy * xy, np.float32(0.0)))) / across
     radii = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
-    for j in range(_lines_across(ray, look.x, look.y, across, *radii, 2.0 * _FOOTPRINT_ENDS * sigma, lines)):
+    reach = 2.0 * _FOOTPRINT_ENDS * sigma
+    for j in range(_lines_across(ray, look.x, look.y, across, radii, reach, table.spacing, lines)):
         w, apart = lines[0, j], lines[1, j]
         density = apart / (2.0 * math.pi * across * sigma) * math.exp(-0.5 * (w / across) ** 2)
         x, y = look.x - w * ey + drift * w * ex, look.y + w * ex + drift * w * ey

@@ -86,11 +86,37 @@ def test_fixed_nodes_are_weighted_where_the_viewer_sees_them():
     assert _error(SoftNodes(2), fabric, queries, truth) > 2.0 * error
 
 
-def test_an_even_footprint_sees_no_parallax():
+@pytest.mark.parametrize("name", ["denim", slow("satin_8"), slow("voile")])
+def test_every_ray_of_an_even_footprint_ends(name):
+    """With rims, areas of yarns and gaps sum to wo_z; without, steep views lose what walls hide."""
+    queries = _queries(woven(name), 60, 6, sigma=(8.0, 9.0), steepest=88.0)
+    areas = []
+    for rims in (True, False):
+        sums, gaps = query_sums(tabulate(woven(name), parallax=True, rims=rims), queries)
+        areas.append((sums[:, :, AREA].sum(axis=1) + gaps) / queries.wo[:, 2])
+    np.testing.assert_allclose(areas[0], 1.0, atol=5e-3)  # linear between angles
+    assert areas[1].min() < 0.97
+    assert areas[1].max() < 1.02
+
+
+@pytest.mark.parametrize("walls", ["left_out", "rim"])
+def test_an_even_footprint_sees_no_parallax(walls):
+    """The answer is that of the truth, whatever the walls; views to 85 degrees."""
     fabric = woven("denim")
-    queries = _queries(fabric, 40, 6, sigma=(4.0, 8.0))
-    for rays, flat in zip(*(query_sums(tabulate(fabric, parallax=p), queries) for p in (True, False)), strict=True):
-        np.testing.assert_array_equal(rays, flat)
+    queries = _queries(fabric, 60, 6, sigma=(4.0, 8.0), steepest=85.0)
+    truth = estimate(fabric, queries, RAYS.model_copy(update={"walls": walls}), 1)
+    assert _error(SoftNodes(2, parallax=True, walls=walls), fabric, queries, truth) < 0.03
+
+
+@pytest.mark.parametrize("name", ["denim", slow("satin_8")])
+def test_rims_are_seen_as_the_truth_sees_them(name):
+    """Steep views meet walls: nodes that leave them out are off by more."""
+    fabric = woven(name)
+    queries = _queries(fabric, 80, 11, sigma=(0.05, 1.0), steepest=85.0)
+    truth = estimate(fabric, queries, RAYS.model_copy(update={"walls": "rim"}), 1)
+    error = _error(SoftNodes(2, parallax=True, walls="rim"), fabric, queries, truth)
+    assert error < 0.04
+    assert _error(SoftNodes(2, parallax=True), fabric, queries, truth) > 1.3 * error
 
 
 @pytest.mark.parametrize("degrees", [0.0, 35.0, 60.0])
