@@ -256,8 +256,10 @@ def _seen(over: np.float32) -> np.float32:
 
 @inlined_fast_kernel
 def _seen_of(at: NodeFrame, area: np.float32, freed: np.float32, d: YarnDirections) -> np.float32:
-    """Return the share of a node's box that the viewer sees, walls included, given its area."""
-    return max(area * at.nz / max(d.ox * at.nx + d.oy * at.ny + d.oz * at.nz, _AWAY) + freed, _0)
+    """Return the share of a node's box that the viewer sees, walls included, given its area over flat cloth."""
+    facing = d.ox * at.nx + d.oy * at.ny + d.oz * at.nz
+    share = area * at.nz / max(facing, _AWAY)
+    return min(max(share + freed, _0), max(share, _1)) if facing > _AWAY else share
 
 
 @inlined_fast_kernel

@@ -9,7 +9,9 @@ is used in it, with the density at q; across the lines the trapezoidal rule. Ray
 end of a piece meet the wall below it: with `SoftNodeTable.rims` they see the surface at this end, which is one node.
 
 Over a cloth of curvature kappa the ray is a parabola: with T = |o_xy| / o_z and g the height over the plane,
-d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) [Kuznetsov2022Curved].
+d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) [Kuznetsov2022Curved]. A steep view's ray rises again before it has sunk to
+the lowest yarns, and may meet the flank of a yarn then: this is the other root of the parabola, on which q grows
+towards the crest. What it clears leaves the cloth.
 """
 
 from __future__ import annotations
@@ -86,6 +88,7 @@ _NEAREST: Final = 1e-5  # least length of a segment
 _CREST_STEPS: Final = 8
 _CREST_CLOSE: Final = 1e-2
 _ROOT_STEPS: Final = 8
+_THIRDS, _HALVINGS = 16, 24
 _CLOSE: Final = 0.02  # of a deviation: how near the end of an interval is found where something hides the rest,
 _WHERE_IT_ENDS: Final = 0.3  # and where the footprint ends
 _NEVER: Final = 1e9
@@ -108,6 +111,8 @@ class ViewRay(NamedTuple):
         Curvature of the cloth in this azimuth, 1/yarn spacings.
     plane : float
         Height of the reference plane.
+    least : float
+        Height at which the rays rise again; that of the lowest yarn if they do not before.
     """
 
     dx: float
@@ -115,6 +120,7 @@ class ViewRay(NamedTuple):
     run: float
     bend: float
     plane: float
+    least: float
 
 
 class YarnCurve(NamedTuple):
@@ -145,19 +151,19 @@ class YarnCurve(NamedTuple):
 
 @kernel
 def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
-    """Return how far before the plane a ray has a height, and the change of this distance with height."""
+    """Return how far before the plane a ray has a height, and its slope there, as a share of that at the plane."""
     if ray.bend == 0.0:
-        return (height - ray.plane) * ray.run, ray.run
+        return (height - ray.plane) * ray.run, 1.0
     square = 1.0 + 2.0 * ray.bend * ray.run * ray.run * (height - ray.plane)
     if square <= 0.0:
         return -_NEVER, 0.0
     root = math.sqrt(square)
-    return 2.0 * (height - ray.plane) * ray.run / (1.0 + root), ray.run / root
+    return 2.0 * (height - ray.plane) * ray.run / (1.0 + root), root
 
 
 @inlined_kernel
-def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
-    """Return to where the point at s is displaced, and a number with the sign of n.o, smooth up to the yarn's border.
+def _surface(curve: YarnCurve, s: float) -> tuple[float, float, float]:
+    """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the yarn's border.
 
     The height is that of `torus_height` and `height_beneath`, sqrt((R +- rho)^2 - b^2) - R cos u_max times the relief.
     """
@@ -165,20 +171,106 @@ def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     rho, b = curve.radius * cosine, curve.along + s * curve.by_along
     if curve.bend == 0.0:
-        height, slope = rho, sine * curve.by_across
-        upright = cosine
-    else:
-        ring, beyond = curve.bend + curve.side * rho, 0.0
-        if curve.side < 0.0:
-            bound = ring * curve.half / curve.bend
-            on_arc = min(max(b, -bound), bound)
-            beyond = abs(b - on_arc) * curve.half / curve.drop
-            b = on_arc
-        root = math.sqrt((ring - b) * (ring + b))
-        height = curve.side * (root - curve.drop) + beyond
-        upright, slope = cosine * root, ring * sine * curve.by_across + curve.side * b * cosine * curve.by_along
-    distance, run = sunk(ray, curve.beta * height)
-    return s - distance, upright + run * curve.beta * slope
+        return curve.beta * rho, curve.beta * sine * curve.by_across, cosine
+    ring, beyond = curve.bend + curve.side * rho, 0.0
+    if curve.side < 0.0:
+        bound = ring * curve.half / curve.bend
+        on_arc = min(max(b, -bound), bound)
+        beyond = abs(b - on_arc) * curve.half / curve.drop
+        b = on_arc
+    root = math.sqrt((ring - b) * (ring + b))
+    slope = ring * sine * curve.by_across + curve.side * b * cosine * curve.by_along
+    return curve.beta * (curve.side * (root - curve.drop) + beyond), curve.beta * slope, cosine * root
+
+
+@inlined_kernel
+def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
+    """Return to where the point at s is displaced, and a number with the sign of n.o."""
+    height, slope, upright = _surface(curve, s)
+    distance, steep = sunk(ray, height)
+    return s - distance, upright * steep + ray.run * slope
+
+
+@inlined_kernel
+def _seen_rising(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
+    """Return the same for rays that rise: its place, and a number that is positive where they meet the flank."""
+    height, slope, upright = _surface(curve, s)
+    steep = math.sqrt(max(1.0 + 2.0 * ray.bend * ray.run * ray.run * (height - ray.plane), 0.0))
+    return s + (1.0 + steep) / (ray.bend * ray.run), ray.run * slope - upright * steep
+
+
+@kernel
+def _reached(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> tuple[float, float]:
+    """Return between which places of a piece rays reach it that rise at `ViewRay.least`; none: the second is first."""
+    # The highest place, by thirds.
+    left, right = low, high
+    for _ in range(_THIRDS):
+        third = (right - left) / 3.0
+        if _surface(curve, left + third)[0] < _surface(curve, right - third)[0]:
+            left += third
+        else:
+            right -= third
+    top = 0.5 * (left + right)
+    if _surface(curve, top)[0] <= ray.least:
+        return high, low
+    first = low if _surface(curve, low)[0] > ray.least else _halve(curve, ray, top, low)
+    return first, high if _surface(curve, high)[0] > ray.least else _halve(curve, ray, top, high)
+
+
+@kernel
+def _halve(curve: YarnCurve, ray: ViewRay, inside: float, outside: float) -> float:
+    """Return the place between two at which rays just reach a piece."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if _surface(curve, middle)[0] > ray.least:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@kernel
+def _rising_crest(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> float:
+    """Return the crest of a piece that rising rays clear; they meet the flank between it and `high`."""
+    if _seen_rising(curve, ray, high)[1] <= 0.0:
+        return high
+    crest = low
+    if _seen_rising(curve, ray, low)[1] < 0.0:
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (crest + high)
+            if _seen_rising(curve, ray, middle)[1] > 0.0:
+                high = middle
+            else:
+                crest = middle
+    return crest
+
+
+@kernel
+def _rising_interval(
+    curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_from: float, q_to: float
+) -> tuple[float, float]:
+    """Return from where to where a flank is seen by rising rays from `q_from` to `q_to`."""
+    start, stop = crest, high
+    if q_to <= q_from or _seen_rising(curve, ray, crest)[0] <= q_from or _seen_rising(curve, ray, high)[0] >= q_to:
+        return high, high
+    if _seen_rising(curve, ray, high)[0] < q_from:
+        stop = _place_of(curve, ray, crest, high, q_from, True)
+    if _seen_rising(curve, ray, crest)[0] > q_to:
+        start = _place_of(curve, ray, crest, high, q_to, True)
+    return start, stop
+
+
+@kernel
+def _place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: float, rising: bool) -> float:
+    """Return the place between two that rays through `target` meet."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        q = _seen_rising(curve, ray, middle)[0] if rising else _seen(curve, ray, middle)[0]
+        if (q > target) == rising:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 @inlined_kernel
@@ -372,6 +464,46 @@ def _write_draft(
     fill_eight(draft[ROWS_PER], k, rows if family == WARP else -rows)
 
 
+class Piece(NamedTuple):
+    """A piece along a line: its curve, row of `SoftNodeTable.bounds`, family, first cell of its grid and its size."""
+
+    curve: YarnCurve
+    bounds: Float32
+    family: int
+    first: int
+    size: int
+
+
+@kernel
+def _write_meetings(
+    scratch: Scratch, kind: int, k: int, ray: ViewRay, of_line: ViewLine, piece: Piece, start: float, stop: float,
+    rising: bool,
+) -> int:  # fmt: skip
+    """Write the nodes of an interval from `k` on, even in the place where they are seen; return where they end.
+
+    Where rays turn they see an endless length of a small piece: places along the line would be far apart there.
+    """
+    ends = _seen_rising(piece.curve, ray, start)[0], _seen_rising(piece.curve, ray, stop)[0]
+    if not rising:
+        ends = _seen(piece.curve, ray, start)[0], _seen(piece.curve, ray, stop)[0]
+    half, middle, sigma = 0.5 * abs(ends[1] - ends[0]), 0.5 * (ends[0] + ends[1]), of_line.sigma
+    count = min(1 + int(2.0 * half / (_DEVIATIONS * sigma)), MOST_ACROSS)
+    if stop <= start or half <= _NEAREST or k + count > scratch.drafts.shape[2] - 2 * BLOCK_NODES:
+        return k
+    draft = scratch.drafts[kind]
+    for i in range(count):
+        q = middle + half * GAUSS_PLACES[count, i]
+        share = of_line.density * half * GAUSS_WEIGHTS[count, i] * math.exp(-0.5 * (q / sigma) ** 2)
+        s = _place_of(piece.curve, ray, start, stop, q, rising)
+        of_node = ViewLine(of_line.x, of_line.y, share, sigma, of_line.apart)
+        _write_draft(
+            draft, k + i, s, s, 1, piece.curve, of_node, piece.bounds, piece.family, piece.size, scratch.line
+        )  # fmt: skip
+        for j in range(8):
+            scratch.firsts[kind, k + i + j] = piece.first
+    return k + count
+
+
 @inlined_kernel
 def _fill_block(draft: Float32, firsts: npt.NDArray[np.uint32], stop: int) -> int:
     """Fill the last block of nodes with such that weigh nothing; return the number of nodes."""
@@ -409,10 +541,15 @@ def _place_line(
     warp_radius, weft_radius = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
     x0, y0, ex, ey, sigma = view_line.x, view_line.y, ray.dx, ray.dy, view_line.sigma
     of_gap, gaps, covered, limit = sunk(ray, 0.0)[0], 0.0, _NEVER, scratch.drafts.shape[2] - 2 * BLOCK_NODES
-    stopped = 0.0
+    stopped, slit_from, slit_to = 0.0, 0.0, 0.0
     left, right = -_FOOTPRINT_ENDS * sigma, _FOOTPRINT_ENDS * sigma
     low = right + sunk(ray, table.highest)[0]
-    last = max(left + sunk(ray, table.lowest)[0], low - _FARTHEST)
+    rising, lowest = ray.least > table.lowest, sunk(ray, max(ray.least, table.lowest))[0]
+    if rising:
+        lowest = sunk(ray, table.highest)[0] - 2.0 * math.sqrt(
+            max(1.0 + 2.0 * ray.bend * ray.run * ray.run * (table.highest - ray.plane), 0.0)
+        ) / (ray.bend * ray.run)  # fmt: skip
+    last = max(left + lowest, low - _FARTHEST)
     while low > last and covered > left:
         # The next cut on the way from the viewer.
         high, low = low, last
@@ -444,8 +581,14 @@ def _place_line(
         if low - sunk(ray, table.crowns[p])[0] >= covered:
             continue
         curve = _curve_of(table, p, ray, x0 - column, y0 - row)
-        wall_to = min(covered, right)
-        start, stop, seen, covered, wall_from = _interval(curve, ray, low, high, sigma, covered)
+        wall_to, reached_to, before = min(covered, right), high, covered
+        reached_from = low
+        if rising:
+            reached_from, reached_to = _reached(curve, ray, low, high)
+            if reached_to <= reached_from:
+                continue
+            wall_to = min(wall_to, _seen_rising(curve, ray, high)[0]) if reached_to == high else -_NEVER
+        start, stop, seen, covered, wall_from = _interval(curve, ray, reached_from, reached_to, sigma, covered)
         kind = column % of_warp if family == WARP else of_warp + row % of_weft
         k, wall_from = stops[kind], max(wall_from, left)
         if table.rims and wall_to - wall_from > _NEAREST and k < limit:
@@ -458,6 +601,22 @@ def _place_line(
                 scratch.firsts[kind, k + i] = first
             k += 1
             stops[kind] = k
+        if rising:
+            of_piece = Piece(curve, bounds, family, first, size)
+            k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, False)
+            crest = _rising_crest(curve, ray, reached_from, reached_to)
+            start, stop = _rising_interval(curve, ray, crest, reached_to, left, min(before, right))
+            k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, True)
+            # Of rays that cleared the last piece, this one stops some, or it opens a new slit above it.
+            cleared = max(_seen_rising(curve, ray, crest)[0], _seen(curve, ray, reached_to)[0])
+            if cleared < before:
+                slit_from, slit_to = cleared, before
+            elif slit_to > slit_from:
+                start, stop = _rising_interval(curve, ray, crest, reached_to, max(slit_from, left), min(slit_to, right))
+                k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, True)
+                slit_from = max(slit_from, cleared)
+            stops[kind] = k
+            continue
         if stop <= start or k >= limit:
             continue
         count = 1 + int(max((stop - start) / _LENGTH, seen / (_DEVIATIONS * sigma)) / table.spacing)

@@ -44,6 +44,11 @@ def _kind(queries, kind):
         return queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
     if kind == "curvature":
         return queries._replace(curvature=np.full(len(queries.u), 0.05, np.float32))
+    if kind == "rising":  # rays that turn above the lowest yarns and rise again
+        flat = queries.wo[:, :2] / np.hypot(*queries.wo[:, :2].T)[:, None]
+        steep = np.random.default_rng(7).uniform(np.radians(65.0), np.radians(84.0), len(flat))
+        wo = np.concatenate([flat * np.sin(steep)[:, None], np.cos(steep)[:, None]], axis=1).astype(np.float32)
+        return queries._replace(wo=wo, curvature=np.full(len(queries.u), 0.2, np.float32))
     return queries
 
 
@@ -65,6 +70,8 @@ def _error(method, fabric, queries, truth):
         slow(woven("denim"), "behind", 0.07),
         (woven("voile"), "behind", 0.08),
         slow(woven("denim"), "curvature", 0.06),
+        (woven("denim"), "rising", 0.04),
+        slow(woven("satin_8"), "rising", 0.07),
     ],
 )
 def test_soft_nodes_see_what_view_rays_see(fabric, kind, most):
