@@ -1,5 +1,3 @@
-"""Files appear whole or not at all."""
-
 import pytest
 
 from pipeline.atomic import atomic_path, atomic_write

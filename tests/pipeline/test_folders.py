@@ -1,5 +1,3 @@
-"""A folder that is written again keeps everything that is not the command's own."""
-
 import json
 import subprocess
 import sys

@@ -1,5 +1,3 @@
-"""A process of its own: what it returns, raises and inherits, and that it ends with its parent."""
-
 import os
 import subprocess
 import sys

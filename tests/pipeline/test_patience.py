@@ -1,5 +1,3 @@
-"""Requests to a storage that fails: how often they are repeated, for how long, and what is said."""
-
 import asyncio
 
 import pytest

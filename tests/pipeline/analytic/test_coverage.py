@@ -1,5 +1,3 @@
-"""Coverage by a few rays and by the table, against the truth's many rays and against closed forms."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Mean colours of the threads in a footprint, against the exact ones and against integrals on a lattice."""
-
 import math
 
 import numpy as np

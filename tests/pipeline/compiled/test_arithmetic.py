@@ -1,5 +1,3 @@
-"""Arithmetic of kernels against NumPy and SciPy in double precision."""
-
 import numpy as np
 from scipy import special
 

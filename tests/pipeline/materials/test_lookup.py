@@ -1,5 +1,3 @@
-"""Reading and evaluation of maps, against the lobes in double precision and closed forms of filtered patterns."""
-
 import math
 
 import numpy as np

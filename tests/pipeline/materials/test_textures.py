@@ -1,5 +1,3 @@
-"""Maps against the truth's albedo and against sums over points of the surface."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The BSDF `twillight` as Mitsuba sees it: values, lobes, and its own chi-square test."""
-
 import numpy as np
 import pytest
 

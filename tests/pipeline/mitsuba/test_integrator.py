@@ -1,5 +1,3 @@
-"""The integrator `twillight_path`: footprints, energy, and light transport against Mitsuba's own path tracer."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Plugins in every variant, and shipped scenes by `twillight_path` against our own renderer, pixel by pixel."""
-
 import math
 from concurrent.futures import ThreadPoolExecutor
 

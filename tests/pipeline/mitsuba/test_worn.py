@@ -1,5 +1,3 @@
-"""Cloth in a shape's frame: which direction is which, turned and mirrored uv, energy, and samples against values."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""What a model was not taught is refused, by name."""
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

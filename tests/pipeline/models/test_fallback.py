@@ -1,5 +1,3 @@
-"""A method for any query: nearest forms where there are any, quadrature where there are none."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""What all networks have in common: answers of restored weights, chunks, domains, and the part run for every query."""
-
 import numpy as np
 import pytest
 import torch

@@ -1,5 +1,3 @@
-"""`sample`, `pdf` and `eval` agree: chi-square over the sphere, means of weights, the delta lobe; bad input."""
-
 import math
 from functools import cache
 

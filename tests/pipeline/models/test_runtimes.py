@@ -1,5 +1,3 @@
-"""Ways to run a method: closed forms of their rounding, agreement in single precision, and what a machine lacks."""
-
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 

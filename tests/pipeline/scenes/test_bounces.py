@@ -1,5 +1,3 @@
-"""Light between yarns in the colours of a cloth."""
-
 import numpy as np
 import pytest
 

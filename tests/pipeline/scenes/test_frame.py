@@ -1,5 +1,3 @@
-"""Frames of Mitsuba scenes against closed forms: plane, cylinder, spheres, shadows, lights and backdrops."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Quadrature of environments against integrals over the sphere."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""What is wrong with a scene is said in one sentence."""
-
 import os
 import subprocess
 import sys

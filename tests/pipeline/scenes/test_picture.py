@@ -1,5 +1,3 @@
-"""Pictures from windows: the same as from one piece, on any number of threads, with layers that sum to them."""
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""What a scene asks: ranges that hold its queries, and nothing that never occurs."""
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

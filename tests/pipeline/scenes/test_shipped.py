@@ -1,5 +1,3 @@
-"""The scenes that come with the package: what they show, and that their frames move by less than a pixel."""
-
 import numpy as np
 import pytest
 

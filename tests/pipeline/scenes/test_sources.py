@@ -1,5 +1,3 @@
-"""What a scene is made of, without loading it: equal to what Mitsuba finds."""
-
 import os
 import re
 

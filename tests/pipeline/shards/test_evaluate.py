@@ -1,5 +1,3 @@
-"""Questions from a file: the numbers of `estimate`, whatever the file's cut; every fault named; whole or not at all."""
-
 import csv
 import json
 import math

@@ -1,5 +1,3 @@
-"""Rows about a texture's texels and about the silhouette, against the truth at other points."""
-
 import numpy as np
 import pytest
 

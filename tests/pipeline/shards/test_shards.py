@@ -1,5 +1,3 @@
-"""Shards on disk: the same bytes for the same task, every kind of damage named, and the manifest beside them."""
-
 import json
 
 import numpy as np

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.draft import Draft, Matrix
 from weaves.fabric import Fabric, load_fabric
@@ -36,6 +37,12 @@ def equal_queries(wi, wo, sigma=2.0, rows=1, centre=(0.3, 0.7)):
     ones = np.ones(rows, np.float32)
     directions = (np.tile(np.asarray(w, np.float32), (rows, 1)) for w in (wi, wo))
     return Queries.round(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
+
+
+def fixed(count, estimator="owen", **options):
+    """Return options that spend this number of points on each query."""
+    limits = {"relative_error": 1e-9, "absolute_error": 0.0, "min_count": count, "max_count": count}
+    return TruthOptions(estimator=estimator, **limits | options)
 
 
 LOPSIDED = woven("denim", ("#.#", "##.", ".##"), {"width": 0.8, "twist": 20.0}, {"bend": 35.0, "relief": 1.2})

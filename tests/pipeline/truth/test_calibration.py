@@ -1,5 +1,3 @@
-"""The calibration itself; reports/truth/calibration.py compares its errors with true ones."""
-
 import itertools
 
 import numpy as np

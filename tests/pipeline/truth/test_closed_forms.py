@@ -1,5 +1,3 @@
-"""Every estimator on cylinders side by side, whose answers are integrals of one angle: its error, bound and order."""
-
 import math
 from typing import get_args
 

@@ -1,5 +1,3 @@
-"""`estimate` on curved cloth against a brute force in NumPy, and light from below the tangent plane."""
-
 import math
 
 import numpy as np

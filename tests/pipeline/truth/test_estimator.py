@@ -1,5 +1,3 @@
-"""The patch BSDF: an outside rendering, an oracle in NumPy, statistics of the estimators, and invariants."""
-
 import math
 from typing import get_args
 

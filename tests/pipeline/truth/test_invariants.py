@@ -1,5 +1,3 @@
-"""The invariants hold on cloth, and each of them finds the physics that breaks it."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The decision whether a patch is hidden, against the closed form of its probability."""
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,5 +1,3 @@
-"""What holds for every estimator: the same cloth, drawn or seen in another way, has the same answers."""
-
 from typing import get_args
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The table of bounces: it returns what was tabulated, and no cloth makes light."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Walks between yarns against closed forms, and what they keep: reciprocity and energy."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Horizons of straight yarns side by side: the tangent from a point to the next cylinder."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""The network for curved surfaces: what each module sees, what is certain, and that it learns silhouettes."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Perceptrons, and the space that networks learn in."""
-
 import math
 
 import pytest

@@ -1,5 +1,3 @@
-"""Symmetries of the features that the network reads: it need not learn them."""
-
 import numpy as np
 import pytest
 

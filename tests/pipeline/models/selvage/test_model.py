@@ -1,5 +1,3 @@
-"""The network, the method, and who answers at a wished error."""
-
 import numpy as np
 import pytest
 import torch

@@ -1,5 +1,3 @@
-"""Samples of texels, and the encoder that reads any number of them in any order."""
-
 import numpy as np
 import pytest
 import torch

@@ -1,5 +1,3 @@
-"""The decoder: one-blobs, and the picture of the repeat."""
-
 import numpy as np
 import pytest
 import torch

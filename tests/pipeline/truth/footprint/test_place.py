@@ -1,5 +1,3 @@
-"""Footprints: wrapped kernels against their closed forms."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Counter-based numbers: stated values, evenness, and the net property of the Owen-scrambled points."""
-
 import numpy as np
 from scipy import stats
 

@@ -1,5 +1,3 @@
-"""The kernels' surface against the NumPy oracle, and its slopes against finite differences."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""Horizons over flat and curved bases against rays that are followed: seen just above, hidden just below."""
-
 import math
 
 import numpy as np

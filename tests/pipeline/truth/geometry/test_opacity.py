@@ -1,5 +1,3 @@
-"""Curved cloth against marches through the oracle's heights, against closed forms, and against flat cloth."""
-
 import math
 
 import numpy as np

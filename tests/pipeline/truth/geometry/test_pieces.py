@@ -1,5 +1,3 @@
-"""Pieces tile their cells, and each names the yarn that is seen there."""
-
 import math
 
 import numpy as np

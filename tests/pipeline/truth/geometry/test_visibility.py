@@ -1,5 +1,3 @@
-"""Exact visibility against a ray march through the oracle's heights."""
-
 import math
 
 import numpy as np

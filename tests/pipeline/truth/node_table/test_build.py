@@ -1,5 +1,3 @@
-"""The table of nodes: symmetries, areas, horizons against exact visibility, and its answers against converged ones."""
-
 import math
 import os
 import subprocess

@@ -1,5 +1,3 @@
-"""Refined nodes: a cut row against the mean of many points, and the choice of the nodes that are refined."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Tables of nodes: which queries they know, and that they are built once."""
-
 import numpy as np
 import pytest
 

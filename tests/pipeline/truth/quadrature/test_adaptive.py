@@ -1,5 +1,3 @@
-"""Quadrature: spectral convergence, agreement with sampled estimates, stated bounds, and invariants."""
-
 import math
 
 import numpy as np

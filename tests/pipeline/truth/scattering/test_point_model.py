@@ -1,5 +1,3 @@
-"""The point model against 50-digit arithmetic and closed forms."""
-
 import math
 
 import mpmath

@@ -1,5 +1,3 @@
-"""The slab in single precision against the one in double."""
-
 import numpy as np
 import pytest
 

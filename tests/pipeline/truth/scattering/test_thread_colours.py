@@ -1,5 +1,3 @@
-"""Colours of components where ends and picks differ in colour: closed forms and an integral on a lattice."""
-
 import math
 
 import numpy as np
