@@ -8,6 +8,7 @@ from pipeline.truth.calibration import BEHIND_FACTORS, FRONT_FACTORS, SAMPLED, T
 from pipeline.truth.cloth import Raw
 from pipeline.truth.estimator import ESTIMATORS, estimate, uncalibrated
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.truth.cloths import fixed
 from weaves.fabric import load_fabric
 
 
@@ -46,7 +47,7 @@ def test_a_component_that_no_point_has_shown_has_an_error():
     """One family of yarns fills a narrow footprint: the other one may still have been missed."""
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=(0.05, 0.08), max_angle=30.0), fabric.weave.repeat, 5, 0, 60)
-    raw = uncalibrated(fabric, queries, TruthOptions(estimator="mc", min_count=64, max_count=64), 1)
+    raw = uncalibrated(fabric, queries, fixed(64, "mc"), 1)
     size = np.linalg.norm(raw.mean[:, :4], axis=1, keepdims=True)
     assert (raw.stage == SAMPLED).all()
     unseen = (raw.mean[:, :4] == 0.0) & (size > 0.0)

@@ -10,24 +10,23 @@ from pipeline.truth.estimator import estimate, uncalibrated
 from pipeline.truth.monte_carlo import RANDOMISATIONS
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.truth.cloths import direction, equal_queries, woven
+from tests.pipeline.truth.cloths import direction, equal_queries, fixed, woven
+from tests.pipeline.truth.geometry.marches import leaves
 from tests.presets import PRESETS, slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.population import Population, Ranges, population_fabrics
 from weaves.surface import surface_at as oracle
 
-EXACT = TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-5, min_count=1 << 20, max_count=1 << 20)
-
 
 def test_diffuse_matches_a_mitsuba_rendering_of_the_geometry():
-    """Rationale: the geometry, its shadows and masks were rendered as a mesh by Mitsuba 3 (plain weave, u_max 22/16).
+    """The geometry, its shadows and masks were rendered as a mesh by Mitsuba 3 (plain weave, u_max 22/16).
 
-    Expected: C_warp, C_weft with w_d = 1 at polar angles 30/30, azimuth 30/210 degrees, repeat average. The rendering's
+    C_warp, C_weft with w_d = 1 at polar angles 30/30, azimuth 30/210 degrees, repeat average. The rendering's
     own error is 0.05 % rms; twice that is allowed.
     """
     fabric = woven("polyester_lining", None, {"bend": 22.0}, {"bend": 16.0}, blend=1.0, width=1.0, relief=1.0)
-    answer = estimate(fabric, equal_queries(direction(30, 30), direction(30, 210), 20.0), EXACT, 1)
+    answer = estimate(fabric, equal_queries(direction(30, 30), direction(30, 210), 20.0), fixed(1 << 20), 1)
     np.testing.assert_allclose(answer.mean[0, 2:], [0.099296, 0.109176], rtol=1e-3)
 
 
@@ -39,13 +38,7 @@ def _patch_by_oracle(fabric, wi, wo, texels):
     wi, wo = np.array(wi), np.array(wo)
 
     def seen(w):
-        free = point.normal @ w > 0
-        flat, step = math.hypot(w[0], w[1]), 0.006
-        rise = np.ptp(point.height)
-        for s in np.arange(step, rise / (w[2] / flat) + step, step):
-            height = oracle(fabric, (x + s * w[0] / flat) % ends, (y + s * w[1] / flat) % picks).height
-            free &= height <= point.height + s * w[2] / flat
-        return free
+        return (point.normal @ w > 0) & leaves(fabric, x, y, point.height, w, step=0.006)
 
     area = np.where(seen(wo), point.normal @ wo / point.normal[:, 2], 0.0)
     lit = np.where(seen(wi), area, 0.0)
@@ -67,9 +60,9 @@ def _patch_by_oracle(fabric, wi, wo, texels):
 def test_all_components_match_an_oracle_that_shares_no_code():
     # Directions are no mirror pair, and the swapped pair differs by far more than the tolerance.
     fabric, wi, wo = load_fabric("denim"), direction(60, 20), direction(20, 150)
-    answer = estimate(fabric, equal_queries(wi, wo, 20.0), EXACT, 1).mean[0]
+    answer = estimate(fabric, equal_queries(wi, wo, 20.0), fixed(1 << 20), 1).mean[0]
     np.testing.assert_allclose(answer, _patch_by_oracle(fabric, wi, wo, 40), rtol=0.02)
-    swapped = estimate(fabric, equal_queries(wo, wi, 20.0), EXACT, 1).mean[0]
+    swapped = estimate(fabric, equal_queries(wo, wi, 20.0), fixed(1 << 20), 1).mean[0]
     assert (np.abs(swapped / answer - 1) > 0.1).any()
 
 
@@ -83,14 +76,8 @@ def test_reported_errors_cover_the_true_error(estimator):
     """
     fabric = load_fabric("wool_gabardine")
     queries = draw_queries(QueryOptions(sigma=(1.0, 8.0), max_angle=80.0), fabric.weave.repeat, 5, 0, 120)
-    reference = estimate(
-        fabric,
-        queries,
-        TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-9, min_count=1 << 16, max_count=1 << 16),
-        8,
-    )
-    options = TruthOptions(estimator=estimator, absolute_error=0.0, relative_error=1e-9, min_count=1024, max_count=1024)
-    answers = estimate(fabric, queries, options, 2)
+    reference = estimate(fabric, queries, fixed(1 << 16), 8)
+    answers = estimate(fabric, queries, fixed(1024, estimator), 2)
     seen = answers.standard_error > 1e-5
     z = (answers.mean - reference.mean)[seen] / np.hypot(answers.standard_error, reference.standard_error)[seen]
     assert (np.abs(z) > 3).mean() < 0.02
@@ -153,12 +140,7 @@ def test_bounds_of_adaptive_estimates_hold_on_every_preset(name):
     """
     fabric = load_fabric(name)
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 11, 0, 400)
-    exact = estimate(
-        fabric,
-        queries,
-        TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-9, min_count=1 << 15, max_count=1 << 15),
-        12,
-    )
+    exact = estimate(fabric, queries, fixed(1 << 15), 12)
     answers = estimate(fabric, queries, TruthOptions(estimator="owen"), 13)
     beyond = np.abs(answers.mean - exact.mean) > answers.bound + 3 * exact.standard_error
     assert beyond.mean() < 0.01
@@ -231,8 +213,7 @@ def test_rotated_ellipses_are_tabulated_with_the_reported_error(name, behind):
     fabric = load_fabric(name)
     kinds = QueryOptions(sigma=(0.3, 3.0), stretch=6.0, behind=behind, max_angle=75.0)
     queries = draw_queries(kinds, fabric.weave.repeat, 12, 0, 100)
-    converged = TruthOptions(estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=8192, max_count=8192)
-    exact = estimate(fabric, queries, converged, 4)
+    exact = estimate(fabric, queries, fixed(8192), 4)
     found = {}
     for estimator in ("auto", "owen"):
         options = TruthOptions(estimator=estimator, relative_error=0.1, min_count=64, max_count=128)
@@ -249,21 +230,13 @@ def test_a_shadow_edge_between_two_azimuths_is_reported():
 
     A table that interpolated the horizons in between was 38 % off here, and reported .6 %.
     """
-    yarns = Ranges(
-        roughness_warp=(0.05, 0.7),
-        roughness_weft=(0.05, 0.7),
-        relief=(0.5, 1.5),
-        bend=(10.0, 60.0),
-        twist=(-35.0, 35.0),
-        width=(0.6, 0.95),
-    )
+    shape = {"relief": (0.5, 1.5), "bend": (10.0, 60.0), "twist": (-35.0, 35.0), "width": (0.6, 0.95)}
+    yarns = Ranges(roughness_warp=(0.05, 0.7), roughness_weft=(0.05, 0.7), **shape)
     fabric = population_fabrics(Population(count=12, seed=951, plain=yarns, twill=yarns, satin=yarns))[11]
     wi, wo = np.float32([[0.7100, 0.2397, 0.6621]]), np.float32([[0.8969, 0.0632, 0.4376]])
-    queries = Queries.round([5.5051], [2.9416], [0.1756], wi, wo)._replace(
-        sigma_minor=np.float32([0.0791]), angle=np.float32([3.025])
-    )
-    many = TruthOptions(estimator="owen", relative_error=1e-9, min_count=1 << 14, max_count=1 << 14)
-    exact = estimate(fabric, queries, many, 1).mean[0]
+    queries = Queries.round([5.5051], [2.9416], [0.1756], wi, wo)
+    queries = queries._replace(sigma_minor=np.float32([0.0791]), angle=np.float32([3.025]))
+    exact = estimate(fabric, queries, fixed(1 << 14), 1).mean[0]
     table, auto = (estimate(fabric, queries, TruthOptions(estimator=name), 1) for name in ("node_table", "auto"))
     assert np.abs(table.mean[0] - exact).max() > 0.3 * np.linalg.norm(exact)
     assert (np.abs(table.mean[0] - exact) <= table.bound[0]).all()

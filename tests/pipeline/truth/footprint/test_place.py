@@ -16,12 +16,8 @@ def test_moments_of_the_wrapped_kernel():
             assert ((x >= 0) & (x < repeat)).all()
             for k in range(4):
                 w = 2 * np.pi * k / repeat
-                size = (
-                    np.exp(-0.5 * (w * sigma) ** 2)
-                    if shape == GAUSSIAN
-                    else np.sinc(w * sigma * BOX_SIDE / (2 * np.pi))
-                )
-                expected = size * np.exp(1j * w * centre)
+                gaussian, box = np.exp(-0.5 * (w * sigma) ** 2), np.sinc(w * sigma * BOX_SIDE / (2 * np.pi))
+                expected = (gaussian if shape == GAUSSIAN else box) * np.exp(1j * w * centre)
                 assert abs(np.mean(weight * np.exp(1j * w * x)) - expected) < 2e-4
 
 
