@@ -17,10 +17,8 @@ from tests.pipeline.truth.cloths import along_cylinders, cylinder_answers, cylin
 
 @pytest.mark.parametrize("method", methods.ALL)
 def test_a_lamp_at_the_eye_lights_all_that_is_seen(method):
-    """Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction.
-
-    Of a patch hidden almost wholly the soft methods answer less.
-    """
+    """Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction. Of
+    a patch hidden almost wholly the soft methods answer less."""
     fabric = woven("cotton_twill", blend=0.0)
     queries = draw_queries(
         QueryOptions(sigma=(0.3, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 60
@@ -53,7 +51,6 @@ def test_shadows_of_cylinders_on_each_other(method, bound):
 
 
 def slope(counts, errors):
-    """Return the order of convergence, fitted to logarithms."""
     return -np.polyfit(np.log(counts), np.log(errors), 1)[0]
 
 
@@ -89,10 +86,8 @@ def test_unscattered_light_through_cylinders(depth):
 
 @pytest.mark.parametrize("method", methods.ALL)
 def test_white_cloth_returns_no_more_light_than_it_gets(method):
-    """Diffuse parts under an even sky, k_d = 1: cosine-distributed lights, whose density is cos / pi.
-
-    Three standard errors of the mean over 2,000 lights are added. A method without shadows may return all of it.
-    """
+    """Diffuse parts under an even sky, k_d = 1: cosine-distributed lights, whose density is cos / pi. Three standard
+    errors of the mean over 2,000 lights are added. A method without shadows may return all of it."""
     fabric, rows = woven("cotton_twill", blend=1.0), 2000
     u, v, x, y = np.random.default_rng(1).random((4, rows))
     sine, azimuth = np.sqrt(u), 2.0 * math.pi * v
@@ -108,10 +103,8 @@ def test_white_cloth_returns_no_more_light_than_it_gets(method):
 
 
 def test_the_seen_area_of_a_closed_surface_is_the_projected_one():
-    """Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle.
-
-    From k = 2 to 4 a yarn has twice the nodes across, and a ramp half as wide: the error falls by order 1 at least.
-    """
+    """Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle. From k = 2
+    to 4 a yarn has twice the nodes across, and a ramp half as wide: the error falls by order 1 at least."""
     fabric, errors = cloth(), []
     queries = draw_queries(QueryOptions(sigma=(6.0, 8.0), max_angle=80.0), fabric.weave.repeat, 3, 0, 60)
     for level in (2, 4):
@@ -125,10 +118,8 @@ def test_the_seen_area_of_a_closed_surface_is_the_projected_one():
     ("sigma", "stretch"), [(0.08, 1.0), (0.2, 1.0), (0.2, 3.0), (0.45, 1.0), (0.45, 2.0), (0.8, 1.0)]
 )
 def test_footprints_on_a_lattice_cover_the_cloth_evenly(sigma, stretch):
-    """The mean over centres of the bare sums is that of a footprint far wider than the repeat, in every regime.
-
-    Weights are shares of the footprint up to the tail that is cut off, alike for all sums, and to the error of rules.
-    """
+    """The mean over centres of the bare sums is that of a footprint far wider than the repeat, in every regime. Weights
+    are shares of the footprint up to the tail that is cut off, alike for all sums, and to the error of rules."""
     fabric = woven("polyester_lining", twist=20.0, width=0.9)
     ends, picks = fabric.weave.repeat
     u, v = (axis.ravel() for axis in np.mgrid[0:ends:0.125, 0:picks:0.125] + 0.0625)

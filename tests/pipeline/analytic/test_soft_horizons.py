@@ -47,16 +47,14 @@ def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction():
         assert abs((1.0 - turn) * table[low] + turn * table[high] - np.sin(angle + 0.3)) < 0.015
 
 
-def test_a_quarter_turn_is_a_quarter_of_the_azimuths():
+def test_a_quarter_turn_is_a_quarter_of_the_azimuths_and_no_azimuth_is_one_too():
     """The diamond angle runs clockwise."""
     for x, y in np.random.default_rng(1).normal(size=(50, 2)).astype(np.float32):
-        low, high, turn = soft.around(x, y)
-        low_turned, high_turned, turn_turned = soft.around(y, -x)
-        assert ((low_turned - low) % soft.AZIMUTHS, (high_turned - high) % soft.AZIMUTHS) == (
-            soft.AZIMUTHS // 4,
-            soft.AZIMUTHS // 4,
-        )
-        assert turn_turned == pytest.approx(turn, abs=1e-5)
+        own, turned = soft.around(x, y), soft.around(y, -x)
+        quarters = [(after - before) % soft.AZIMUTHS * 4 for before, after in zip(own[:2], turned[:2], strict=True)]
+        assert quarters == [soft.AZIMUTHS] * 2 and turned[2] == pytest.approx(own[2], abs=1e-5)
+    low, _, turn = soft.around(np.float32(0.0), np.float32(0.0))
+    assert 0 <= low < soft.AZIMUTHS and 0.0 <= turn <= 1.0
 
 
 def test_azimuths_even_in_the_angle_are_read_to_second_order():
@@ -83,11 +81,6 @@ def test_what_two_directions_see_together_is_between_the_least_and_the_most_that
         assert soft.azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in (*xy[2:], *xy[:2]))) == pytest.approx(
             ways, abs=1e-6
         )
-
-
-def test_no_azimuth_is_an_azimuth_too():
-    low, _, turn = soft.around(np.float32(0.0), np.float32(0.0))
-    assert 0 <= low < soft.AZIMUTHS and 0.0 <= turn <= 1.0
 
 
 def test_a_fall_of_the_largest_share_is_a_line_in_the_curvature():

@@ -8,6 +8,8 @@ from pipeline.truth.geometry import heightfield as heights
 from pipeline.truth.scattering import slab
 from tests.pipeline.truth.cloths import woven
 
+STEP = 1e-5  # of central differences
+
 
 @pytest.fixture(scope="module")
 def field():
@@ -51,11 +53,8 @@ def test_turning_is_a_derivative(seed):
         t = tangent(angles, fibre)
         return float(np.dot(h, t[:3])), turning(*h, t, angles, fibre)
 
-    step = 1e-5
-    expected = [
-        (along(u + step, v)[0] - along(u - step, v)[0]) / (2 * step),
-        (along(u, v + step)[0] - along(u, v - step)[0]) / (2 * step),
-    ]
+    pairs = (((u + STEP, v), (u - STEP, v)), ((u, v + STEP), (u, v - STEP)))
+    expected = [(along(*after)[0] - along(*before)[0]) / (2 * STEP) for after, before in pairs]
     np.testing.assert_allclose(along(u, v)[1], expected, atol=1e-8)
 
 
@@ -63,7 +62,7 @@ def test_turning_is_a_derivative(seed):
 def test_frames_are_those_of_the_surface_by_differentiation(seed):
     """Points of a torus of R = 2.1, r = .4 stretched by beta; fibres wind about the yarn at the angle of the twist."""
     v, u, twist, relief = np.random.default_rng(seed).uniform(-0.9, 0.9, 4).tolist()
-    radius, bend_radius, beta, step = 0.4, 2.1, 1.0 + 0.5 * relief, 1e-5
+    radius, bend_radius, beta, step = 0.4, 2.1, 1.0 + 0.5 * relief, STEP
 
     def point(u, v):
         ring = bend_radius + radius * math.cos(v)

@@ -45,11 +45,9 @@ def test_the_exact_answers_are_what_is_known_without_an_integral():
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_answers_are_exact_within_the_errors_they_state(estimator):
-    """3 of 1,000 lie beyond their bounds; the rms error is at most about that of the standard errors, and 1 %.
-
-    For a table without refinement cylinders are the worst cloth: all borders of shadows lie alike, across nodes.
-    Without the neighbour's shadow diffuse light would be 17 % off.
-    """
+    """3 of 1,000 lie beyond their bounds; the rms error is at most about that of the standard errors, and 1 %. For a
+    table without refinement cylinders are the worst cloth: all borders of shadows lie alike, across nodes. Without the
+    neighbour's shadow diffuse light would be 17 % off."""
     options = TruthOptions(estimator=estimator, relative_error=0.005, max_count=1 << 14)
     answers = estimate(ROUND, ASKED, options, 1)
     dark = answers.mean == 0.0
@@ -65,7 +63,6 @@ def test_answers_are_exact_within_the_errors_they_state(estimator):
 
 
 def order(counts, errors):
-    """Return the order of convergence, fitted to logarithms."""
     return -stats.linregress(np.log(counts), np.log(errors)).slope
 
 

@@ -47,12 +47,8 @@ def lobes_of(fabric, queries):
 def test_a_cloth_turned_or_mirrored_has_its_lobes_turned_or_mirrored(x, y):
     """A mirror reverses the twists. Points within a deviation of an edge, or of a cell of a grid, may lie beyond it."""
     queries = points_of(LOPSIDED)
-    own, there = (
-        lobes_of(cloth, asked)[1].astype(np.float64)
-        for cloth, asked in (
-            (LOPSIDED, queries), (redrawn(OVER[::y, ::x], mirrored=x * y < 0), reversed_axes(queries, x, y))
-        )
-    )  # fmt: skip
+    image = redrawn(OVER[::y, ::x], mirrored=x * y < 0), reversed_axes(queries, x, y)
+    own, there = (lobes_of(*pair)[1].astype(np.float64) for pair in ((LOPSIDED, queries), image))
     assert np.quantile(np.abs(there / own - 1.0), 0.95) < 1e-2
     assert np.quantile(np.abs(lobes_of(LOPSIDED, reversed_axes(queries, x, y))[1] / own - 1.0), 0.5) > 0.05
 

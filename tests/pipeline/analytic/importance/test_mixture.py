@@ -5,14 +5,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.importance import lobes as point
-from pipeline.analytic.importance.mixture import density_rows, draw_rows, sample_flake_scatter
-from pipeline.analytic.importance.surface import tabulate_surface
+from pipeline.analytic.importance.mixture import sample_flake_scatter
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.sequences import independent_pair
 from pipeline.truth.scattering.slab import density, sigma
-from tests.directions import sphere, unit
-from tests.pipeline.truth.cloths import woven
+from tests.directions import unit
 from tests.presets import slow
 
 LEVEL = 1e-3  # chance that a right sampler fails the chi-square test anywhere
@@ -37,7 +34,6 @@ def flake_scatter_pdf(wx, wy, wz, sx, sy, sz, tx, ty, tz, alpha):
 
 @allocating_kernel
 def _directions(w, t, alpha, key, count):
-    """Return `count` sampled directions."""
     directions = np.empty((count, 3))
     for k in range(count):
         first, second = independent_pair(key, k)
@@ -47,10 +43,8 @@ def _directions(w, t, alpha, key, count):
 
 @allocating_kernel
 def _cell_integrals(w, t, alpha, rows, columns, nodes):
-    """Return the integral of the pdf over cells in polar angle and azimuth, by midpoints.
-
-    Nodes equal in cosine would lie 4 degrees apart at the poles, and lose 6e-4 of a ridge that crosses them.
-    """
+    """Return the integral of the pdf over cells in polar angle and azimuth, by midpoints. Nodes equal in cosine would
+    lie 4 degrees apart at the poles, and lose 6e-4 of a ridge that crosses them."""
     cells = np.zeros((rows, columns))
     step = math.pi / (rows * nodes)
     for row in range(rows * nodes):
@@ -84,11 +78,9 @@ def _chi_square(counts, expected):
 @pytest.mark.parametrize("count", [400_000, slow(10_000_000)])
 @pytest.mark.parametrize("index", range(len(CONFIGURATIONS)))
 def test_directions_pass_a_chi_square_test(index, count):
-    """P-values above the Sidak share of LEVEL over all configurations; NODES^2 midpoints a cell.
-
-    The pdf jumps at the direction opposite to the given one: doubling the nodes moves no cell by more than a small part
-    of its statistical error.
-    """
+    """P-values above the Sidak share of LEVEL over all configurations; NODES^2 midpoints a cell. The pdf jumps at the
+    direction opposite to the given one: doubling the nodes moves no cell by more than a small part of its statistical
+    error."""
     alpha, pair = CONFIGURATIONS[index]
     w, t = (np.array(x) for x in PAIRS[pair])
     expected = count * _cell_integrals(w, t, alpha, ROWS, COLUMNS, NODES)
@@ -114,12 +106,9 @@ def test_the_pdf_integrates_to_1():
 
 @pytest.mark.parametrize("alpha", [0.01, 0.1, 1.0])
 def test_samples_keep_their_digits_near_the_fibre_axis(alpha):
-    """A given direction along the fibre is where matrix forms lose four digits at alpha = .01.
-
-    n.d = sqrt(1 - first), where n and d are rebuilt from the returned direction with S^(1/2) and its inverse
-    in 50 digits. Tolerance: the direction is rounded to 1e-16; S^(-1/2) magnifies that by 1/alpha, and the half vector
-    by 1/|w + s|.
-    """
+    """A given direction along the fibre is where matrix forms lose four digits at alpha = .01. n.d = sqrt(1 - first),
+    where n and d are rebuilt from the returned direction with S^(1/2) and its inverse in 50 digits. Tolerance: the
+    direction is rounded to 1e-16; S^(-1/2) magnifies that by 1/alpha, and the half vector by 1/|w + s|."""
     mpmath.mp.dps = 50
     rng = np.random.default_rng(7)
     for tilt in (0.0, 1e-9, 1e-4, 0.01, 0.3):
@@ -150,45 +139,3 @@ def test_first_number_0_mirrors_in_the_axis_and_round_flakes_need_no_tangent():
     w, t = PAIRS["tilted"]
     assert sample_flake_scatter(*w, *t, 1.0, 0.0, 0.3) == pytest.approx(w, abs=1e-15)
     assert np.dot(sample_flake_scatter(*w, *t, 1.0, 0.5, 0.3), w) == pytest.approx(0.0, abs=1e-15)
-
-
-@pytest.mark.parametrize("sigma", [0.02, 0.4, 8.0])
-def test_the_mixture_of_a_footprint_has_its_mass_and_its_samples(sigma):
-    """Probabilities add up to 1, the density to what does not go straight through; samples fall on both sides by it.
-
-    Midpoints on a sphere of 200 by 400 integrate lobes of alpha = .3 to 1e-3. Shares of 20,000 samples of each of eight
-    looks lie within the range that binomial counts leave with chance 1 - LEVEL, all together.
-    """
-    fabric, rng, looks, count = woven("voile", roughness=0.3, twist=20.0), np.random.default_rng(5), 8, 20_000
-    places, size = rng.random((looks, 2)) * 2.0, np.full(looks, sigma, np.float32)
-    wo = rng.normal(size=(looks, 3))
-    wo[:, 2] = np.abs(wo[:, 2]) + 0.3
-    wo = (wo / np.linalg.norm(wo, axis=1, keepdims=True)).astype(np.float32)
-    lobes = point.Lobes(
-        np.empty((looks, point.FLAKE_ROWS, 10), np.float32), np.empty((looks, point.STRAIGHT + 1), np.float32)
-    )
-    u, v = (np.ascontiguousarray(axis, np.float32) for axis in places.T)
-    scratch = np.empty((point.POINT_ROWS, 8), np.float32)
-    footprints = (u, v, size, size, np.zeros_like(size))
-    point.find_rows(tabulate_surface(fabric), footprints, wo, point.point_places(8), np.float32(2.0), scratch, lobes)
-    np.testing.assert_allclose(lobes.flakes[:, point.SHARE].sum(axis=1) + lobes.rest.sum(axis=1), 1.0, atol=1e-5)
-
-    ways = sphere(200, 400).astype(np.float32)
-    least = 1.0 - (1.0 - LEVEL) ** (1.0 / (3 * looks * 2))
-    for look in range(looks):
-        own = point.Lobes(*(np.repeat(part[look : look + 1], len(ways), axis=0) for part in lobes))
-        pdf = np.empty(len(ways), np.float32)
-        density_rows(own, ways, np.repeat(wo[look : look + 1], len(ways), axis=0), pdf)
-        mass = pdf * 4.0 * math.pi / len(ways)
-        straight = float(lobes.rest[look, point.STRAIGHT])
-        assert mass.sum() == pytest.approx(1.0 - straight, abs=1e-3)
-        own, towards = point.Lobes(*(part[:count] for part in own)), np.repeat(wo[look : look + 1], count, axis=0)
-        wi, drawn, through = np.empty((count, 3), np.float32), np.empty(count, np.float32), np.empty(count, np.bool_)
-        draw_rows(own, towards, rng.random((count, 3)), wi, drawn, through)
-        again = np.empty(count, np.float32)
-        density_rows(own, wi, towards, again)
-        np.testing.assert_allclose(drawn[~through], again[~through], rtol=1e-5)
-        assert (wi[through] == -wo[look]).all()
-        shares = {straight: through, mass[ways[:, 2] > 0.0].sum(): ~through & (wi[:, 2] > 0.0)}
-        for share, members in shares.items():
-            assert stats.binomtest(int(members.sum()), count, min(float(share), 1.0)).pvalue > least

@@ -22,6 +22,7 @@ def test_moments_of_the_wrapped_kernel():
 
 
 def test_a_box_of_whole_repeats_is_the_repeat_average():
+    assert stats.uniform(0, BOX_SIDE).std() == pytest.approx(1.0) and math.isclose(BOX_SIDE, math.sqrt(12))
     for whole in (1, 2, 7):
         sigma = 2.0 * whole / BOX_SIDE
         weights = [place(Axis(BOX, 0.3, sigma, 2.0), (k + 0.5) / 64)[1] for k in range(64)]
@@ -32,7 +33,3 @@ def test_a_box_of_whole_repeats_is_the_repeat_average():
 def test_centres_far_away_are_folded(centre):
     x, _ = place(Axis(GAUSSIAN, centre, 1e-4, 4.0), 0.5)
     assert x == pytest.approx(0.25, abs=1e-9)
-
-
-def test_a_box_side_is_what_the_standard_deviation_says():
-    assert stats.uniform(0, BOX_SIDE).std() == pytest.approx(1.0) and math.isclose(BOX_SIDE, math.sqrt(12))

@@ -143,12 +143,10 @@ def test_limits_known_without_sampling():
     ("width", "curvature", "depth"), [(0.8, 0.0, 2.5), (0.8, 0.01, 312.0), (0.1, 1.0, 0.03), (0.1, 1.0, 0.12)]
 )
 def test_gaps_let_rays_through(width, curvature, depth):
-    """Narrow yarns against a march through yarns with two sides, per ray, and their share of a patch.
-
-    `depth` says how far beneath the fabric plane the ray would sink (for flat cloth, its slope): in the last two cases
-    it comes up again, and some rays do so through another gap or the same one. Both take yarns for solid from their
-    surface to the plane. Strips beside a narrow yarn are searched at points: .6 % of the rays may differ.
-    """
+    """Narrow yarns against a march through yarns with two sides, per ray, and their share of a patch. `depth` says how
+    far beneath the fabric plane the ray would sink (for flat cloth, its slope): in the last two cases it comes up
+    again, and some rays do so through another gap or the same one. Both take yarns for solid from their surface to the
+    plane. Strips beside a narrow yarn are searched at points: .6 % of the rays may differ."""
     fabric = woven("denim", width=width)
     model = cloth_side(fabric, TruthOptions())
     highest, lowest = model.front.highest, -model.back.highest

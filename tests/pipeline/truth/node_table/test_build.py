@@ -52,10 +52,8 @@ def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
 )
 @pytest.mark.parametrize("footprint", ["gaussian", slow("box")])
 def test_answers_match_converged_ones(fabric, behind, footprint):
-    """Mean signed error of each component below .3 %, within three standard errors of the mean over the queries.
-
-    The typical query is within .6 %; transparency likewise.
-    """
+    """Mean signed error of each component below .3 %, within three standard errors of the mean over the queries. The
+    typical query is within .6 %; transparency likewise."""
     queries = draw_queries(QueryOptions(sigma=(0.4, 8.0), max_angle=80.0), fabric.weave.repeat, 21, 0, 80)
     if behind:
         queries = queries._replace(wi=queries.wi * np.float32([1, 1, -1]))

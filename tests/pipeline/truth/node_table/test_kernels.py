@@ -44,18 +44,12 @@ def pieces(table):
     for piece in table.pieces:
         count = piece[NODES_X] * piece[NODES_Y]
         if piece[PIECE_FAMILY] != GAP:
-            yield (
-                piece[PIECE_FAMILY],
-                slice(piece[FIRST_NODE], piece[FIRST_NODE] + count),
-                slice(piece[FIRST_FINE], piece[FIRST_FINE] + count),
-            )
+            yield piece[PIECE_FAMILY], *(slice(piece[k], piece[k] + count) for k in (FIRST_NODE, FIRST_FINE))
 
 
 def scattered(field, family, wi, wo, normal, tangent, inverse, **factors):
-    """Return f cos_i cos_o / n_z of every node in double precision; wi from behind is transmitted.
-
-    Terms of the formula can be multiplied by `factors`.
-    """
+    """Return f cos_i cos_o / n_z of every node in double precision; wi from behind is transmitted. Terms of the formula
+    can be multiplied by `factors`."""
     alpha = float(field.yarn[family, ALPHA]) * factors.get("alpha", 1.0)
     thickness = field.thickness * factors.get("thickness", 1.0)
     function = slab.transmission if wi[2] < 0 else slab.reflection
@@ -134,10 +128,7 @@ def test_area_diffuse_and_unscattered(cloth, case):
         alpha = float(field.yarn[family, ALPHA])
         crossed = kernels.crossing(normal, tangent, direction(wo), layer(field, family), shares.areas)
         t = np.stack(tangent).astype(np.float64)
-        through = [
-            slab.unscattered(slab.sigma(*o, *t[:, k], alpha), float(o @ n[:, k]), field.thickness)
-            if area[k] > 0
-            else 0.0
-            for k in range(count)
-        ]
-        assert crossed == pytest.approx(area @ through, rel=RTOL)
+        seen = np.flatnonzero(area > 0)
+        sizes = [(slab.sigma(*o, *t[:, k], alpha), float(o @ n[:, k])) for k in seen]
+        through = [slab.unscattered(*size, field.thickness) for size in sizes]
+        assert crossed == pytest.approx(area[seen] @ through, rel=RTOL)

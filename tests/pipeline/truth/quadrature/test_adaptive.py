@@ -54,10 +54,8 @@ def _specular_errors(roughness, split):
 @pytest.mark.parametrize(("roughness", "bounds"), [(0.3, (5e-2, 1e-3, 2e-6)), (0.1, (0.3, 3e-2, 2e-4))])
 def test_convergence_is_spectral_without_shadows(roughness, bounds):
     """Measured elsewhere (specification, 6), alpha = .1: n = 12 -> 6e-3, 16 -> 8e-4, 24 -> 1.6e-5, about exp(-.49 n).
-
-    The rate fitted here must be at least that, and not fall from one doubling to the next as an algebraic order's
-    does. Without cuts the yarns' edges, which turn away from any slanted direction, leave 1e-3 at n = 16.
-    """
+    The rate fitted here must be at least that, and not fall from one doubling to the next as an algebraic order's does.
+    Without cuts the yarns' edges, which turn away from any slanted direction, leave 1e-3 at n = 16."""
     errors = _specular_errors(roughness, CUT)
     assert all(error < bound for error, bound in zip(errors, bounds, strict=True))
     rate = -stats.linregress([4, 8, 16], np.log(errors)).slope

@@ -57,7 +57,6 @@ class Fibres:
         self.areas = (2 * (a * edge + b * np.sin(edge))) @ mass
 
     def area(self, w):
-        """Return the projected area of the flakes towards w, (N, 3)."""
         across = np.linalg.norm(np.cross(w, self.tangent), axis=1)
         return np.interp(np.arctan2(across, np.abs(w @ self.tangent)), self.angles, self.areas)
 
@@ -130,10 +129,8 @@ def _compare(count, seed, finer=1):
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "seed", "finer"), [(300_000, 11, 1), (4_000_000, 50, 2)])
 def test_photons_leave_as_the_slab_says(count, seed, finer):
-    """8 slabs, three energies and 8 bins of the outgoing cosine each, within 3 standard errors, Sidak-corrected.
-
-    Many photons need finer sums of the expected shares too.
-    """
+    """8 slabs, three energies and 8 bins of the outgoing cosine each, within 3 standard errors, Sidak-corrected. Many
+    photons need finer sums of the expected shares too."""
     for scores in _compare(count, seed, finer):
         level = 1 - (1 - LEVEL) ** (1 / scores.size)
         assert np.abs(scores).max() < stats.norm.isf(level / 2), np.round(scores, 1)

@@ -30,7 +30,6 @@ def _exact_flakes(i, o, t, alpha):
 
 
 def _exact_specular(i, o, t, alpha, thickness):
-    """Return f_r in 50 digits."""
     flakes, s_i, s_o, i, o = _exact_flakes(i, o, t, alpha)
     depth = mpmath.mpf(thickness) * (s_i / i[2] + s_o / o[2])
     return float(flakes * (1 - mpmath.exp(-depth)) / (4 * (s_i * o[2] + s_o * i[2])))
@@ -66,15 +65,12 @@ def test_specular_matches_50_digits():
             assert worst < 1e-12 / alpha
 
 
-def test_round_flakes_equal_the_lommel_seeliger_slab():
+def test_round_flakes_equal_the_lommel_seeliger_slab_and_opposite_directions_give_no_nan():
+    w = _unit(0.3, 0.2)
+    assert density(*(w - w), 0.0, 1.0, 0.0, 0.1) == 0.0
     i, o, t = _unit(0.4, 0.1), _unit(1.1, 2.0), _unit(1.2, 0.5)
     ours = reflection(density(*(i + o), *t, 1.0), sigma(*i, *t, 1.0), sigma(*o, *t, 1.0), i[2], o[2], 2.0)
     assert ours == pytest.approx(-math.expm1(-2.0 * (1 / i[2] + 1 / o[2])) / (4 * math.pi * (i[2] + o[2])), rel=1e-13)
-
-
-def test_opposite_directions_give_no_nan():
-    w = _unit(0.3, 0.2)
-    assert density(*(w - w), 0.0, 1.0, 0.0, 0.1) == 0.0
 
 
 def _crossing_pairs(count):
