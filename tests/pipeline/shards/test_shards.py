@@ -22,7 +22,6 @@ EXTRA = [SAMPLES.model_copy(update={"texels_per_yarn": 1}), OPACITY, GRAZING]
 
 
 def read_shard(path):
-    """Return the queries and answers of a shard."""
     return rows_of(read_columns(path, "components"))
 
 
