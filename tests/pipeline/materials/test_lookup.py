@@ -1,5 +1,3 @@
-"""Reading and evaluation of maps, against the lobes in double precision and closed forms of filtered patterns."""
-
 import math
 
 import numpy as np
@@ -28,17 +26,10 @@ def maps_of(pattern, sheen=SHEEN):
     def plane(values):
         return (pattern[..., None] * np.asarray(values)).astype(np.float32)
 
-    level = Planes(
-        coverage=pattern.astype(np.float32),
-        height=np.zeros_like(pattern, np.float32),
-        normal=plane(normal),
-        fibres=plane(entries),
-        base=plane((0.3, 0.2, 0.0)),
-        specular=plane((0.08, 0.04, 0.0)),
-        through=plane((0.1, 0.05, 0.0)),
-    )
-    found = Layout(4, 4, pattern.shape[1], pattern.shape[0])
-    return tabulate(level, MATERIAL, found, sheen, SPECULAR), normal, fibre
+    colours = {"base": (0.3, 0.2, 0.0), "specular": (0.08, 0.04, 0.0), "through": (0.1, 0.05, 0.0)}
+    planes = {name: plane(values) for name, values in {"normal": normal, "fibres": entries, **colours}.items()}
+    level = Planes(coverage=pattern.astype(np.float32), height=np.zeros_like(pattern, np.float32), **planes)
+    return tabulate(level, MATERIAL, Layout(4, 4, *pattern.shape[::-1]), sheen, SPECULAR), normal, fibre
 
 
 def test_one_material_is_the_sum_of_its_lobes():

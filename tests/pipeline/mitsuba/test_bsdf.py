@@ -1,5 +1,3 @@
-"""The BSDF `twillight` as Mitsuba sees it: values, lobes, and its own chi-square test."""
-
 import numpy as np
 import pytest
 
@@ -104,11 +102,9 @@ def test_bad_properties_end_in_one_sentence(scalar, plugin, properties, words):
     [(("front", "gauze", "behind"), 11, 24, 20_000), slow(tuple(CONFIGURATIONS), 21, 32, 500_000)],
 )
 def test_mitsubas_chi_square_test(llvm, names, cells, nodes, samples):
-    """LEVEL for all configurations together, by Sidak; few cells make the quadrature of densities exact enough.
-
-    Light straight through is a delta lobe and left out. Mitsuba's adapter drops samples without weight. Here they
-    count: the density does not know which light is in shadow.
-    """
+    """LEVEL for all configurations together, by Sidak; few cells make the quadrature of densities exact enough. Light
+    straight through is a delta lobe and left out. Mitsuba's adapter drops samples without weight. Here they count: the
+    density does not know which light is in shadow."""
     import drjit as dr
 
     context = llvm.BSDFContext()
@@ -125,8 +121,6 @@ def test_mitsubas_chi_square_test(llvm, names, cells, nodes, samples):
             scattered = sample.sampled_component != STRAIGHT_THROUGH
             return sample.wo, dr.select(scattered, llvm.Float(1.0), llvm.Float(0.0))
 
-        test = llvm.chi2.ChiSquareTest(
-            domain=llvm.chi2.SphericalDomain(), sample_func=draw, pdf_func=density, sample_dim=3,
-            sample_count=samples, res=cells, ires=nodes,
-        )  # fmt: skip
+        settings = {"sample_dim": 3, "sample_count": samples, "res": cells, "ires": nodes}
+        test = llvm.chi2.ChiSquareTest(llvm.chi2.SphericalDomain(), draw, density, **settings)
         assert test.run(significance_level=LEVEL, test_count=len(names), quiet=True), test.messages

@@ -1,5 +1,3 @@
-"""The energy bound: whatever a method answers, no more light leaves than arrives, by either side."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Light between yarns in the colours of a cloth."""
-
 import numpy as np
 import pytest
 
@@ -57,17 +55,12 @@ def test_a_thread_sends_on_light_in_its_own_colour():
     assert np.ptp(own[:, 2], axis=0).max() > 0.1
 
 
-def test_cloth_seen_from_behind_is_the_cloth_of_its_back():
+def test_cloth_seen_from_behind_is_the_cloth_of_its_back_and_transmitted_light_has_one_bounce():
     flip = np.float32([1.0, 1.0, -1.0])
     behind = shade(CLOTH, NONE, _queries(WI * flip, WO * flip), "all")
-    assert behind == pytest.approx(shade(CLOTH.back(), NONE, _queries(), "all"))
-    assert behind.max() > 0.0
-
-
-def test_transmitted_light_has_one_bounce():
-    """All bounces of it are not known: nothing is added."""
-    queries = _queries(WI * np.float32([1.0, 1.0, -1.0]))
-    assert shade(CLOTH, NONE, queries, "all").max() == 0.0
+    assert behind == pytest.approx(shade(CLOTH.back(), NONE, _queries(), "all")) and behind.max() > 0.0
+    # All bounces of transmitted light are not known: nothing is added.
+    assert shade(CLOTH, NONE, _queries(WI * flip), "all").max() == 0.0
 
 
 @pytest.mark.parametrize("number", [0, 2, "none"])

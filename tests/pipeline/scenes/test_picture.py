@@ -1,5 +1,3 @@
-"""Pictures from windows: the same as from one piece, on any number of threads, with layers that sum to them."""
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -76,8 +74,8 @@ def test_a_window_shows_what_the_whole_frame_shows_there(table):
 
 def test_windows_and_threads_change_nothing(table, monkeypatch):
     expected, counts = whole(table)
-    for name, value in (("QUERIES", 500), ("CHUNK", 37)):
-        monkeypatch.setattr(pictures, name, value)
+    monkeypatch.setattr(pictures, "QUERIES", 500)
+    monkeypatch.setattr(pictures, "CHUNK", 37)
     cut, again = whole(table, threads=3)
     np.testing.assert_allclose(cut["rgb"], expected["rgb"], atol=2e-6)
     assert (counts == again).all() and 0 < counts[1] < counts[0]

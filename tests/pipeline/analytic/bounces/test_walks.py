@@ -1,5 +1,3 @@
-"""Walks between yarns against closed forms, and what they keep: reciprocity and energy."""
-
 import math
 
 import numpy as np
@@ -24,11 +22,9 @@ def test_starting_points_cover_what_is_seen_from_above(fabric):
 
 
 def test_round_yarns_side_by_side_give_each_other_what_lines_of_sight_say():
-    """Cylinders of diameter 1: from a point at the angle v, the neighbour fills angles from its tangent line down.
-
-    Of what a point sends across, the share between two angles to its normal is half the difference of their sines.
-    What reaches the neighbour leaves the cloth, or reaches another yarn.
-    """
+    """Cylinders of diameter 1: from a point at the angle v, the neighbour fills angles from its tangent line down. Of
+    what a point sends across, the share between two angles to its normal is half the difference of their sines. What
+    reaches the neighbour leaves the cloth, or reaches another yarn."""
     sine = (np.arange(4000) + 0.5) / 2000 - 1.0
     v = np.arcsin(sine)
     x, y = 1.0 - 0.5 * sine, -0.5 * np.cos(v)

@@ -1,5 +1,3 @@
-"""First hits against a march through the oracle's heights, and the reference plane against a fine grid of them."""
-
 import math
 
 import numpy as np
