@@ -66,11 +66,12 @@ def test_cloth_hangs_together_unless_some_yarns_lie_on_all_others(matrix):
     assert Draft(matrix).hangs_together() == (not loose)
 
 
-def test_drawing_has_pick_0_at_the_bottom():
+def test_drawing_has_pick_0_at_the_bottom_and_rolling_moves_the_repeat():
     draft = Matrix(rows=["#..", "##."]).build()
     assert draft.repeat == (3, 2)
     assert draft.warp_over.tolist() == [[True, True, False], [True, False, False]]
     assert draft.text() == "██· · \n████· "
+    assert Matrix(rows=["...", "#.."]).build().rolled(1, 1).rows() == [".#.", "..."]
 
 
 @settings(deadline=None)
@@ -85,11 +86,6 @@ def test_canonical_form_ignores_shift_mirror_and_repetition(matrix, ends, picks,
 def test_canonical_form_tells_cloths_apart():
     weaves = [Plain(), Twill(over=2, under=2), Twill(over=3, under=1), Twill(over=1, under=3)]
     assert len({weave.build().canonical() for weave in weaves}) == 4
-
-
-def test_rolled_moves_the_repeat():
-    draft = Matrix(rows=["...", "#.."]).build()
-    assert draft.rolled(1, 1).rows() == [".#.", "..."]
 
 
 def test_loom_weaves_the_twill_it_is_tied_up_for():
@@ -123,17 +119,7 @@ def test_draft_is_a_read_only_copy_and_survives_pickling():
     assert hash(pickle.loads(pickle.dumps(draft))) == hash(draft)
 
 
-@pytest.mark.parametrize(
-    ("rows", "cells"),
-    [
-        (["#"], 1),
-        (["#.", ".#"], 2),
-        (["#.#.", ".#.#", "#.#.", ".#.#"], 2),
-        (["#...", ".#..", "..#.", "...#"], 4),
-        (["#..", "...", "..."], 9),
-        (["##..", "##..", "..##", "..##"], 8),
-    ],
-    ids=["one", "plain", "plain drawn twice", "twill", "single point", "basket"],
-)
-def test_different_cells_are_those_no_translation_carries_into_another(rows, cells):
-    assert Matrix(rows=rows).build().different_cells() == cells
+def test_different_cells_are_those_no_translation_carries_into_another():
+    """One cell, plain, plain drawn twice, a twill, a single point, and a basket."""
+    drawings = ["#", "#. .#", "#.#. .#.# #.#. .#.#", "#... .#.. ..#. ...#", "#.. ... ...", "##.. ##.. ..## ..##"]
+    assert [Matrix(rows=drawing.split()).build().different_cells() for drawing in drawings] == [1, 2, 2, 4, 9, 8]

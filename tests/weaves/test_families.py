@@ -23,13 +23,9 @@ def test_every_end_takes_the_same_steps_and_the_twill_rises_to_the_side_it_is_na
         assert set(draft.warp_over.sum(axis=0)) == {sum(over)}
 
 
-def test_a_3_1_twill_is_drawn_as_weavers_draw_it():
-    draft = Twill(over=3, under=1).build()
-    assert draft.rows() == [".###", "###.", "##.#", "#.##"] and draft.name == "twill 3/1"
-
-
-def test_the_four_end_broken_twill_takes_its_ends_as_0_1_3_2():
+def test_a_3_1_twill_is_drawn_as_weavers_draw_it_and_broken_it_takes_its_ends_as_0_1_3_2():
     straight, broken = (Twill(family=family, over=3, under=1).build() for family in ("twill", "broken_twill"))
+    assert straight.rows() == [".###", "###.", "##.#", "#.##"] and straight.name == "twill 3/1"
     assert np.array_equal(broken.warp_over, straight.warp_over[:, [0, 1, 3, 2]])
 
 

@@ -15,6 +15,7 @@ from weaves.population import FamilyName, Population, Ranges, population_fabrics
 
 RANGES = ("plain", "twill", "satin", "irregular")
 UNSEEN: tuple[FamilyName, ...] = ("compound_twill", "large_satin", "irregular")
+NARROW = dict.fromkeys(RANGES, Ranges(width=(0.6, 0.9)))
 SEEDS = st.integers(0, 2**63 - 1)
 
 
@@ -82,10 +83,7 @@ def test_a_population_without_drafts_is_refused():
 
 def test_a_share_of_solid_cloth_changes_nothing_but_widths():
     """A binomial test at .1 % on the share; all else is as without it."""
-    narrow = Ranges(width=(0.6, 0.9))
-    loose, mixed = (
-        Population(count=200, seed=3, solid=solid, plain=narrow, twill=narrow, satin=narrow) for solid in (0.0, 0.4)
-    )
+    loose, mixed = (Population(count=200, seed=3, solid=solid, **NARROW) for solid in (0.0, 0.4))
     pairs = list(zip(population_fabrics(loose), population_fabrics(mixed), strict=True))
     solid = [b for _, b in pairs if b.warp.width == b.weft.width == 1.0]
     assert stats.binomtest(len(solid), 200, 0.4).pvalue > 1e-3
@@ -119,10 +117,7 @@ def test_drafts_for_unseen_cloth_are_in_no_population_of_the_default_families(se
 @pytest.mark.parametrize(("solid", "expected"), [(0.5, 2), (0.25, 1), (1.0, 4), (0.0, 0)])
 def test_a_balanced_population_has_every_family_and_the_share_of_solid_cloth_in_each(solid, expected):
     """Sixteen fabrics of four families: four each, of which 4 * solid are solid."""
-    narrow = Ranges(width=(0.6, 0.9))
-    population = Population(
-        count=16, seed=8, families=("plain", *UNSEEN), balanced=True, solid=solid, **dict.fromkeys(RANGES, narrow)
-    )
+    population = Population(count=16, seed=8, families=("plain", *UNSEEN), balanced=True, solid=solid, **NARROW)
     fabrics = population_fabrics(population, "cloth_{index}_{family}")
     for place, family in enumerate(population.families):
         own = fabrics[place::4]

@@ -42,8 +42,11 @@ def random_points(fabric, count=4000, seed=1):
     return np.random.default_rng(seed).random((2, count)) * np.array([[ends], [picks]])
 
 
-def test_crown_of_a_plain_float_by_hand():
-    """L = 1, u_max = 30°: R = 1, r = 1/2, so the crown is 1 + 1/2 - cos 30° high; the fibres lie at psi to the yarn."""
+def test_a_plain_float_by_hand():
+    """L = 1, u_max = 30°: R = 1, r = 1/2, so the crown is 1 + 1/2 - cos 30° high; the fibres lie at psi to the yarn.
+
+    Off the axis sin v = x/r, sin u = y/(R + r cos v): at x = .25, y = .3.
+    """
     fabric = cloth({"family": "plain"}, {"bend": 30, "twist": 20}, {"bend": 30, "twist": 20})
     sine, cosine = np.sin(np.radians(20)), np.cos(np.radians(20))
     seen = surface_at(fabric, [0.5, 1.5], [0.5, 0.5])
@@ -51,10 +54,6 @@ def test_crown_of_a_plain_float_by_hand():
     assert np.allclose(seen.height, 1.5 - np.sqrt(0.75), rtol=1e-15)
     assert np.allclose(seen.normal, [0, 0, 1], atol=1e-16)
     assert np.allclose(seen.tangent, [[-sine, cosine, 0], [-cosine, -sine, 0]], atol=1e-15)
-
-
-def test_a_point_off_the_axis_by_hand():
-    """Closed form: sin v = x/r, sin u = y/(R + r cos v); at x = .25, y = .3 of a float with R = 1, r = 1/2."""
     fabric = cloth({"family": "plain"}, {"bend": 30, "twist": 0}, {"bend": 30, "twist": 0})
     cos_v = np.sqrt(0.75)
     sin_u = 0.3 / (1 + 0.5 * cos_v)

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from tests.refusals import accepted, refusal
 from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
 from weaves.draft import Draft, smallest_repeat
 from weaves.draft_files.read import read_draft
 from weaves.draft_files.wif_sections import MOST_WIF_BYTES
-from weaves.errors import MOST_LETTERS, BadInput
 
 SAMPLES = {str(path): Path(path.locate()) for path in files("dtx-to-wif") if "test_data" in path.parts}
 """Files that come with the library; its own tests say which are bad."""
@@ -50,14 +50,6 @@ def read(tmp_path):
 
 def rows(draft):
     return Draft(smallest_repeat(draft.warp_over)).rows()
-
-
-def refusal(read, content, suffix=".wif"):
-    with pytest.raises(BadInput) as refused:
-        read(content, suffix)
-    sentence = str(refused.value)
-    assert len(sentence) <= MOST_LETTERS and sentence.isprintable()
-    return sentence
 
 
 def test_the_sections_of_a_twill(read):
@@ -240,13 +232,6 @@ def test_a_weavepoint_file_without_yarns_per_inch(read):
 small = st.sampled_from([name for name in VALID if SAMPLES[name].stat().st_size < 20_000])
 
 
-def is_read_or_one_sentence(read, content, suffix):
-    try:
-        read(content, suffix)
-    except BadInput as refused:
-        assert len(str(refused)) <= MOST_LETTERS and str(refused).isprintable()
-
-
 @settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(small, st.data())
 def test_a_damaged_file_is_a_draft_or_one_sentence(read, name, data):
@@ -254,7 +239,7 @@ def test_a_damaged_file_is_a_draft_or_one_sentence(read, name, data):
     for place in data.draw(st.lists(st.integers(0, len(content) - 1), max_size=6)):
         content[place] ^= 1 << data.draw(st.integers(0, 7))
     left = data.draw(st.integers(0, len(content)))
-    is_read_or_one_sentence(read, bytes(content[:left] if data.draw(st.booleans()) else content), SAMPLES[name].suffix)
+    accepted(read, bytes(content[:left] if data.draw(st.booleans()) else content), SAMPLES[name].suffix)
 
 
 words = st.sampled_from(["[WIF]", "[WARP]", "[TIEUP]", *"=1,%;\n[] \0", "color", "nan"])
@@ -264,4 +249,4 @@ words = st.sampled_from(["[WIF]", "[WARP]", "[TIEUP]", *"=1,%;\n[] \0", "color",
 @given(st.lists(words, max_size=60), st.sampled_from([".wif", ".dtx"]))
 @example(["[WIF]", "\n", "[WARP]", "\n", "color", "=", ","], ".wif")
 def test_any_words_are_a_draft_or_one_sentence(read, pieces, suffix):
-    is_read_or_one_sentence(read, "".join(pieces), suffix)
+    accepted(read, "".join(pieces), suffix)

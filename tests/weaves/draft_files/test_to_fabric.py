@@ -151,11 +151,6 @@ def test_what_is_no_cloth_is_refused(imported, change, named):
         imported(wif(**change))
 
 
-def test_a_number_of_a_yarn_that_is_not_allowed_is_refused(imported):
-    with pytest.raises(BadInput, match=r"warp\.bend = 95"):
-        imported(wif(), given={"warp": {"bend": 95.0}, "weft": {}})
-
-
 def test_the_shipped_houndstooth_is_a_twill_of_four_and_four():
     path = PRESETS.parent / "examples" / "houndstooth.wif"
     fabric = fabric_of(read_draft(path), denim, "houndstooth", "houndstooth.wif", NOTHING).fabric
