@@ -7,7 +7,7 @@ from weaves.errors import MOST_LETTERS, BadInput
 
 def sentence_of(refused):
     sentence = str(refused)
-    assert len(sentence) <= MOST_LETTERS and sentence.isprintable(), sentence
+    assert 0 < len(sentence) <= MOST_LETTERS and sentence.isprintable(), sentence
     return sentence
 
 

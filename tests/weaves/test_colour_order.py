@@ -47,11 +47,9 @@ def test_a_fabric_without_an_order_has_no_such_key():
         ({"ends": [["white", 0]]}, "ends"),
         ({"picks": [["white", MOST_THREADS], ["navy", 1]]}, str(MOST_THREADS)),
         ({"palette": {}}, "palette"),
-        (
-            {"palette": {"glow": {"diffuse": [1.0] * 3, "diffuse_transmission": [0.5] * 3}}, "ends": [["glow", 1]]},
-            "glow",
-        ),
+        ({"palette": {"glow": {"diffuse": [1.0] * 3, "diffuse_transmission": [0.5] * 3}}, "ends": [["glow", 1]]},
+         "palette.glow"),
     ],
-)
+)  # fmt: skip
 def test_bad_colours_are_one_sentence(colours, named):
     assert named in refusal(coloured, **colours)

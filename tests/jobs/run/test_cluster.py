@@ -78,11 +78,7 @@ import jobs.run.crew as module
 found = module.software() | {"numba": "0.1"}
 module.software = lambda: found
 """
-
-NO_PACKAGE = """
-import sys
-sys.modules["jobs"] = None
-"""
+NO_PACKAGE = 'import sys; sys.modules["jobs"] = None'
 
 
 def test_a_run_without_a_worker_of_this_version_ends_with_a_sentence(tmp_path, processes, shown):
@@ -120,9 +116,8 @@ def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, monkeypatch):
     shards = [fake.task(f"shard {index}", seconds=0.3) for index in range(18)]
     tasks = [*shards, fake.task("net", fake.FakeTraining, needs=shards)]
     seen = []
-    with LocalCluster(
-        n_workers=0, threads_per_worker=1, host="127.0.0.1", dashboard_address=":0", silence_logs=50
-    ) as cluster:
+    quiet = {"dashboard_address": ":0", "silence_logs": 50}
+    with LocalCluster(n_workers=0, threads_per_worker=1, host="127.0.0.1", **quiet) as cluster:
         adaptive = cluster.adapt(minimum=0, maximum=3, interval="100ms", wait_count=2, target_duration="300ms")
 
         def count():

@@ -12,28 +12,14 @@ from jobs.plan.training import Training
 from jobs.run.ledger import Ledger
 from pipeline.shards.store import read_table, write_columns
 from tests.jobs import made_up
-
-RECIPE = """
-name = "tiny"
-[dataset]
-seen = ["denim"]
-shard_rows = 64
-rows = { train = 128, validation = 32, test = 64 }
-[[models]]
-model = "woven"
-[[models]]
-model = "neumip"
-[bench]
-views = ["plane"]
-"""
+from tests.jobs.made_up import flip
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """Return a folder in which a recipe is finished, the recipe beside it."""
     folder = tmp_path_factory.mktemp("whole")
-    (folder / "tiny.toml").write_text(RECIPE)
-    made_up.finished(folder / "tiny.toml", folder / "out")
+    made_up.finished(made_up.write_recipe(folder, "tiny", "woven", "neumip"), folder / "out")
     return folder
 
 
@@ -48,12 +34,6 @@ def run(whole, tmp_path, monkeypatch, call):
     run.tasks = made_up.plan(made_up.load_recipe(tmp_path / "tiny.toml"))
     run.of = lambda kind: next(task for task in run.tasks if isinstance(task, kind))
     return run
-
-
-def flip(path, chance=random.Random(0)):  # noqa: B008, any byte will do
-    content = bytearray(path.read_bytes())
-    content[chance.randrange(len(content))] ^= chance.randrange(1, 256)
-    path.write_bytes(content)
 
 
 def same(found, expected, but=()):
