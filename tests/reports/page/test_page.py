@@ -119,7 +119,7 @@ def test_every_section_shows_its_numbers(folder, page):
         "everything–4.5e+081fast",
         "largesterror,1/sr(lowerisbetter)woven25.0%",
     ):
-        assert text in words, text
+        assert text in words, text  # fmt: skip
     assert "150 queries a fabric" in page.words and "a stated error of 0.07 %" in page.words
     assert "woven by compile was not measured (no <compiler>)." in page.words
     assert "Largest error of all queries." in page.words

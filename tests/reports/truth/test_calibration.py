@@ -23,18 +23,13 @@ def test_the_comparison_of_normal_errors():
 @pytest.mark.parametrize(
     ("ratio", "exceeded", "low", "high", "holds"),
     [
-        (0.9, 0.002, 0.85, 0.95, True),
-        (0.9, 0.002, None, None, True),
-        (0.7, 0.002, None, None, False),
-        (0.7, 0.002, 0.5, 0.85, True),
-        (0.7, 0.002, 0.65, 0.75, False),
-        (1.4, 0.002, 1.3, 1.5, False),
-        # 8,000 values: 24 beyond their bound are expected, 38 have a chance of .5 %.
-        (1.0, 36 / 8000, 0.9, 1.1, True),
-        (1.0, 38 / 8000, 0.9, 1.1, False),
+        (0.9, 0.002, 0.85, 0.95, True), (0.9, 0.002, None, None, True), (0.7, 0.002, None, None, False),
+        (0.7, 0.002, 0.5, 0.85, True), (0.7, 0.002, 0.65, 0.75, False), (1.4, 0.002, 1.3, 1.5, False),
+        (1.0, 36 / 8000, 0.9, 1.1, True), (1.0, 38 / 8000, 0.9, 1.1, False),
     ],
-)
+)  # fmt: skip
 def test_a_row_holds_within_its_limits(ratio, exceeded, low, high, holds):
+    """Of 8,000 values 24 beyond their bound are expected; 38 have a chance of .5 %."""
     assert Calibration("auto", "solid", ratio, exceeded, low, high, 1.0, 0.0, 2000).holds is holds
 
 

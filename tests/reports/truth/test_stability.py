@@ -7,31 +7,20 @@ import numpy as np
 import pytest
 
 from pipeline.compiled import float32 as single
-from reports.truth import formulas
+from reports.truth import formulas, stability
 from reports.truth.finding import ILL, RECORDS, Finding, failures, judge
-from reports.truth.stability import (
-    BENDS,
-    DIGITS,
-    draw,
-    expressions,
-    footprints,
-    judged,
-    places,
-    sigma_of,
-    slab_of,
-)
 
-EXPRESSIONS = list(expressions())
+EXPRESSIONS = list(stability.expressions())
 
 
 @pytest.mark.parametrize("name", dict.fromkeys(expression.name for expression in EXPRESSIONS))
 def test_corners_hold(name):
-    findings = [finding for row in EXPRESSIONS if row.name == name for finding in judged(row)]
+    findings = [finding for row in EXPRESSIONS if row.name == name for finding in stability.judged(row)]
     assert findings
     assert [(f.expression, f.corner, f.fault, f.at) for f in failures(findings)] == []
 
 
-@pytest.mark.parametrize(("compare", "count"), [(places, 2000), (footprints, 120)])
+@pytest.mark.parametrize(("compare", "count"), [(stability.places, 2000), (stability.footprints, 120)])
 def test_answers_far_away_are_those_at_home(compare, count):
     findings = compare()
     assert {finding.count for finding in findings} == {count}
@@ -44,13 +33,13 @@ def test_answers_far_away_are_those_at_home(compare, count):
         ("1 − exp(−x)", {"x 0 … 80"}),
         ("σ", {"α = 0.01, near the axis", "α = 0.1, near the axis"}),
         ("D", {"α = 0.01", "α = 0.1"}),
-        ("torus height", {f"u_max = {bend:g}°" for bend in BENDS}),
+        ("torus height", {f"u_max = {bend:g}°" for bend in stability.BENDS}),
     ],
 )
 def test_a_textbook_form_is_caught(name, caught):
     """As single precision would be if someone 'simplified' it: exactly the corners where it loses digits fail."""
     rows = [row._replace(single=row.naive) for row in EXPRESSIONS if row.name == name]
-    findings = [finding for row in rows for finding in judged(row) if not finding.corner.endswith(ILL)]
+    findings = [finding for row in rows for finding in stability.judged(row) if not finding.corner.endswith(ILL)]
     assert {finding.corner for finding in failures(findings) if finding.arithmetic == "float32"} == caught
 
 
@@ -58,23 +47,23 @@ def test_a_textbook_exponential_is_caught(monkeypatch):
     """A quotient of it over a difference of Lambda fails, but for equal ones: their limit is a case of its own."""
     monkeypatch.setattr(single, "absorbed", lambda x: np.float32(1) - np.exp(-x))
     (through,) = (row for row in EXPRESSIONS if row.name == "G_t")
-    assert not any(finding.holds for finding in judged(through)[1:3])
+    assert not any(finding.holds for finding in stability.judged(through)[1:3])
 
 
 @pytest.mark.parametrize("behind", [False, True])
 def test_fifty_digits_agree_with_double_precision_by_the_textbook(behind):
     """Away from the corners the textbook's double precision is good to 1e-12, and so are the 50 digits."""
-    columns = draw(40, 0.5, (30.0, 60.0), (20.0, 45.0), (0.5, 2.0), behind).values()
-    with mpmath.workdps(DIGITS):
+    columns = stability.draw(40, 0.5, (30.0, 60.0), (20.0, 45.0), (0.5, 2.0), behind).values()
+    with mpmath.workdps(stability.DIGITS):
         exact = formulas.textbook_slab(*map(formulas.exact, columns)).astype(np.float64)
-    assert slab_of(*columns) == pytest.approx(exact, rel=1e-12)
+    assert stability.slab_of(*columns) == pytest.approx(exact, rel=1e-12)
     assert formulas.textbook_slab(*columns) == pytest.approx(exact, rel=1e-12)
 
 
 def test_formulas_on_arrays_are_those_of_the_kernels_and_fifty_digits_are_kept():
-    _, wo, t, alpha, _ = draw(200, 0.1, (0.0, 60.0, 89.9), (30.0, 80.0), (2.0,)).values()
-    assert formulas.sigma(wo, t, alpha) == pytest.approx(sigma_of(wo, t, alpha), rel=1e-15)
-    with mpmath.workdps(DIGITS):
+    _, wo, t, alpha, _ = stability.draw(200, 0.1, (0.0, 60.0, 89.9), (30.0, 80.0), (2.0,)).values()
+    assert formulas.sigma(wo, t, alpha) == pytest.approx(stability.sigma_of(wo, t, alpha), rel=1e-15)
+    with mpmath.workdps(stability.DIGITS):
         third = formulas.exact([1.0]) / formulas.exact([3.0])
         assert abs(third[0] - mpmath.mpf(1) / 3) < mpmath.mpf(10) ** -49
 

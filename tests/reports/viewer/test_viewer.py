@@ -162,13 +162,11 @@ MOVE = """(async () => {{
 @pytest.mark.parametrize(
     ("name", "value", "changes"),
     [
-        ("Turn", "30", {"turn": 30.0}),
-        ("Tilt", "25", {"tilt": 25.0}),
-        ("Distance", str(np.log(300.0)), {"distance": 300.0}),
-        ("Light, turn", "20", {"light_turn": 20.0}),
+        ("Turn", "30", {"turn": 30.0}), ("Tilt", "25", {"tilt": 25.0}),
+        ("Distance", str(np.log(300.0)), {"distance": 300.0}), ("Light, turn", "20", {"light_turn": 20.0}),
         ("Light, tilt", "70", {"light_tilt": 70.0}),
     ],
-)
+)  # fmt: skip
 def test_sliders_move_viewer_and_light(fresh, name, value, changes):
     fresh.run(MOVE.format(name=name, value=value))
     if name == "Distance":
@@ -180,16 +178,11 @@ def test_sliders_move_viewer_and_light(fresh, name, value, changes):
 @pytest.mark.parametrize(
     ("name", "value", "moved"),
     [
-        ("Warp, roughness", "0.2", [0]),
-        ("Weft, roughness", "0.2", [1]),
-        ("Warp, twist", "35", [0]),
-        ("Weft, twist", "-35", [1]),
-        ("Warp, normal’s weight", "1", [2]),
-        ("Weft, normal’s weight", "0", [3]),
-        ("Optical thickness", str(np.log(0.5)), [0, 1]),
-        ("Bend", "1", [0, 1, 2, 3]),
+        ("Warp, roughness", "0.2", [0]), ("Weft, roughness", "0.2", [1]), ("Warp, twist", "35", [0]),
+        ("Weft, twist", "-35", [1]), ("Warp, normal’s weight", "1", [2]), ("Weft, normal’s weight", "0", [3]),
+        ("Optical thickness", str(np.log(0.5)), [0, 1]), ("Bend", "1", [0, 1, 2, 3]),
     ],
-)
+)  # fmt: skip
 def test_sliders_of_yarns_move_their_components_alone(fresh, name, value, moved):
     before = components(fresh, 2)
     fresh.run(MOVE.format(name=name, value=value))
