@@ -1,5 +1,3 @@
-"""Exit codes and sentences: whatever is wrong, one line tells it and no traceback is shown."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""The terminal obeys nothing that comes from outside."""
-
 import io
 
 from rich.table import Table

@@ -1,5 +1,3 @@
-"""Means and ranges over trainings."""
-
 import math
 
 import pandas as pd

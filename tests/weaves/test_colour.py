@@ -1,5 +1,3 @@
-"""Colours: three notations, one linear sRGB."""
-
 import numpy as np
 import pytest
 

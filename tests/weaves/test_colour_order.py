@@ -1,5 +1,3 @@
-"""Colour orders: sequences, repeats, and what is refused."""
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,5 +1,3 @@
-"""Drafts: drawings, looms, mirror images, and the floats that pass through every cell."""
-
 import pickle
 
 import numpy as np

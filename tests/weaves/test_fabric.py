@@ -1,5 +1,3 @@
-"""Fabrics: presets, files, and what their fingerprint sees."""
-
 import json
 
 import pytest

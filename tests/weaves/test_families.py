@@ -1,5 +1,3 @@
-"""Families of weaves: plain, rib, basket, satins, and twills straight, broken and in herringbone."""
-
 import numpy as np
 import pytest
 from hypothesis import given

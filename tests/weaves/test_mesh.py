@@ -1,5 +1,3 @@
-"""The mesh against the oracle of heights, and against areas and volumes in closed form."""
-
 import math
 from functools import partial
 

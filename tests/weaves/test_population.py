@@ -1,5 +1,3 @@
-"""Random fabrics: reproducible, within their ranges, and never what was excluded."""
-
 from typing import get_args
 
 import numpy as np

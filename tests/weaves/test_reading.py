@@ -1,5 +1,3 @@
-"""Files from outside: only regular ones, of a bounded size."""
-
 import os
 
 import pytest

@@ -1,5 +1,3 @@
-"""The torus geometry: closed forms, symmetries, and the normal as the gradient of the height."""
-
 import mpmath
 import numpy as np
 import pytest

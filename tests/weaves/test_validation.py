@@ -1,5 +1,3 @@
-"""Whatever is wrong with a file or a table, one sentence says where, what, and what is allowed."""
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,5 +1,3 @@
-"""Yarns: the colours with which they make no light, and what is said of others."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Schedules against closed forms; the time left, learnt by kind and counted along the schedule."""
-
 import time
 from typing import ClassVar
 

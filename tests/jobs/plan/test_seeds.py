@@ -1,5 +1,3 @@
-"""Several trainings of a model: seeds, tasks, and which measurements are made of each."""
-
 import pytest
 
 from jobs.plan.measurements.fabrics import ErrorsBySize, OnFabric

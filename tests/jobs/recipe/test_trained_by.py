@@ -1,5 +1,3 @@
-"""Models that another recipe trains: whose rows, whose trainings, what is refused."""
-
 import dataclasses
 
 import pytest

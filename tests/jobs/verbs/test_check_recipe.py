@@ -1,5 +1,3 @@
-"""Check and repair of a recipe, on made-up products: what is not as it was is found, named and made again."""
-
 import random
 import shutil
 from functools import partial

@@ -1,5 +1,3 @@
-"""`twillight evaluate` by the truth and by a trained model: answers, refusals, and what a kill leaves."""
-
 import json
 import signal
 import subprocess

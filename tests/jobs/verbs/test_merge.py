@@ -1,5 +1,3 @@
-"""Two folders of products become one; what does not fit is refused, what is damaged left out."""
-
 import shutil
 from functools import partial
 

@@ -1,5 +1,3 @@
-"""`twillight plan`: reasons and schedules of a recipe whose shards are partly done."""
-
 from pathlib import Path
 
 import pytest

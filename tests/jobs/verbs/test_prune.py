@@ -1,5 +1,3 @@
-"""What no named recipe needs, and what is never removed."""
-
 from functools import partial
 
 import pytest

@@ -1,5 +1,3 @@
-"""`twillight compare`, `records merge` and `results`: where they find Records, what they write, what they refuse."""
-
 import pytest
 
 from pipeline.truth.conventions import COMPONENTS

@@ -1,5 +1,3 @@
-"""Pictures from the command line: those of the benchmark, their layers, sizes, frames and fabrics, and bad input."""
-
 import re
 import sys
 from functools import partial

@@ -1,5 +1,3 @@
-"""`twillight require`: from a page's Records and a scene to a recipe that can be run; wishes that cannot be met."""
-
 from functools import partial
 
 import pytest

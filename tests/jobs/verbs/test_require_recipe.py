@@ -1,5 +1,3 @@
-"""A scene's own recipe: what it keeps of the general one, what it leaves out, and that its paths hold anywhere."""
-
 import dataclasses
 import os
 

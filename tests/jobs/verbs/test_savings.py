@@ -1,5 +1,3 @@
-"""What a scene's own recipe saved: sums over receipts, numbers of two pages, and what is missing in one sentence."""
-
 import csv
 import json
 import math

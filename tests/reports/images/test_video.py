@@ -1,5 +1,3 @@
-"""Films as PyAV reads them back."""
-
 import numpy as np
 import pytest
 

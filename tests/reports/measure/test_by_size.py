@@ -1,5 +1,3 @@
-"""Errors and times by the size of footprints: each class by itself."""
-
 from reports.measure.by_size import EDGES, MEASURES, SIZES, measure_by_size, measure_errors_by_size
 
 

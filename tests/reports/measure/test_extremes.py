@@ -1,5 +1,3 @@
-"""Methods at their extremes: what is asked, closed forms of what is measured, and the model that comes along."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The white furnace: closed forms, and a truth that makes no light."""
-
 import math
 
 import numpy as np

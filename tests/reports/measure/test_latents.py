@@ -1,5 +1,3 @@
-"""Between fabrics and after edits: methods whose errors and times are known, and a tiny untrained network."""
-
 import time
 
 import pytest

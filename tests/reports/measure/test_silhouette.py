@@ -1,5 +1,3 @@
-"""The edge of a cloth cylinder: geometry against closed forms, comparisons that know their answer."""
-
 import numpy as np
 import pytest
 

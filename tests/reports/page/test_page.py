@@ -1,5 +1,3 @@
-"""The page: its files, what it says, and what keyboard and screen reader meet."""
-
 import itertools
 import re
 from dataclasses import replace

@@ -1,5 +1,3 @@
-"""Pictures of a page: their order, and strips of frames."""
-
 import io
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""The table of README.md, reports/RESULTS.md, and blocks that a command writes."""
-
 import math
 
 import pytest

@@ -1,5 +1,3 @@
-"""Errors at equal time: the rival's curve, class by class."""
-
 import math
 
 import pytest

@@ -1,5 +1,3 @@
-"""Tables of a page: cells with intervals and ranges, words, what is marked and what is left out."""
-
 import math
 
 import pytest

@@ -1,5 +1,3 @@
-"""Sentences of a page: what is the cheapest, the paper's comparison, other work on the machine, facts of the limits."""
-
 import math
 
 import pandas as pd

@@ -1,5 +1,3 @@
-"""Frames of a benchmark: means over fabrics and trainings, means over unseen fabrics, the front of two costs."""
-
 import math
 
 import pandas as pd

@@ -1,5 +1,3 @@
-"""The tables of error against time: what is on the front, and what is the cheapest."""
-
 import math
 
 import pandas as pd

@@ -1,5 +1,3 @@
-"""Measured accuracies are what their definitions say, and Records bring them back."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""Every query is counted in one kind."""
-
 import pytest
 
 from reports.truth.effort import CLASSES, RECORDS, measure

@@ -1,5 +1,3 @@
-"""Loss by mean colours: small where a footprint covers many threads, and no bias."""
-
 import pytest
 
 from reports.truth.footprint_colours import RECORDS, measure

@@ -1,5 +1,3 @@
-"""Error against time of path-traced frames: numbers of a tiny frame, Records, and equal times in closed form."""
-
 import math
 
 import pytest

@@ -1,5 +1,3 @@
-"""Rows written as Records come back equal; NaN has no Record; Records of other measurements are left out."""
-
 import math
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,5 +1,3 @@
-"""Every expression holds over its corners, and a form that loses digits there does not pass for one that keeps them."""
-
 import math
 
 import mpmath

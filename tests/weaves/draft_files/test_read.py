@@ -1,5 +1,3 @@
-"""Reading of draft files: what each section means, real files, and what is refused."""
-
 import io
 import signal
 import zipfile

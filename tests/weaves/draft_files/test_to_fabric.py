@@ -1,5 +1,3 @@
-"""Fabrics from drafts: repeats, colours, sizes, assumptions, and what is no cloth."""
-
 import re
 
 import numpy as np

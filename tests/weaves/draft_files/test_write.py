@@ -1,5 +1,3 @@
-"""Draft files that are written: read back they are the same cloth, and other programs can read them."""
-
 import re
 
 import numpy as np

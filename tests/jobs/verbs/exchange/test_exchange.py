@@ -1,5 +1,3 @@
-"""`twillight import`, `export --mesh`, `export --wif` and `view`: the files, what is printed, what cannot be used."""
-
 import numpy as np
 
 from reports.viewer import view

@@ -1,5 +1,3 @@
-"""The folder of maps, read back by other readers, and the sentences for what cannot be written."""
-
 import errno
 import filecmp
 import json

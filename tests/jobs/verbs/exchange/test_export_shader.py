@@ -1,5 +1,3 @@
-"""`twillight export --shader` on the command line: what it writes without a compiler, and what it refuses."""
-
 import json
 import shutil
 

@@ -1,5 +1,3 @@
-"""Published data sets, read by tools that know nothing of this package; stopped, continued and refused."""
-
 import hashlib
 import json
 import shutil

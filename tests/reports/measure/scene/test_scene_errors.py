@@ -1,5 +1,3 @@
-"""Frames of a scene and what is measured on them, at a size of a few pixels."""
-
 import sys
 from types import SimpleNamespace
 
