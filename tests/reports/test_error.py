@@ -4,15 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.truth.query import Answers
-from reports.error import (
-    COLOUR_WEIGHTS,
-    colour_error,
-    colour_noise,
-    component_errors,
-    most_error,
-    ratio,
-    squared_error,
-)
+from reports.error import COLOUR_WEIGHTS, colour_error, colour_noise, component_errors, most_error, ratio, squared_error
 
 
 def answers(mean, standard_error):

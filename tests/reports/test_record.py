@@ -6,15 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from reports.record import (
-    Provenance,
-    Record,
-    machine_path,
-    read_machine,
-    read_records,
-    this_machine,
-    write_records,
-)
+from reports.record import Provenance, Record, machine_path, read_machine, read_records, this_machine, write_records
 from weaves.errors import BadInput
 
 SUBJECT = Record(
