@@ -19,14 +19,8 @@ from weaves.errors import BadInput
 METHOD = """
 class Theirs:
     name, version, setting = "theirs", 3, ""
-
-    def __init__(self, rows=8):
-        pass
-
-    def covers(self, fabric):
-        return True
-
-    prepare = predict = bytes_stored = covers
+    covers = prepare = predict = bytes_stored = lambda self, *rest: True
+    def __init__(self, rows=8): pass
 """
 
 METRIC = '''

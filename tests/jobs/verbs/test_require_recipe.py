@@ -9,6 +9,7 @@ from pipeline.models.curved import CurvedOptions
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.options import TruthOptions
+from tests.jobs.recipe.test_added import METHOD
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -135,17 +136,9 @@ def test_scenes_and_fabrics_by_path_are_found_from_anywhere(tmp_path, monkeypatc
     assert str(tmp_path) not in path.read_text()
 
 
-THEIRS = """
-class Theirs:
-    name, setting, version = "theirs", "", 3
-    covers = prepare = predict = bytes_stored = lambda self, *rest: None
-    def __init__(self, rows=8): pass
-"""
-
-
 def test_a_method_from_outside_keeps_its_name_and_its_options(tmp_path):
     code = tmp_path / "theirs.py"
-    code.write_text(THEIRS, encoding="utf-8")
+    code.write_text(METHOD, encoding="utf-8")
     add = [f"{code}:Theirs"]
     general = load_recipe("quick", add)
     first = narrowed(tmp_path / "r.toml", general, "theirs", options={"rows": 5}, add=add).models[0].options
