@@ -40,7 +40,7 @@ def test_difference_is_blue_where_dark_and_red_where_bright():
     assert outside[3] == 0
 
 
-def test_drawdown_starts_at_the_bottom_left():
+def test_drawdowns_start_at_the_bottom_left_and_in_colours_show_the_thread_on_top():
     fabric = load_fabric("denim")
     picture = decoded(tiles.drawdown(fabric))
     middle = tiles.CELL_PIXELS // 2
@@ -48,9 +48,6 @@ def test_drawdown_starts_at_the_bottom_left():
     picks, ends = fabric.weave.warp_over.shape
     assert (cells[:picks, :ends] == fabric.weave.warp_over).all()
     assert (cells[picks : 2 * picks, :ends] == fabric.weave.warp_over).all()
-
-
-def test_the_drawdown_in_colours_shows_the_thread_on_top():
     fabric = load_fabric("houndstooth")
     picture = decoded(tiles.colours(fabric))
     side = len(picture) // tiles.CELLS

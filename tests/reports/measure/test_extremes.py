@@ -1,4 +1,5 @@
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -7,14 +8,14 @@ import torch
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodesOptions
 from pipeline.models.registry import load_methods, load_model, pretrained_folder
-from pipeline.models.runtimes import runs
+from pipeline.models.runtimes import RUNTIMES, runs
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import faults
 from reports.measure.extremes import FAR, FOOTPRINTS, extremes, lustrous, measure_extremes
-from reports.options import EXTREME_PRECISIONS
+from reports.options import EXTREME_PRECISIONS, RuntimeName
 from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import load_fabric
 
@@ -93,6 +94,10 @@ def test_places_and_sizes_that_change_the_answer_are_seen():
     found = measured(shrink)
     assert found["", "extreme_far"].value == 0.0
     assert found["", "extreme_large"].value == pytest.approx(0.25, rel=0.02)
+
+
+def test_the_names_of_runtimes_are_those_of_the_models():
+    assert set(RUNTIMES) == set(get_args(RuntimeName))
 
 
 @pytest.mark.parametrize("cloth", [LINING, lustrous(TWILL)], ids=lambda fabric: fabric.name)

@@ -41,17 +41,14 @@ def test_of_a_method_with_knobs_the_last_spectrum_and_the_baselines_are_drawn(ma
 
 
 @SCHEMES
-def test_every_method_has_a_colour_of_its_own(scheme):
+def test_every_method_has_a_colour_and_a_mark_of_its_own(scheme):
+    assert len({*(mark for mark, _, _ in METHODS.values()), *MARKS}) == len(METHODS) + len(MARKS)
     names = ["truth", "woven", "neumip", "point_sampled", "woven_wide", "another"]
     colours = scheme.colours(names)
     assert len(set(colours.values())) == len(names)
     assert scheme.colours(["woven", "woven"]) == {"woven": colours["woven"]}
     assert {*CLASSES, *NAMES} <= set(scheme.methods)
     assert len(set(scheme.methods.values()) | set(scheme.others)) == len(scheme.methods) + len(scheme.others)
-
-
-def test_every_model_has_a_mark_that_no_other_has():
-    assert len({*(mark for mark, _, _ in METHODS.values()), *MARKS}) == len(METHODS) + len(MARKS)
 
 
 def test_a_page_gives_names_their_colours_for_good():

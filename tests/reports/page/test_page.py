@@ -88,13 +88,10 @@ def test_the_headline_and_the_front(folder, page):
     assert set(front.loc[~front["front"], "method"]) == {"neumip"}
 
 
-def test_page_says_what_it_is_made_of(page, page_input):
+def test_every_section_shows_its_numbers_and_what_they_are_made_of(folder, page, page_input):
+    """Sections in their order, each in the navigation, and a row of each table that no other test looks at."""
     made_of = ["fedcba9876543210", "tiny-01234567", "0011223344556677", page_input.machine.cpu, "1.51 %"]
     assert all(fact in page.words for fact in [*made_of, "<script>alert('cloth')</script> & more"])
-
-
-def test_every_section_shows_its_numbers(folder, page):
-    """Sections in their order, each in the navigation, and a row of each table that no other test looks at."""
     ids = [section["id"] for section in page.all("section")]
     assert ids == list(WORDS["sections"]) and set(ids) <= set(page.targets)
     words = page.words.replace(" ", "")
@@ -238,11 +235,8 @@ def test_the_style_has_no_motion_and_takes_its_colours_from_the_schemes(page):
     assert "outline: none" not in style and ":focus-visible" in style
 
 
-def test_words_are_escaped_and_code_is_marked():
+def test_yarns_have_their_diffuse_and_their_specular_colours_and_words_are_escaped():
     assert prose("a < b in `c`") == "a &lt; b in <code>c</code>"
-
-
-def test_yarns_have_their_diffuse_and_their_specular_colours():
     denim = load_fabric("denim")
     warp, weft = fabric_card(denim, "seen")["yarns"]
     yarn = {"diffuse": denim.warp.diffuse_rgb, "specular": denim.warp.specular_rgb}

@@ -10,16 +10,13 @@ from reports.tables import sentences as told
 
 
 def test_the_cheapest_within_each_limit_is_said():
-    table = pd.DataFrame(
-        {
-            "role": ["seen", "seen", "seen", "unseen"],
-            "method": ["prefiltered", "soft_nodes", "woven", "woven"],
-            "setting": ["", "k = 4", "", ""],
-            "ns": [240.0, 1500.0, 4000.0, 4000.0],
-            "error": [0.1, 0.04, 0.05, 0.011],
-            "flicker": [0.03, 0.02, 0.002, math.nan],
-        }
-    )
+    rows = [
+        ("seen", "prefiltered", "", 240.0, 0.1, 0.03),
+        ("seen", "soft_nodes", "k = 4", 1500.0, 0.04, 0.02),
+        ("seen", "woven", "", 4000.0, 0.05, 0.002),
+        ("unseen", "woven", "", 4000.0, 0.011, math.nan),
+    ]
+    table = pd.DataFrame(rows, columns=["role", "method", "setting", "ns", "error", "flicker"])
     seen, unseen = (text.replace("\u00a0", " ") for text in told.cheapest_sentences(table))
     assert seen == (
         "Seen fabrics, error of the colour: cheapest within 10 %: prefiltered (240 ns); cheapest within 5 %: soft "
@@ -61,16 +58,8 @@ def test_scenes_name_the_cheapest_and_what_is_in_the_noise():
 
 
 def test_the_trade_names_the_cheapest_methods_and_what_two_points_get():
-    table = pd.DataFrame(
-        {
-            "role": "seen",
-            "method": ["point_sampled", "soft_nodes", "woven"],
-            "setting": ["k = 2", "k = 1", ""],
-            "fabrics": 8,
-            "ns": [500.0, 1000.0, 4000.0],
-            "error": [0.4, 0.045, 0.03],
-        }
-    )
+    rows = [("point_sampled", "k = 2", 500.0, 0.4), ("soft_nodes", "k = 1", 1000.0, 0.045), ("woven", "", 4000.0, 0.03)]
+    table = pd.DataFrame(rows, columns=["method", "setting", "ns", "error"]).assign(role="seen", fabrics=8)
     lead, figures = told.trade(table)
     assert lead.replace("\u00a0", " ") == (
         "A pixel of two random points has an error of 40 % on the 8 seen fabrics. Cheapest within 10 % and 5 % error: "

@@ -94,11 +94,7 @@ def test_records_hold_the_findings_and_the_textbooks_lost_values_apart():
         found([1.0, 2.0], [1.0, 2.000002], naive=[math.nan, 3.0]),
         judge("y", "a | b", "float64", {"y": [3.0]}, [-1.0], [1.0], 1e-9),
     ]
-    assert (findings[0].naive, findings[0].naive_not_finite, findings[0].holds) == (
-        pytest.approx(0.5, rel=1e-5),
-        1,
-        True,
-    )
+    assert findings[0].naive == pytest.approx(0.5, rel=1e-5) and findings[0].holds and findings[0].naive_not_finite == 1
     again = RECORDS.from_records(RECORDS.to_records(findings))
     assert again[0] == findings[0]
     assert [(f.corner, f.fault) for f in again] == [(f.corner, f.fault) for f in findings]
