@@ -18,6 +18,7 @@ import twillight
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Answers
 from tests.datasets import write_dataset
+from tests.refusals import refusal
 from twillight import BadInput, Dataset, Queries, evaluate, load_fabric, load_model, open_dataset
 
 ROOT = Path(__file__).parents[1]
@@ -133,14 +134,12 @@ def test_evaluate_takes_lists_and_double_precision():
 )
 def test_bad_input_of_evaluate_is_one_sentence(change, options, sentence):
     queries = Queries.round(u=[0.5], v=[0.5], sigma=[0.3], wi=[[0, 0, 1]], wo=[[0, 0, 1]])._replace(**change)
-    with pytest.raises(BadInput, match=re.escape(sentence)):
-        evaluate(load_fabric("denim"), queries, **options)
+    assert sentence in refusal(evaluate, load_fabric("denim"), queries, **options)
 
 
 @pytest.mark.parametrize("name", ["selvege", "no/such/folder"])
 def test_a_model_that_does_not_exist(name):
-    with pytest.raises(BadInput, match="selvage"):
-        load_model(name)
+    assert "selvage" in refusal(load_model, name)
 
 
 def test_rows_are_the_same_in_every_form(dataset):
@@ -183,8 +182,7 @@ def test_all_fabrics_of_a_split(dataset):
     ],
 )
 def test_bad_input_of_a_dataset_is_one_sentence(call, sentence, dataset):
-    with pytest.raises(BadInput, match=re.escape(sentence)):
-        call(dataset)
+    assert sentence in refusal(call, dataset)
 
 
 FORKED = """
