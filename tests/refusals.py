@@ -1,8 +1,26 @@
 """Refusals of bad input: one short sentence."""
 
+import signal
+from contextlib import contextmanager
+
 import pytest
 
 from weaves.errors import MOST_LETTERS, BadInput
+
+
+@contextmanager
+def ends(seconds=300):
+    """Fail, rather than wait, where a reader does not return; so long is far above what any takes."""
+
+    def late(number, frame):
+        raise AssertionError(f"it takes more than {seconds} s")
+
+    signal.signal(signal.SIGALRM, late)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
 
 
 def sentence_of(refused):

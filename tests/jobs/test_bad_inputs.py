@@ -6,7 +6,6 @@ import os
 import resource
 import shlex
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -25,13 +24,12 @@ from jobs.cli import main
 from jobs.recipe.load import load_recipe
 from pipeline.scenes.catalogue import load_scene
 from reports.record import Record, this_machine, write_records
-from tests.refusals import accepted
+from tests.refusals import accepted, ends
 from tests.weaves.draft_files.drafts import wif
 from weaves.draft_files.write import wif_text
 from weaves.errors import MOST_LETTERS, BadInput
 from weaves.fabric import load_fabric
 
-SECONDS = 300  # a pipe that is opened would wait for ever
 MEMORY = 1 << 30
 
 FORMATS = {
@@ -261,20 +259,12 @@ def faults(code, sentence, shown, words=()):
 def wrong_end(command, capsys, words=""):
     """Run a command that must be refused; return what is wrong with its end, its sentence, and files that it left."""
     before = set(Path().iterdir())
-    signal.signal(signal.SIGALRM, _late)
-    signal.alarm(SECONDS)
-    try:
+    with ends():  # a pipe that is opened would wait for ever
         code = main(shlex.split(command))
-    finally:
-        signal.alarm(0)
     captured = capsys.readouterr()
     wrong = faults(code, captured.err, captured.out, words.split(" & "))
     wrong += [f"wrote {name}" for name in set(Path().iterdir()) - before]
     return [(command[:100], wrong, code, captured.err[:1000])] if wrong else []
-
-
-def _late(number, frame):
-    raise AssertionError(f"it takes more than {SECONDS} s")
 
 
 @pytest.mark.parametrize(

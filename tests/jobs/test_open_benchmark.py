@@ -172,7 +172,6 @@ def test_methods_that_fail_leave_the_others_their_results(entered):
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
     assert "hangs: predict took longer than 5 s, its limit" in last and "--add late.py:Late" in last
-
     records = [path for path in (entered / "out" / "records").glob("*.json") if "machine" not in path.name]
     timing = {path.name: read_records([path]) for path in records if "tim" in path.name}
     frame = next(found for name, found in timing.items() if "plane" in name)

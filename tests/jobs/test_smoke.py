@@ -19,10 +19,8 @@ def test_the_smoke_recipe_from_fabrics_to_the_page(tmp_path, capsys):
     # What a run leaves: nothing half-written, nothing outside these folders.
     assert {path.name for path in out.iterdir()} == {"datasets", "ledger", "models", "records", "report"}
     assert not list(out.rglob(".tmp-*"))
-
     assert main(["run", "smoke", "--out", str(out)]) == 0
     assert f"nothing to do: {len(tasks)} tasks done" in capsys.readouterr().out
-
     # What a scene requires is chosen from that page, and its recipe is one.
     asked = ["require", "curtain", "--out", str(out), "--recipe", "smoke", "--frames", "1"]
     assert main([*asked, "--error", "0.5"]) == 0, capsys.readouterr().err
@@ -34,7 +32,6 @@ def test_the_smoke_recipe_from_fabrics_to_the_page(tmp_path, capsys):
     # A wish that nothing meets is answered with the nearest points of the front.
     assert main([*asked, "--error", "1e-9", "--time", "1e-3"]) == 2
     assert "nearest points of the front" in capsys.readouterr().err
-
     shard = out / tasks[0].products[0]
     whole = shard.read_bytes()
     shard.write_bytes(whole[: len(whole) // 2])

@@ -22,11 +22,8 @@ def test_no_text_moves_the_cursor_or_is_markup():
         assert "[red]name[/nothing] :smile:" in text
 
 
-def test_lines_and_columns_are_as_they_were():
+def test_lines_columns_and_styles_of_our_own_are_as_they_were():
     assert shown("a\nb  é 織") == "a\nb  é 織\n"
-
-
-def test_styles_of_our_own_stay():
     stream = io.StringIO()
     Terminal(file=stream, force_terminal=True, color_system="standard").print("name", style="bold")
     assert stream.getvalue() == "\x1b[1mname\x1b[0m\n"

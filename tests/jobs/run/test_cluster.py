@@ -12,6 +12,7 @@ import urllib.request
 from http.server import HTTPServer, SimpleHTTPRequestHandler
 from itertools import product
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import distributed
 import psutil
@@ -215,20 +216,14 @@ def test_a_dashboard_is_an_address_with_a_page(path, there):
     """A scheduler without one names its address too."""
     with HTTPServer(("127.0.0.1", 0), SimpleHTTPRequestHandler) as server:
         threading.Thread(target=server.handle_request, daemon=True).start()
-        crew = _crew(f"http://127.0.0.1:{server.server_port}/{path}")
-        assert crew.dashboard == (crew._client.dashboard_link if there else None)
+        address = f"http://127.0.0.1:{server.server_port}/{path}"
+        client = SimpleNamespace(dashboard_link=address, subscribe_topic=lambda *given: None, nthreads=dict)
+        crew = Crew(client, True, print)
+        assert crew.dashboard == (address if there else None)
     assert crew.dashboard is None  # nobody answers
 
 
-def _crew(dashboard):
-    client = SimpleNamespace(dashboard_link=dashboard, subscribe_topic=lambda *given: None, nthreads=dict)
-    return Crew(client, True, print)
-
-
 def test_workers_that_cannot_start_are_no_bug(monkeypatch, tmp_path):
-    def broken(**options):
-        raise RuntimeError("Nanny failed to start.\nmore")
-
-    monkeypatch.setattr(distributed, "LocalCluster", broken)
+    monkeypatch.setattr(distributed, "LocalCluster", Mock(side_effect=RuntimeError("Nanny failed to start.\nmore")))
     with pytest.raises(WorkFailed, match=r"could not start: Nanny failed to start\.$"):
         fake.run(SHARDS, tmp_path)

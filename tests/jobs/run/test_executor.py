@@ -165,7 +165,6 @@ def test_a_run_on_processes_of_this_machine(tmp_path, monkeypatch):
     monkeypatch.setattr(executor, "kernel_groups", lambda todo: groups)
     heard = fake.Heard()
     summary = fake.run(tasks, tmp_path, workers=2, manifests=[heard])
-
     assert set(titles(summary.ran)) == {"good", "victim", "fine", *titles(timed)} == {*heard} - {"saved"}
     assert set(titles(summary.failed)) == {"bad", "forgetful", "late"} and titles(summary.waiting) == ["stuck"]
     ledger = Ledger(tmp_path)

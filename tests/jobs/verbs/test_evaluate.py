@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pyarrow as pa
@@ -73,10 +74,7 @@ def test_bad_rows_are_listed_when_skipped(evaluate, tmp_path):
 
 
 def test_ctrl_c_says_that_nothing_was_written(evaluate, tmp_path, monkeypatch):
-    def stop(*arguments, **options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(pipeline.shards.evaluate, "estimate", stop)
+    monkeypatch.setattr(pipeline.shards.evaluate, "estimate", Mock(side_effect=KeyboardInterrupt))
     assert evaluate() == (130, "", "stopped; result.parquet was not written", None)
     assert [path.name for path in tmp_path.iterdir()] == ["queries.parquet"]
 

@@ -1,6 +1,7 @@
 import re
 import sys
 from functools import partial
+from unittest.mock import Mock
 
 import matplotlib.image
 import numpy as np
@@ -134,11 +135,7 @@ def test_a_film_has_the_frames_that_are_asked_for_and_needs_its_library(render, 
 
 def test_a_stopped_picture_leaves_what_was_there(render, tmp_path, monkeypatch):
     (tmp_path / "a.png").write_bytes(b"before")
-
-    def stopped(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(jobs.verbs.render, "displayed", stopped)
+    monkeypatch.setattr(jobs.verbs.render, "displayed", Mock(side_effect=KeyboardInterrupt))
     code, _, complaint = render("plane", "--out", "a.png", "--method", "soft_nodes", *SMALL)
     assert code == 130 and complaint == "stopped; a.png is as it was before\n"
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]

@@ -16,9 +16,7 @@ def test_the_curve_of_a_parameter_is_straight_in_both_logarithms():
     assert error_at(curve, 250.0) == pytest.approx(250.0**-0.5)
     assert math.isnan(error_at(curve, 99.0))
     assert error_at(curve, 1e6) == pytest.approx(1600.0**-0.5)
-
     assert error_at([(100.0, 0.1), (200.0, 0.5), (400.0, 0.05)], 200.0) == pytest.approx(math.sqrt(0.1 * 0.05))
-
     curve = [(100.0, 0.2), (200.0, 0.0), (400.0, 0.1)]
     assert error_at(curve, 150.0) == pytest.approx(0.2)
     assert error_at(curve, 300.0) == error_at(curve, 500.0) == 0.0

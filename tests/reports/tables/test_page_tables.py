@@ -27,7 +27,6 @@ def cells_of(table, label):
 def test_a_table_has_numbers_on_the_right_and_settings_of_a_method_are_a_group():
     table = markdown_table(("method", "ns"), [("points", "12"), ("woven", "3")])
     assert table.splitlines() == ["| method | ns |", "| :-- | --: |", "| points | 12 |", "| woven | 3 |"]
-
     settings = ("a", "1"), ("a", "2"), ("b", "")
     rows = [TableRow(f"{name}", (TableCell("1"),), name, setting) for name, setting in settings]
     groups = ResultTable("t", ("method", "x"), tuple(rows)).groups

@@ -2,6 +2,7 @@ import errno
 import filecmp
 import json
 import shutil
+from unittest.mock import Mock
 
 import MaterialX
 import numpy as np
@@ -149,11 +150,8 @@ def test_maps_of_before_are_replaced_and_other_files_stay(folder, tmp_path, caps
 def test_a_full_disk_leaves_the_maps_of_before(folder, tmp_path, monkeypatch, capsys):
     made = tmp_path / "made"
     shutil.copytree(folder, made)
-
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(maps, "write_texture", full)
+    full = OSError(errno.ENOSPC, "No space left on device")
+    monkeypatch.setattr(maps, "write_texture", Mock(side_effect=full))
     assert call("denim", "--maps", str(made), "--size", "64") == 1
     assert "No space left" in capsys.readouterr().err
     assert not filecmp.dircmp(folder, made).diff_files and len([*made.iterdir()]) == len([*folder.iterdir()])
