@@ -103,8 +103,7 @@ def test_the_text_is_enough(entered):
     assert len(re.findall(r"<tr[^>]*>\s*<t[hd][^>]*>(?:<[^>]*>|\s)*nearest[ _]table", html)) > 3, "a row in each table"
     assert "nothing to do" in run(COMMAND, entered).stdout
     without = run(COMMAND.partition(" --add")[0], entered)
-    assert without.returncode == 2
-    assert "'nearest_table'" in without.stderr and "--add FILE.py:CLASS" in without.stderr
+    assert without.returncode == 2 and "'nearest_table'" in without.stderr and "--add FILE.py:CLASS" in without.stderr
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,7 @@ def test_times_stay_apart_and_equal_numbers_are_kept_once_those_that_differ_both
     assert (joined.shared, joined.unlike) == (1, [])
     other = MSE.model_copy(update={"value": 2.5})
     joined = join({"A": [MSE], "B": [other]})
-    assert joined.records == [MSE, of("B", other)]
-    assert joined.unlike == [(MSE, other)]
+    assert joined.records == [MSE, of("B", other)] and joined.unlike == [(MSE, other)]
 
 
 @pytest.mark.parametrize(

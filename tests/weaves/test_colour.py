@@ -6,8 +6,7 @@ from weaves.colour import Spectrum, delta_e, encoded, linear_rgb
 
 def test_hex_is_decoded_by_the_srgb_curve():
     """IEC 61966-2-1: below 0.04045 a line, above it ((c + 0.055)/1.055)^2.4."""
-    assert linear_rgb("#000000") == (0, 0, 0)
-    assert linear_rgb("#FFFFFF") == pytest.approx((1, 1, 1))
+    assert linear_rgb("#000000") == (0, 0, 0) and linear_rgb("#FFFFFF") == pytest.approx((1, 1, 1))
     assert linear_rgb("#0a80ff") == pytest.approx((10 / 255 / 12.92, ((128 / 255 + 0.055) / 1.055) ** 2.4, 1))
 
 

@@ -38,8 +38,7 @@ def test_floats_agree_with_a_walk_along_the_yarns(matrix):
 @given(matrices)
 def test_drawing_reads_back(matrix):
     draft = Draft(matrix)
-    assert Matrix(rows=draft.rows()).build() == draft
-    assert draft.text().count("██") == matrix.sum()
+    assert Matrix(rows=draft.rows()).build() == draft and draft.text().count("██") == matrix.sum()
 
 
 @settings(deadline=None)
@@ -66,8 +65,7 @@ def test_cloth_hangs_together_unless_some_yarns_lie_on_all_others(matrix):
 
 def test_drawing_has_pick_0_at_the_bottom_and_rolling_moves_the_repeat():
     draft = Matrix(rows=["#..", "##."]).build()
-    assert draft.repeat == (3, 2)
-    assert draft.warp_over.tolist() == [[True, True, False], [True, False, False]]
+    assert draft.repeat == (3, 2) and draft.warp_over.tolist() == [[True, True, False], [True, False, False]]
     assert draft.text() == "██· · \n████· "
     assert Matrix(rows=["...", "#.."]).build().rolled(1, 1).rows() == [".#.", "..."]
 
@@ -112,8 +110,7 @@ def test_draft_is_a_read_only_copy_and_survives_pickling():
     assert draft.warp_over[0, 0]
     with pytest.raises(ValueError, match="read-only"):
         draft.warp_over[0, 0] = False
-    assert pickle.loads(pickle.dumps(draft)) == draft
-    assert hash(pickle.loads(pickle.dumps(draft))) == hash(draft)
+    assert pickle.loads(pickle.dumps(draft)) == draft and hash(pickle.loads(pickle.dumps(draft))) == hash(draft)
 
 
 def test_different_cells_are_those_no_translation_carries_into_another():

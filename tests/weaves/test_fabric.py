@@ -46,15 +46,13 @@ tables = st.fixed_dictionaries(
 def test_a_fabric_reads_back_from_its_own_file(tmp_path_factory, fabric):
     path = tmp_path_factory.mktemp("fabric") / "cloth.toml"
     path.write_text(fabric.to_toml(), encoding="utf-8", newline="")
-    assert load_fabric(path) == fabric
-    assert Fabric.model_validate(json.loads(fabric.model_dump_json())) == fabric
+    assert load_fabric(path) == fabric and Fabric.model_validate(json.loads(fabric.model_dump_json())) == fabric
 
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_preset_is_a_cloth_with_a_source(name):
     fabric = load_fabric(name)
-    assert fabric.name == name
-    assert "chosen here" in fabric.source or "Irawan" in fabric.source
+    assert fabric.name == name and ("chosen here" in fabric.source or "Irawan" in fabric.source)
     # It hangs together: every yarn changes side, and no float is so short that it would be drawn flat.
     floats = cells(fabric.weave)
     assert max(floats.top_length.max(), floats.under_length.max()) < float("inf")
@@ -81,8 +79,7 @@ def test_the_physical_size_is_left_out_where_it_is_unknown():
 def test_optics_see_shape_but_neither_colour_name_or_source_nor_how_the_draft_was_written():
     white = denim.warp.model_copy(update={"diffuse": "#ffffff"})
     painted = denim.model_copy(update={"name": "x", "source": "", "warp": white})
-    assert painted.optics() == denim.optics()
-    assert json.loads(json.dumps(denim.optics())) == denim.optics()
+    assert painted.optics() == denim.optics() and json.loads(json.dumps(denim.optics())) == denim.optics()
     rows = {"family": "matrix", "rows": [".###", "###.", "##.#", "#.##"]}
     assert Fabric.model_validate(denim.model_dump() | {"draft": rows}).optics() == denim.optics()
 

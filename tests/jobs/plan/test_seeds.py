@@ -37,8 +37,7 @@ def of(tasks, kind, name="woven"):
 
 def test_more_seeds_add_trainings_and_change_none(one, three, files):
     before, after = of(one, Training), of(three, Training)
-    assert list(before) == [0] and list(after) == [0, 1, 2]
-    assert len({task.id for (task,) in after.values()}) == 3
+    assert list(before) == [0] and list(after) == [0, 1, 2] and len({task.id for (task,) in after.values()}) == 3
     assert {task.training.model_copy(update={"seed": 0}) for (task,) in after.values()} == {before[0][0].training}
     assert after[2][0].title == "woven on 5 fabrics, seed 2"
     assert_changed(one, three, "^report")
@@ -86,7 +85,6 @@ def test_the_note_on_a_model_and_its_records_name_the_seeds(one, three):
     (note,) = [note for note in three[-1].models if note.name == "woven"]
     assert "3 trainings with the seeds 0 to 2" in note.about
     trained = {seed: task.id for seed, (task,) in of(three, Training).items()}
-    assert note.fingerprint == trained[0]
-    assert not any("trainings with" in note.about for note in one[-1].models)
+    assert note.fingerprint == trained[0] and not any("trainings with" in note.about for note in one[-1].models)
     for seed, same in of(three, OnFabric).items():
         assert (same[0].provenance.seed, same[0].provenance.model) == (seed, trained[seed])

@@ -57,8 +57,7 @@ def test_workers_of_somebody_elses_scheduler(tmp_path, processes, capfd):
     capfd.readouterr()
     with pytest.raises(WorkFailed, match="the dask scheduler is gone"):
         fake.run(tasks, out, scheduler=processes.given, manifests=[kill])
-    assert Ledger(out).state(tasks[0]) == "done"
-    assert capfd.readouterr().err == ""
+    assert Ledger(out).state(tasks[0]) == "done" and capfd.readouterr().err == ""
 
 
 def test_a_task_that_fails_on_one_worker_is_tried_on_another(tmp_path, processes, monkeypatch):
@@ -107,8 +106,7 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_task(tmp_path, pro
 
     before = fake.Heard(join)
     summary = fake.run(tasks, tmp_path, shown, scheduler=processes.given, manifests=[before])
-    assert len(summary.ran) == 8
-    assert len({event["pid"] for event in fake.events(tmp_path)}) == 1
+    assert len(summary.ran) == 8 and len({event["pid"] for event in fake.events(tmp_path)}) == 1
     assert shown.file.getvalue().count("gets no task: it has numba 0.1") == 1
 
 

@@ -28,8 +28,7 @@ def kinds(found):
 def test_two_data_sets_of_one_recipe_are_sound(trade):
     recipe, tasks, ledger = trade
     shares = []
-    assert faults(*trade, shares.append) == []
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert faults(*trade, shares.append) == [] and shares == sorted(shares) and shares[-1] == 1.0
     left = {path for path in made_up.contents(ledger.out) if not path.startswith("ledger/")}
     assert left <= set(own_files(recipe, tasks, ledger.out))
 
@@ -44,8 +43,7 @@ def test_each_copy_of_a_shared_shard_is_read(trade):
     assert kinds(faults(recipe, tasks, ledger)) == [("damaged", shared.products[1])]
     assert ledger.discard(shared) == [shared.products[1]]
     # The sound copy gives the bytes again.
-    assert ledger.adopt(shared) and second.read_bytes() == content
-    assert faults(recipe, tasks, ledger) == []
+    assert ledger.adopt(shared) and second.read_bytes() == content and faults(recipe, tasks, ledger) == []
 
 
 def test_a_manifest_of_either_data_set_is_compared(trade):

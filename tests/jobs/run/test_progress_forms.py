@@ -75,8 +75,7 @@ def test_lines_have_failures_rate_time_left_and_dashboard(clock):
     assert lines[0].startswith("compiling kernels: ")
     assert "4 tasks (generate 4) on 2 workers; dashboard: http://here:8787/status" in lines
     assert "failed: generate shard 1: [the] disk was full" in lines
-    assert "again: generate shard 2: OSError: once" in lines
-    assert lines[-1] == "nothing new"
+    assert "again: generate shard 2: OSError: once" in lines and lines[-1] == "nothing new"
     out = io.StringIO()
     with Board(TASKS, Estimate(), form_of("plain", Console(file=out, width=200))) as board:
         board.start(1, None)
@@ -91,8 +90,7 @@ def test_lines_have_failures_rate_time_left_and_dashboard(clock):
 
 def test_bars_have_failures_rate_and_dashboard(clock):
     text = run(clock, "rich")
-    assert "dashboard: http://here:8787/status" in text
-    assert "2/4 tasks, 1 failed" in text and "4 tasks/min" in text
+    assert "dashboard: http://here:8787/status" in text and "2/4 tasks, 1 failed" in text and "4 tasks/min" in text
 
 
 def test_auto_shows_bars_on_a_terminal_alone():

@@ -43,8 +43,7 @@ def same(found, expected, but=()):
 
 def test_a_finished_recipe_is_sound_and_what_is_left_to_do_is_missing(run):
     code, said, told = run()
-    assert code == 0 and told == ""
-    assert "4 shards with 224 rows, 2 models" in said and "are sound" in said
+    assert code == 0 and told == "" and "4 shards with 224 rows, 2 models" in said and "are sound" in said
     shutil.rmtree(run.out)
     code, said, told = run()
     assert code == 1 and "sound" not in said
@@ -62,14 +61,12 @@ def test_a_shard_that_is_gone_and_files_cut_short_are_named_and_made_again(run):
     expected, shard, training = made_up.contents(run.out), run.of(Shard), run.of(Training)
     (run.out / shard.products[0]).unlink()
     code, _, told = run()
-    assert code == 1 and f"{run.out / shard.products[0]}: missing" in told
-    assert run("--repair")[0] == 0
+    assert code == 1 and f"{run.out / shard.products[0]}: missing" in told and run("--repair")[0] == 0
     same(made_up.contents(run.out), expected, but=[f"ledger/{shard.id}.json"])
     for path in (shard.products[0], training.products[0]):
         (run.out / path).write_bytes(expected[path][:-1])
     code, _, told = run()
-    assert code == 2 and told.count(": cut: it has") == 2
-    assert run("--repair")[0] == 0
+    assert code == 2 and told.count(": cut: it has") == 2 and run("--repair")[0] == 0
     same(made_up.contents(run.out), expected)
 
 
@@ -88,8 +85,7 @@ def test_a_page_of_other_measurements_is_outdated(run):
     page = run.of(Page)
     (run.out / "ledger" / f"{page.id}.json").unlink()
     code, _, told = run()
-    assert code == 1 and f"{run.out / page.products[0]}: outdated" in told
-    assert run("--repair")[0] == 0
+    assert code == 1 and f"{run.out / page.products[0]}: outdated" in told and run("--repair")[0] == 0
 
 
 def test_values_that_were_never_right_are_odd(run):

@@ -46,8 +46,7 @@ def test_what_a_stopped_training_goes_on_from_is_kept(two, tmp_path):
         for name in ("checkpoint.safetensors", ".tmp-card.json"):
             (out / training.folder / name).write_text("x")
     two("narrow.toml", "--delete")
-    assert len(list(out.glob("models/*/checkpoint.safetensors"))) == 1
-    assert not list(out.glob("models/*/.tmp-*"))
+    assert len(list(out.glob("models/*/checkpoint.safetensors"))) == 1 and not list(out.glob("models/*/.tmp-*"))
 
 
 def test_bytes_of_shards_that_another_data_set_keeps_are_not_counted(two, tmp_path):

@@ -37,8 +37,7 @@ def test_truth_and_measurements_are_those_of_the_general_recipe(tmp_path):
     assert own.bench.scenes.model_copy(update={"names": ()}) == QUICK.bench.scenes.model_copy(update={"names": ()})
     assert own.bench.scenes.names == ("sphere",) and not own.bench.bounds
     assert [model.options.name for model in own.models] == ["woven", "point_sampled"]
-    assert own.models[1].options.counts == [2]
-    assert [fabric.name for fabric in own.fabrics] == ["denim"]
+    assert own.models[1].options.counts == [2] and [fabric.name for fabric in own.fabrics] == ["denim"]
 
 
 def _with_macro(options, **more):
@@ -66,8 +65,7 @@ def test_a_table_that_cannot_answer_makes_way_for_sampling_at_a_stated_error(tmp
     general = dataclasses.replace(curved, dataset=curved.dataset.model_copy(update={"training_truth": table}))
     bent = require(QueryOptions(sigma=sigma, curvature=(0.01, 0.1)))
     own = narrowed(tmp_path / "r.toml", general, "curved", requirement=bent)
-    assert own.dataset.queries.curvature[1] > 0
-    assert own.dataset.training_truth == SAMPLED
+    assert own.dataset.queries.curvature[1] > 0 and own.dataset.training_truth == SAMPLED
 
 
 def test_the_training_is_cut_by_the_effort_and_its_average_with_it(tmp_path):

@@ -29,8 +29,7 @@ def test_ticks_of_both_signs_are_powers_of_ten_and_few():
 @pytest.mark.parametrize("count", [1, 5, 40])
 def test_labels_keep_apart(count):
     places = figures._apart([0.1 * (index // 3) for index in range(count)], 0.2, 3.0)
-    assert all(b - a >= 0.2 - 1e-9 for a, b in pairwise(places))
-    assert places[-1] <= 3.0
+    assert all(b - a >= 0.2 - 1e-9 for a, b in pairwise(places)) and places[-1] <= 3.0
 
 
 def test_of_a_method_with_knobs_the_last_spectrum_and_the_baselines_are_drawn(made_up):

@@ -68,8 +68,7 @@ def test_scenes_mark_their_fronts_and_the_papers_step():
     # A flicker of 0 is the truth's and cannot be drawn; one below 0 is drawn by its size.
     assert below.lines[0].get_xydata().tolist() == [[10.0, 0.1], [80.0, 0.01]]
     (arrow,) = [text for text in above.texts if text.arrow_patch]
-    assert arrow.xy == pytest.approx((8.3, 0.2 / 4.1))
-    assert not below.texts
+    assert arrow.xy == pytest.approx((8.3, 0.2 / 4.1)) and not below.texts
     assert figure.legends[0].get_texts()[-1].get_text() == "the paper: 4.1× lower at 0.83× the time"
 
 

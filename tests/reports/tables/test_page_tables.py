@@ -34,8 +34,7 @@ def test_a_table_has_numbers_on_the_right_and_settings_of_a_method_are_a_group()
 
 
 def test_a_paragraph_without_its_value_is_left_out():
-    assert paragraphs(["a {b}", "c"], {"b": 1}) == ["a 1", "c"]
-    assert paragraphs(["a {b}", "c"], {}) == ["c"]
+    assert paragraphs(["a {b}", "c"], {"b": 1}) == ["a 1", "c"] and paragraphs(["a {b}", "c"], {}) == ["c"]
 
 
 def test_networks_trained_once_are_left_out_of_a_single_unseen_fabric(made_up, three_trainings):
@@ -122,8 +121,7 @@ def test_a_scene_has_the_range_over_trainings_beside_its_interval():
 def test_numbers_of_a_scene_have_their_intervals_and_the_last_row_is_the_truths_noise():
     table = attic(RECORDS)
     shown = {title: (cell.text, cell.interval) for title, cell in cells_of(table, "woven").items()}
-    assert shown["MSE"] == ("2.00e−3", "(1.80 … 2.30)e−3")
-    assert shown["PSNR, dB"] == ("31.2", "(30.1 … 32.9)")
+    assert shown["MSE"] == ("2.00e−3", "(1.80 … 2.30)e−3") and shown["PSNR, dB"] == ("31.2", "(30.1 … 32.9)")
     assert shown["colour"] == ("in the noise", "(0 … 3.1 %)")
     assert shown["flicker"] == ("−2.00e−3", "(−2.10 … 0.35)e−3")
     assert shown["ms a frame"] == ("12.5", "") and shown["SSIM"] == ("–", "")

@@ -145,8 +145,7 @@ def test_the_median_over_methods_is_said():
 )
 def test_a_comparison_warns_of_busy_machines_alone(a, b, words):
     sentences = told.busy(of(a), of(b))
-    assert len(sentences) == bool(words)
-    assert all(words in sentence for sentence in sentences)
+    assert len(sentences) == bool(words) and all(words in sentence for sentence in sentences)
     assert told.busy(of(told.QUIET), []) and told.busy([], []) == []
 
 

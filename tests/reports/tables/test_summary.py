@@ -60,20 +60,17 @@ def test_unseen_fabrics_have_geometric_means():
     more = [*error("woven", "", "crepe", "unseen", 0.8), *error("point_sampled", "k = 2", "crepe", "unseen", 8.0)]
     table = summary.error_table([*RECORDS, *more])
     woven = row(table, method="woven", role="unseen")
-    assert woven.fabrics == 2
-    assert woven.ratio == pytest.approx(13.0 / 2.8)
+    assert woven.fabrics == 2 and woven.ratio == pytest.approx(13.0 / 2.8)
     assert (woven.ratio_fabrics, woven.mse_fabrics) == pytest.approx((5.0, math.sqrt(1.6)))
     assert summary.summary_table([*RECORDS, *more]).loc[("woven", ""), "× lower, unseen"] == pytest.approx(5.0)
 
 
 def test_errors_are_means_over_fabrics():
     woven = row(summary.error_table(RECORDS), method="woven", role="seen")
-    assert (woven.fabrics, woven.queries) == (2, 200)
-    assert woven.mse == pytest.approx(2.0)
+    assert (woven.fabrics, woven.queries) == (2, 200) and woven.mse == pytest.approx(2.0)
     assert woven.standard_error == pytest.approx(0.05 / 2)  # sqrt(.03^2 + .04^2) / 2
     assert (woven.low, woven.high) == pytest.approx((2 - 1.96 * 0.025, 2 + 1.96 * 0.025))
-    assert woven.noise_share == pytest.approx(0.5 / 2.5)
-    assert woven.ratio == pytest.approx(8.0 / 2.0)
+    assert woven.noise_share == pytest.approx(0.5 / 2.5) and woven.ratio == pytest.approx(8.0 / 2.0)
     assert woven.ratio_low < 4 < woven.ratio_high
 
 
@@ -94,8 +91,7 @@ def test_without_the_baseline_or_below_the_noise_there_is_no_ratio():
 def test_fabrics_and_pictures():
     by_fabric = summary.fabric_table(RECORDS)
     assert by_fabric["fabric"].tolist() == ["denim", "basket", "twill_4_4"]
-    assert by_fabric["point_sampled k = 2"].tolist() == [6.0, 10.0, 5.0]
-    assert math.isnan(by_fabric["neumip"][1])
+    assert by_fabric["point_sampled k = 2"].tolist() == [6.0, 10.0, 5.0] and math.isnan(by_fabric["neumip"][1])
     pictures = summary.picture_table(RECORDS)
     assert pictures[["scene", "mse"]].to_numpy().tolist() == [["sphere", 0.5], ["plane", 0.7]]
 
@@ -106,8 +102,7 @@ def test_aliasing_and_timing():
     timing = summary.timing_table(RECORDS)
     woven, truth = row(timing, method="woven"), row(timing, method="truth")
     assert (woven.median_ns, woven.time_ratio, woven.bytes_stored) == pytest.approx((400, 0.8, 350_000))
-    assert truth.time_ratio == pytest.approx(100)
-    assert math.isnan(truth.bytes_stored)
+    assert truth.time_ratio == pytest.approx(100) and math.isnan(truth.bytes_stored)
     # 400 ns a query are .83 s a frame of 1920 by 1080.
     assert woven.frame_ms == pytest.approx(829.44)
     assert math.isnan(woven.most_threads_ns) and math.isnan(woven.prepare_ms) and math.isnan(woven.memory)
@@ -181,8 +176,7 @@ def test_means_over_fabrics_and_albedos_lie_within_the_range_of_the_trainings():
             records += [one.model_copy(update=about) for one in found]
     net = row(summary.error_table(records), method="net")
     names = ["ratio_fabrics", "ratio_fabrics_least", "ratio_fabrics_most", "mse_fabrics"]
-    assert [getattr(net, name) for name in names] == pytest.approx([8.0] * 4)
-    assert net.ratio == pytest.approx(64 / 17)
+    assert [getattr(net, name) for name in names] == pytest.approx([8.0] * 4) and net.ratio == pytest.approx(64 / 17)
     albedo = row(summary.energy_table(records), method="net")
     assert [getattr(albedo, f"furnace_diffuse{end}") for end in ("", "_least", "_most")] == [32.0] * 3
 

@@ -12,8 +12,7 @@ def test_the_comparison_of_normal_errors():
     error = rng.uniform(0.5, 2.0, (200_000, 1))
     wrong, nothing = error * rng.standard_normal(error.shape), np.zeros_like(error)
     ratio, exceeded = compared(wrong, error, 2.9677 * error, nothing)
-    assert ratio == pytest.approx(1.0, rel=0.01)
-    assert exceeded == pytest.approx(0.003, rel=0.15)
+    assert ratio == pytest.approx(1.0, rel=0.01) and exceeded == pytest.approx(0.003, rel=0.15)
     # The reference's own error is subtracted.
     noisy = wrong + error * rng.standard_normal(error.shape)
     ratio, _ = compared(noisy, error, error, error)

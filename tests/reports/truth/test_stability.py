@@ -14,8 +14,7 @@ EXPRESSIONS = list(stability.expressions())
 @pytest.mark.parametrize("name", dict.fromkeys(expression.name for expression in EXPRESSIONS))
 def test_corners_hold(name):
     findings = [finding for row in EXPRESSIONS if row.name == name for finding in stability.judged(row)]
-    assert findings
-    assert [(f.expression, f.corner, f.fault, f.at) for f in failures(findings)] == []
+    assert findings and [(f.expression, f.corner, f.fault, f.at) for f in failures(findings)] == []
 
 
 @pytest.mark.parametrize(("compare", "count"), [(stability.places, 2000), (stability.footprints, 120)])
@@ -73,15 +72,13 @@ def found(value, reference, **more) -> Finding:
 def test_judgement():
     good, wrong = found([1.0, 2.0], [1.0, 2.000002]), found([1.0, 2.0, 3.0], [1.0, 2.00001, 3.0])
     assert (good.holds, good.worst, good.at) == (True, pytest.approx(1e-6, rel=1e-3), "x 1")
-    assert (wrong.holds, wrong.at) == (False, "x 1")
-    assert "beyond the limit 2.0e-06" in wrong.fault
+    assert (wrong.holds, wrong.at) == (False, "x 1") and "beyond the limit 2.0e-06" in wrong.fault
 
 
 @pytest.mark.parametrize(("value", "fault"), [(math.nan, "NaN"), (math.inf, "NaN"), (-1e-12, "negative")])
 def test_impossible_values_fail_however_small_their_error(value, fault):
     finding = found([1.0, 1.0, value], [1.0, 1.0, 1e-12], floor=1.0)
-    assert (finding.holds, finding.at) == (False, "x 2")
-    assert f"1 of 3 values are {fault}" in finding.fault
+    assert (finding.holds, finding.at) == (False, "x 2") and f"1 of 3 values are {fault}" in finding.fault
 
 
 def test_normals_may_point_down_and_count_as_vectors():
@@ -96,5 +93,4 @@ def test_records_hold_the_findings_and_the_textbooks_lost_values_apart():
     ]
     assert findings[0].naive == pytest.approx(0.5, rel=1e-5) and findings[0].holds and findings[0].naive_not_finite == 1
     again = RECORDS.from_records(RECORDS.to_records(findings))
-    assert again[0] == findings[0]
-    assert [(f.corner, f.fault) for f in again] == [(f.corner, f.fault) for f in findings]
+    assert again[0] == findings[0] and [(f.corner, f.fault) for f in again] == [(f.corner, f.fault) for f in findings]

@@ -313,8 +313,7 @@ def test_every_control_has_a_name_and_takes_the_focus(page):
     nameless = """[...document.querySelectorAll("input, select, button, canvas")].filter(element =>
         !(element.getAttribute("aria-label") || element.textContent.trim() || element.closest("label"))
         || element.tabIndex < 0).map(element => element.outerHTML)"""
-    assert page.run(nameless) == []
-    assert page.run("document.querySelectorAll('[data-name]').length") >= 20
+    assert page.run(nameless) == [] and page.run("document.querySelectorAll('[data-name]').length") >= 20
 
 
 def test_without_webgl_a_still_picture_and_a_sentence(whole, tmp_path):
@@ -322,8 +321,7 @@ def test_without_webgl_a_still_picture_and_a_sentence(whole, tmp_path):
     with viewer(whole, tmp_path, without) as own:
         assert own.run("byId('notice').textContent") == ("This is a still picture: This browser has no WebGL 2.")
         assert own.run("byId('still').getBoundingClientRect().width * byId('still').naturalWidth") > 0
-        assert own.run("getComputedStyle(byId('panel')).display") == "none"
-        assert own.errors == []
+        assert own.run("getComputedStyle(byId('panel')).display") == "none" and own.errors == []
 
 
 def test_nothing_is_written_to_the_console_and_nothing_is_asked_for(page):

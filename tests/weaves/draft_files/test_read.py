@@ -46,8 +46,7 @@ def test_the_sections_of_a_twill(read):
     assert (draft.title, draft.program, draft.remarks) == ("Small cloth", "Loom 2", ())
     assert draft.ends.colours == ("#ffffff",) * 8 and draft.picks.colours == ("#aa1020",) * 8
     assert (draft.ends.width, draft.picks.width) == pytest.approx((0.75, 0.5))
-    assert draft.ends.per_cm == pytest.approx(720 / 12 / 2.54)
-    assert draft.picks.per_cm == pytest.approx(1 / 0.254)
+    assert draft.ends.per_cm == pytest.approx(720 / 12 / 2.54) and draft.picks.per_cm == pytest.approx(1 / 0.254)
 
 
 def test_liftplans_several_treadles_and_falling_sheds(read):
@@ -69,8 +68,7 @@ def test_single_colours_and_lengths_of_threads(read):
         wif(WARP_COLORS="2=2\n5=\n8=2", WEFT_COLORS="1=1", WARP_SPACING="1=20\n2=4", WARP_THICKNESS="1=5\n2=3\n3=")
     )
     white, red = "#ffffff", "#aa1020"
-    assert draft.ends.colours == (white, red, *[white] * 5, red)
-    assert draft.picks.colours == (white, *[red] * 7)
+    assert draft.ends.colours == (white, red, *[white] * 5, red) and draft.picks.colours == (white, *[red] * 7)
     assert draft.ends.width == pytest.approx((5 + 3 + 6 * 9) / (20 + 4 + 6 * 12))
 
 

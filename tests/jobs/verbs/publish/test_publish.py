@@ -153,8 +153,7 @@ def test_card_and_citation_have_what_data_hubs_and_the_format_require(published)
     files = {(c["config_name"], file["split"]): file["path"] for c in found["configs"] for file in c["data_files"]}
     assert {key: sum(pq.read_metadata(p).num_rows for p in published.glob(name)) for key, name in files.items()} == ROWS
     assert [config["config_name"] for config in found["configs"] if config.get("default")] == ["seen"]
-    assert all(f"| `{name}` |" in text for name in SCHEMA.names)
-    assert "{" not in text.replace("{{", "")
+    assert all(f"| `{name}` |" in text for name in SCHEMA.names) and "{" not in text.replace("{{", "")
     found = yaml.safe_load((published / "CITATION.cff").read_text(encoding="utf-8"))
     assert {"cff-version", "message", "title", "authors"} <= found.keys()
     assert found["type"] == "dataset" and found["license"] == "CC-BY-4.0"
@@ -195,15 +194,13 @@ def test_a_stopped_run_leaves_nothing_and_is_continued(published, dataset, tmp_p
     own.write_text("mine")
     assert publish(dataset, target) == 2 and own.read_text() == "mine"
     own.unlink()
-    assert publish(dataset, target) == 130
-    assert not target.exists()
+    assert publish(dataset, target) == 130 and not target.exists()
     kept = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in done[1:]}
     done[0].write_bytes(done[0].read_bytes()[:-50] + bytes(50))  # damaged meanwhile
     (done[0].parent / "odd.parquet").touch()
     monkeypatch.undo()
     target.mkdir()
-    assert publish(dataset, target) == 0
-    assert made_up.contents(target) == made_up.contents(published)
+    assert publish(dataset, target) == 0 and made_up.contents(target) == made_up.contents(published)
     moved = [target / path.relative_to(tmp_path / ".tmp-wide") for path in kept]
     assert [(path.stat().st_mtime_ns, path.stat().st_ino) for path in moved] == list(kept.values())
     assert [path.name for path in tmp_path.iterdir()] == ["wide"]
@@ -240,8 +237,7 @@ def test_a_data_set_that_is_not_whole_or_a_folder_that_cannot_be_written_is_refu
     (folder / first.file).unlink()
     assert "does not exist" in unpublished(folder)
     (folder / first.file).write_bytes((folder / second.file).read_bytes())
-    assert file_sha256(folder / first.file) == second.sha256
-    assert "SHA-256" in unpublished(folder)
+    assert file_sha256(folder / first.file) == second.sha256 and "SHA-256" in unpublished(folder)
     (folder / "manifest.json").unlink()
     assert "generate the data set first" in unpublished(folder)
 

@@ -87,8 +87,7 @@ def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores():
     errors = image_errors(CLOTH, truth, size, DISC)
     assert errors.mse.noise == pytest.approx((size[DISC] ** 2).mean())
     for error in (errors.mse, errors.mse_relative):
-        assert abs(error.value) < 5 * error.standard_error
-        assert error.measured == pytest.approx(error.noise, rel=0.1)
+        assert abs(error.value) < 5 * error.standard_error and error.measured == pytest.approx(error.noise, rel=0.1)
         assert error.low < error.value < error.high
     for metric, measure in errors.perceived.items():
         assert measure.value == pytest.approx(measure.floor, rel=0.1), metric
