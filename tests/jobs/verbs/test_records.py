@@ -1,16 +1,8 @@
 import pytest
 
 from pipeline.truth.conventions import COMPONENTS
-from reports.record import (
-    OF_A_PAGE,
-    Provenance,
-    Record,
-    machine_path,
-    read_machine,
-    read_records,
-    this_machine,
-    write_records,
-)
+from reports import record
+from reports.record import OF_A_PAGE, Provenance, Record, read_records, this_machine, write_records
 from reports.tables.documents import markers
 
 
@@ -63,7 +55,7 @@ def test_what_is_not_there_is_one_sentence(call, write, tmp_path):
     (tmp_path / "broken.json").write_text("[1]")
     (tmp_path / "old.json").write_text('[{"method": "woven", "metric": "mean_error", "value": 1.0}]')
     lone = write("lone") / "report/quick" / OF_A_PAGE
-    machine_path(lone).unlink()
+    record.machine_path(lone).unlink()
     for other, words in (
         (tmp_path / "broken.json", "holds no records"),
         (tmp_path / "old.json", "of this version (0.metric: 'mean_error' is no metric of reports.catalogue)"),
@@ -81,7 +73,7 @@ def test_records_of_two_machines_are_joined_and_shown(call, refused, write, tmp_
     records = read_records([out])
     assert [(one.metric, one.value) for one in records] == [("mse", 1e-4), ("time", 50.0), ("time", 20.0)]
     for words in ("2 cores", "64 cores"):
-        assert any(words in one.provenance.machine for one in records) and words in read_machine(out).cpu
+        assert any(words in one.provenance.machine for one in records) and words in record.read_machine(out).cpu
     assert "woven 50 20" in text and "3 Records of 2 machines; 1 are alike" in text
     assert "holds Records of several machines" in refused("compare", out, pages[0])
 

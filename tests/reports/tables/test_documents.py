@@ -3,16 +3,8 @@ import math
 import pytest
 
 from reports.record import Machine, Record
-from reports.tables.documents import (
-    README_METHODS,
-    block,
-    kept_time,
-    markers,
-    readme_block,
-    results_page,
-    two_decimals,
-    with_block,
-)
+from reports.tables import documents
+from reports.tables.documents import README_METHODS, block, markers, readme_block, results_page
 from tests.refusals import refusal
 
 MACHINE = Machine(
@@ -85,9 +77,9 @@ def test_a_fresh_run_changes_no_byte_while_times_are_within_a_quarter(records):
 
 
 def test_a_time_is_kept_within_a_quarter_and_numbers_have_no_sign_at_zero():
-    assert [kept_time("2×", fresh) for fresh in (2.5, 1.6, 2.6, 1.5)] == ["2×", "2×", "2.6×", "1.5×"]
-    assert [kept_time("–", 3.21), kept_time("12×", 11.8)] == ["3.2×", "12×"]
-    assert [two_decimals(value) for value in (-0.004, 0.0, -0.123)] == ["0.00", "0.00", "−0.12"]
+    assert [documents.kept_time("2×", fresh) for fresh in (2.5, 1.6, 2.6, 1.5)] == ["2×", "2×", "2.6×", "1.5×"]
+    assert [documents.kept_time("–", 3.21), documents.kept_time("12×", 11.8)] == ["3.2×", "12×"]
+    assert [documents.two_decimals(value) for value in (-0.004, 0.0, -0.123)] == ["0.00", "0.00", "−0.12"]
 
 
 def test_records_without_the_baseline_or_of_no_recipe_are_refused(records, made_up):
@@ -124,8 +116,8 @@ TEXT = f"before\n{FIRST}\nold\n{LAST}\nafter\n"
 
 def test_a_block_is_replaced_and_nothing_else():
     assert block(TEXT, "speeds", "file") == "old\n"
-    assert with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
-    assert with_block(TEXT, "speeds", "old", "file") == TEXT
+    assert documents.with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
+    assert documents.with_block(TEXT, "speeds", "old", "file") == TEXT
 
 
 @pytest.mark.parametrize("text", ["nothing", f"{FIRST}\nno end", f"{LAST}\n{FIRST}\n"])

@@ -23,6 +23,9 @@ def error(method, setting, fabric, role, mse, noise=0.0, spread=0.0):
     ]
 
 
+PICTURES = [("denim", "sphere", "mse", 0.5), ("denim", "plane", "mse", 0.7), ("denim", "plane", "flicker", 0.1)]
+PICTURES += [("basket", "plane", "flicker", 0.3)]
+PICTURES += [("denim", "plane", "excess_energy", -0.1), ("basket", "plane", "excess_energy", -0.3)]
 RECORDS = [
     *error("woven", "", "denim", "seen", 1.0, noise=0.25, spread=0.03),
     *error("woven", "", "basket", "seen", 3.0, noise=0.75, spread=0.04),
@@ -32,17 +35,7 @@ RECORDS = [
     *error("point_sampled", "k = 2", "denim", "seen", 6.0),
     *error("point_sampled", "k = 2", "basket", "seen", 10.0),
     *error("point_sampled", "k = 2", "twill_4_4", "unseen", 5.0),
-    *(
-        Record(method="woven", fabric=fabric, role="seen", scene=scene, metric=metric, value=value)
-        for fabric, scene, metric, value in (
-            ("denim", "sphere", "mse", 0.5),
-            ("denim", "plane", "mse", 0.7),
-            ("denim", "plane", "flicker", 0.1),
-            ("basket", "plane", "flicker", 0.3),
-            ("denim", "plane", "excess_energy", -0.1),
-            ("basket", "plane", "excess_energy", -0.3),
-        )
-    ),
+    *(Record(method="woven", fabric=f, role="seen", scene=s, metric=m, value=v) for f, s, m, v in PICTURES),
     Record(method="woven", metric="time", value=400.0),
     Record(method="point_sampled", setting="k = 2", metric="time", value=500.0),
     Record(method="truth", metric="time", value=50_000.0),
