@@ -80,7 +80,7 @@ def test_the_bound_knows_light_from_behind_but_no_curved_cloth(files):
 def test_a_table_is_refused_for_cloth_of_too_many_cells(files):
     """A stripe that shifts by one pick an end in 9 of 10 picks: no translation carries it onto itself."""
     rows = ["#" + "." * 9, *["#." * 5] * 9]
-    files.exchange('family = "satin"\nends = 5\nmove = 2', f'family = "matrix"\nrows = {json.dumps(rows)}')
+    files.exchange('family = "satin", ends = 5, move = 2', f'family = "matrix", rows = {json.dumps(rows)}')
     load_recipe(files.write())
     files.exchange("relative_error = 0.05", 'estimator = "node_table"')
     words = "at most 96 different cells, own has 100; take 'auto'"
