@@ -4,6 +4,8 @@ A yarn is a circle swept along a centre line of arcs: that of a float on top, an
 meet at height 0 with one slope. Rays meet tubes by sphere tracing, whose steps are exact distances: nothing is shared
 with the marches of the package but the table of floats. The relief is taken to be 1. Seen from above alone, whole
 yarns are the `envelope`: at every place the higher of two, without what a ray sees under a yarn's side.
+
+Compiled callers in other files of the tests do not notice a change of this one: empty the cache of kernels after it.
 """
 
 from __future__ import annotations

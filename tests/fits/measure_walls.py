@@ -6,8 +6,8 @@ Rays to viewer and light meet whole yarns (tests/whole_yarns.py) as they meet th
 same model of a point. Pictures of one repeat have side^2 pixels of standard deviation .05 yarn, two azimuths and three
 lights; all meanings get the same rays. Two meanings are not in the package:
 
-- `yarn`: a ray that meets a wall sees the tube of the yarn above, lit as its rim is, or black if it passes below.
-  Rims that face away count as little as with `rim`.
+- `yarn`: a ray that meets a wall sees the tube of the yarn above, lit as its rim is. One that passes below that tube
+  sees black; if the rim faces away as well, it does not count.
 - `envelope`: both yarns of every cell go on along their tori and the higher one is seen. Walls are left only where
   yarns of one family lie side by side.
 
@@ -15,6 +15,21 @@ The first table has the root mean square over pixels and lights of the differenc
 components, without the noise of the rays) over their mean, and in brackets the relative error of the mean of the
 picture. `on walls` is the root mean square over the rays that meet a wall alone. The second table has the mean over
 places at sigma .03 over that of the repeat.
+
+Seen, over the four views, rms (and mean of the relative errors), in percent:
+
+| fabric | left_out | rim | yarn | envelope |
+|---|---|---|---|---|
+| denim | 29.9 (-1.2) | 22.1 (-0.9) | 21.5 (-1.1) | 0.0 (+0.0) |
+| wool_gabardine | 26.2 (-1.2) | 19.0 (-1.0) | 18.7 (-1.1) | 0.1 (+0.0) |
+| satin_8 | 17.0 (+8.0) | 16.1 (+3.0) | 5.1 (+0.0) | 14.0 (+4.9) |
+| silk_shantung | 38.7 (-0.4) | 24.1 (-0.3) | 22.5 (-0.6) | 1.8 (+0.1) |
+| voile | 18.1 (-0.7) | 16.1 (-0.7) | 16.0 (-0.8) | 2.5 (-0.2) |
+| silk_charmeuse | 9.4 (+1.8) | 7.0 (+0.6) | 3.2 (-0.1) | 6.2 (+1.0) |
+| crepe | 18.4 (+1.5) | 12.1 (+0.1) | 9.7 (-0.4) | 7.0 (+0.8) |
+
+The mean over places is off by up to 3 (denim), 2, 13 (satin), 5 and 1.4 % with `left_out`, by .6 % (voile) at most with
+`rim` and with `yarn`. The other pixels differ because floats end at borders of cells, and whole yarns where they cross.
 """
 
 from __future__ import annotations
@@ -133,8 +148,8 @@ def shares(
         if meaning == YARN and row[0] == 0.0:
             hit = first_hit(front, at_x, at_y, top, towards)
             family, side, rim, nx, ny, nz, _, _, _ = surface_at(front, hit.x, hit.y, hit.end, hit.pick)
-            if hit.what == ON_WALL and nx * wo[0] + ny * wo[1] + nz * wo[2] > 0.0:
-                row[0] = 1.0
+            if hit.what == ON_WALL:
+                row[0] = 1.0 if nx * wo[0] + ny * wo[1] + nz * wo[2] > 0.0 else 0.0
                 z = top + hit.distance * towards.rise
                 t = tube_above(front, family, hit, z, wo)
                 if t < math.inf:
