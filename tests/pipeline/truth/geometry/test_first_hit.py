@@ -74,6 +74,20 @@ def test_rays_meet_walls_where_floats_end():
     assert 0.02 < shares[0] < 0.5 and shares[1] == 0.0
 
 
+@pytest.mark.parametrize("name", ["denim", "voile"])
+def test_a_wall_is_that_of_the_yarn_above_it(name):
+    """The surface at the hit is above the ray there; on the other side of the border it would be below."""
+    field = height_field(load_fabric(name))
+    towards, _, _ = sinking(ray(*direction(60.0, 33.0), 0.0), field.highest, field.highest)
+    above = []
+    for k in range(3000):
+        hit = first_hit(field, 0.21 * k, 0.137 * k, field.highest, towards)
+        if hit.what == ON_WALL:
+            height = surface_at(field, hit.x, hit.y, hit.end, hit.pick)[2]
+            above.append(height - field.highest - hit.distance * towards.rise)
+    assert len(above) > 30 and min(above) > 0.0
+
+
 @pytest.mark.parametrize("fabric", [LOPSIDED, woven("denim"), woven("voile")], ids=["narrow", "closed", "open"])
 def test_the_reference_plane_is_the_mean_height(fabric):
     ends, picks = fabric.weave.repeat
