@@ -81,7 +81,8 @@ class Options(Design):
     blends: ClassVar[bool] = False
     """True if blended latents of two fabrics give the fabrics between them."""
     any_physics: ClassVar[bool] = False
-    """True if it can learn any physics of the truth (frame, normaliser, shadows); else only the default."""
+    """True if it can learn any physics of the truth (`pipeline.models.domain.PHYSICS`); else only the default, and what
+    it has an option for."""
     seconds: ClassVar[tuple[float, float]] = (2.4e-5, 3e-6)
     """Estimate of the time of one query in training and in prediction, on one core of a server of 2022."""
     prepare_seconds: ClassVar[float] = 0.1
