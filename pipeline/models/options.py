@@ -171,7 +171,7 @@ class TextureOptions(ComponentLossOptions):
     hidden: int = Field(default=25, ge=4, le=256)
     """Width of the three hidden layers of all perceptrons."""
     offset: bool = True
-    """Shift the centre along the view by a learnt depth before the look-up."""
+    """Shift the centre along the view by a learnt depth before the look-up, as parallax does."""
     blur: float = Field(default=8.0, ge=0, le=64)
     """Standard deviation, in finest texels, of the Gaussian blur on the textures at the first step; 0 means none."""
     blur_halving: float = Field(default=0.11, gt=0, le=1)

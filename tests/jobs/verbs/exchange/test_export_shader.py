@@ -7,6 +7,8 @@ import pytest
 
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.card import write_model
+from pipeline.models.selvage import SelvageOptions
+from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.models.woven import WovenOptions
 from pipeline.shader import export_shader as verb
 from pipeline.shader import languages, soft_nodes, tables
@@ -58,6 +60,9 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(twillight, mon
     assert "not installed: onnxscript" in refused(twillight, CLOTH, *shader, "selvage", "--language", "onnx")
     monkeypatch.setattr(verb, "covering_model", lambda *_: object())
     assert "has no shader; soft_nodes, selvage and" in refused(twillight, CLOTH, *shader, "woven")
+    rays = Selvage(SelvageNetwork(SelvageOptions(parallax=True)))
+    monkeypatch.setattr(verb, "covering_model", lambda *_: rays)
+    assert "was trained with parallax" in refused(twillight, CLOTH, *shader, "rays")
     assert not (tmp_path / "x").exists()
 
 
