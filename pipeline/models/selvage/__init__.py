@@ -22,6 +22,7 @@ class SelvageOptions(Options):
         "diffuse_colour",
         "colour_weight",
     )
+    newer: ClassVar[tuple[str, ...]] = ("parallax",)
     seconds: ClassVar[tuple[float, float]] = (2e-5, 2.5e-6)
     prepare_seconds: ClassVar[float] = 1.2
     without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
@@ -43,6 +44,8 @@ class SelvageOptions(Options):
     bound: bool = True
     """Bound each component by the answer of the soft nodes without shadows: no diffuse light is then gained."""
     footprint: Gaussian = "gaussian"
+    parallax: bool = False
+    """True if the footprints of its soft nodes are patches of view rays; must be that of the truth."""
 
     layers: ClassVar[int] = 2
     """Hidden layers."""

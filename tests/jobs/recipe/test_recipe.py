@@ -5,6 +5,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from jobs.plan.measurements.models import AtExtremes
 from jobs.recipe.load import load_recipe, recipe_names
 from pipeline.scenes.catalogue import load_scene
 from tests.refusals import refusal, sentence_of
@@ -69,6 +70,42 @@ def refused(files, words):
 )  # fmt: skip
 def test_bad_input_is_one_sentence(files, old, new, words):
     refused(files.exchange(old, new), words)
+
+
+def of_view_rays(files, network="", queries=""):
+    """Return the recipe with parallax in each table of truth options, another network and other queries."""
+    files.exchange("[0.05, 8.0]", f"[0.05, 8.0]\n{queries}").exchange("relative_error = 0.05", "parallax = true")
+    files.exchange("counts = [1, 2]", "counts = [1, 2]\nparallax = true")
+    files.exchange("frames = 4", "\n".join(f"{key}.parallax = true" for key in ("truth", "frame_truth", "edge.truth")))
+    return files.exchange('model = "neumip"', network or 'model = "neumip"')
+
+
+@pytest.mark.parametrize(
+    "network",
+    [
+        'model = "neumip"\noffset = false',
+        'model = "curved"',
+        'model = "selvage"\nparallax = true',
+        'model = "unified_btf"\ntruth = { parallax = true }',
+        'model = "btf_autoencoder"\ntruth = { parallax = true }',
+    ],
+)
+def test_every_network_may_learn_view_rays(files, network):
+    """Beside `woven`; and all that is planned, the truth at extremes too, is of these rays."""
+    extremes = [task for task in of_view_rays(files, network).plan() if isinstance(task, AtExtremes)]
+    assert len(extremes) == 3 and {(task.truth.parallax, task.truth.estimator) for task in extremes} == {(True, "owen")}
+
+
+@pytest.mark.parametrize(
+    ("network", "queries", "words"),
+    [
+        ('model = "selvage"', "", ["models.1.parallax = False", "of dataset.truth, True"]),
+        ('model = "unified_btf"', "", ["models.1.truth.parallax = False", "of dataset.truth, True"]),
+        ("", "max_angle = 89.5", ["dataset.truth.parallax = True", "within 89 degrees", "max_angle is 89.5"]),
+    ],
+)
+def test_what_cannot_be_of_view_rays_is_one_sentence(files, network, queries, words):
+    refused(of_view_rays(files, network, queries), words)
 
 
 def test_the_bound_knows_light_from_behind_but_no_curved_cloth(files):

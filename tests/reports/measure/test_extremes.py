@@ -13,7 +13,7 @@ from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import faults
+from pipeline.truth.query import LOWEST_VIEWER, faults
 from reports.measure.extremes import FAR, FOOTPRINTS, extremes, lustrous, measure_extremes
 from reports.options import EXTREME_PRECISIONS, RuntimeName
 from tests.pipeline.models.stand_ins import FakeMethod
@@ -69,6 +69,22 @@ def test_closed_forms():
     for metric in ("extreme_far", "extreme_not_finite", "extreme_negative"):
         assert found["", metric].value == 0.0
     assert {record.fabric for record in found.values()} == {LINING.name}, "what is not covered is not asked"
+
+
+def test_viewers_too_low_for_parallax_have_no_truth(monkeypatch):
+    """They are answered, and not compared; lights that graze are."""
+    monkeypatch.setattr(Scaled, "truth", TruthOptions(estimator="owen", parallax=True, min_count=32, max_count=32))
+
+    def predict(method, fabric, queries, seed=0):
+        low = queries.wo[:, 2] < LOWEST_VIEWER
+        answers = np.full((len(low), 4), 7.0, np.float32)
+        answers[~low] = 1.1 * estimate(fabric, queries.take(~low), method.truth, 0).mean
+        return answers
+
+    monkeypatch.setattr(Scaled, "predict", predict)
+    found = measured(Scaled())
+    for metric in ("extreme_error", "extreme_grazing"):
+        assert found["", metric].value == pytest.approx(0.1, rel=1e-5)
 
 
 def spoilt(answers, queries):

@@ -6,6 +6,8 @@ import pytest
 
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.card import write_model
+from pipeline.models.selvage import SelvageOptions
+from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.models.woven import WovenOptions
 from pipeline.shader import export_shader as verb
 from pipeline.shader import languages, soft_nodes, tables
@@ -55,6 +57,9 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(refusal, monke
     assert "not installed: onnxscript" in refusal(CLOTH, *shader, "selvage", "--language", "onnx")
     monkeypatch.setattr(verb, "covering_model", lambda *_: object())
     assert "has no shader; soft_nodes, selvage and" in refusal(CLOTH, *shader, "woven")
+    rays = Selvage(SelvageNetwork(SelvageOptions(parallax=True)))
+    monkeypatch.setattr(verb, "covering_model", lambda *_: rays)
+    assert "was trained with parallax" in refusal(CLOTH, *shader, "rays")
     assert not (tmp_path / "x").exists()
 
 
