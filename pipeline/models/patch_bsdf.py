@@ -24,7 +24,8 @@ from pipeline.analytic.importance.surface import LobeSurface, tabulate_surface
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
 from pipeline.models.named import named_method
-from pipeline.scenes.bounces import Bounces, check_bounces, later_bounces
+from pipeline.scenes.bounces import check_bounces, later_bounces
+from pipeline.scenes.options import BOUNCES, Bounces
 from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.shade import coloured
 from pipeline.truth.footprint.mixture import footprints
@@ -108,7 +109,7 @@ class PatchBSDF:
         method: str | Fallback | TruthAnswers = USUAL_METHOD,
         points: int = 8,
         widening: float = 2.0,
-        bounces: Bounces = 1,
+        bounces: Bounces = BOUNCES,
     ) -> None:
         check_bounces(bounces, "PatchBSDF")
         if points < 1:

@@ -7,19 +7,15 @@ all of them. So it is added where components become colours, from a table of the
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from pipeline.analytic.bounces.table import bounce_table, bounced
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.per_fabric import PerFabric
+from pipeline.scenes.options import Bounces
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-
-Bounces = Literal[1, "all"]
-"""Bounces of light: one, as the components have it, or all bounces between diffuse yarns."""
 
 _TABLES = PerFabric(bounce_table)
 
@@ -34,8 +30,16 @@ def later_bounces(fabric: Fabric, queries: Queries, colours: Float32 | Float64) 
     """Return the light of all bounces after the first, linear RGB by the family that is seen, (N, 2, 3), in 1/sr.
 
     It belongs to the diffuse components. The yarns that are seen have their own diffuse colours, those of `colours`,
-    (N, 4, 3); yarns further back have the mean ones of the cloth. 0 where light and viewer are on different sides: of
-    transmitted light only the first bounce is known. Tables are made at their first use, which takes seconds.
+    (N, 4, 3); yarns further back have the mean ones of the cloth.
+    """
+    return light_between(fabric, queries) * colours[:, 2:]
+
+
+def light_between(fabric: Fabric, queries: Queries) -> Float64:
+    """Return the same where the yarns that are seen are white, (N, 2, 3).
+
+    0 where light and viewer are on different sides: of transmitted light only the first bounce is known. Tables are
+    made at their first use, which takes seconds.
     """
     average, result = fabric.average(), np.zeros((len(queries.u), 2, 3))
     diffuse = np.array([average.warp.diffuse_rgb, average.weft.diffuse_rgb])
@@ -44,5 +48,5 @@ def later_bounces(fabric: Fabric, queries: Queries, colours: Float32 | Float64) 
         if rows.size:
             seen = queries.take(rows)
             seen, side = (seen.turned(), fabric.back()) if behind else (seen, fabric)
-            result[rows] = bounced(_TABLES.of(side), seen.wi, seen.wo, diffuse) * colours[rows, 2:]
+            result[rows] = bounced(_TABLES.of(side), seen.wi, seen.wo, diffuse)
     return result

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.footprint_colours import footprint_colours
-from pipeline.scenes.bounces import Bounces, check_bounces, later_bounces
+from pipeline.scenes.bounces import check_bounces, later_bounces
 from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.options import BOUNCES, Bounces
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -39,7 +40,9 @@ def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
     return np.where(through[:, None, None], colours(fabric, transmitted=True), colours(fabric))
 
 
-def shade(fabric: Fabric, components: npt.ArrayLike, queries: Queries, bounces: Bounces = 1) -> npt.NDArray[np.float64]:
+def shade(
+    fabric: Fabric, components: npt.ArrayLike, queries: Queries, bounces: Bounces = BOUNCES
+) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear RGB, (N, 3), from components with unit colour, (N, 4), and their queries.
 
     With all bounces, light that yarns give to each other is added. BadInput for another number of bounces.
