@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from pipeline.analytic.bounces.table import bounce_table
 from pipeline.mitsuba.register import register
 from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
+from pipeline.scenes import bounces
 from pipeline.scenes.variant import llvm_works, mitsuba
 
 NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
@@ -46,6 +48,12 @@ def hits_of(viewer, count=1, uv=UV, **other):
 
 def worn_of(fabric, sigma=0.3, **other):
     return Worn(ClothOptions(fabric=fabric, sigma=sigma, **other))
+
+
+@pytest.fixture
+def few_walks(monkeypatch):
+    """Make small tables of light between yarns."""
+    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
 
 
 @pytest.fixture
