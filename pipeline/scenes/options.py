@@ -15,7 +15,7 @@ Bounces = Literal[1, "all"]
 """Bounces of light: one, as the components have it, or all bounces between diffuse yarns."""
 
 BOUNCES: Final[Bounces] = 1
-"""Bounces of light wherever nobody asks for others."""
+"""Bounces of light unless others are chosen."""
 
 
 class PixelOptions(Frozen):

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32
 from pipeline.fingerprint import fingerprint
-from pipeline.scenes.bounces import light_between
+from pipeline.scenes.bounces import light_between, seen_light
 from pipeline.scenes.frame import SceneFrame, render
 from pipeline.scenes.loading import FilmWindow, Loaded
 from pipeline.scenes.shade import coloured, compose
@@ -180,7 +180,7 @@ class _UnderWay:
         frame = self._frame
         answers = {key: _gathered(asked, (0, 5)) for key, asked in self._asked.items()}
         colours = {key: _gathered(asked, (0, 4, 3)) for key, asked in self._colours.items()}
-        later = {key: _gathered(light, (0, 2, 3)) * colours[key][:, 2:] for key, light in self._between.items()}
+        later = {key: seen_light(_gathered(light, (0, 4, 3)), colours[key]) for key, light in self._between.items()}
         through = {key: self._transparency(key, answers[key][:, 4]) for key in answers}
         covered = {key: frame.gbuffers[key].coverage(_gathered(rims, (0,))) for key, rims in self._coverage.items()}
         planes = {"backdrop": frame.backdrop.astype(np.float32)}

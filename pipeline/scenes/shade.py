@@ -41,14 +41,19 @@ def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
 
 
 def shade(
-    fabric: Fabric, components: npt.ArrayLike, queries: Queries, bounces: Bounces = BOUNCES
+    fabric: Fabric,
+    components: npt.ArrayLike,
+    queries: Queries,
+    bounces: Bounces = BOUNCES,
+    colours: npt.NDArray[np.floating] | None = None,
 ) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear RGB, (N, 3), from components with unit colour, (N, 4), and their queries.
 
-    With all bounces, light that yarns give to each other is added. BadInput for another number of bounces.
+    With all bounces, light that yarns give to each other is added. Colours, (N, 4, 3), are those of `colours_of` unless
+    given. BadInput for another number of bounces.
     """
     check_bounces(bounces, "shade")
-    colours = colours_of(fabric, queries)
+    colours = colours_of(fabric, queries) if colours is None else colours
     rgb = coloured(components, colours)
     return rgb if bounces == 1 else rgb + later_bounces(fabric, queries, colours).sum(axis=1)
 

@@ -23,7 +23,7 @@ from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.fingerprint import fingerprint
 from pipeline.models.fallback import Fallback, fallback_answers
 from pipeline.models.method import Method
-from pipeline.scenes.bounces import light_between
+from pipeline.scenes.bounces import light_between, seen_light
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
 from pipeline.scenes.gbuffer import GBuffer
@@ -62,8 +62,8 @@ class ClothQueries:
         elsewhere.
     colours : float32 (M, 4, 3)
         The truth's colours of the components. Methods have those of the footprint's threads (pipeline.scenes.shade).
-    between : float32 (M, 2, 3) or (1, 1, 1)
-        Light of all bounces after the first (`pipeline.scenes.bounces`), before the colours of what is seen; 0 without.
+    between : float32 (M, 4, 3) or (1, 4, 1)
+        Light of all bounces after the first (`pipeline.scenes.bounces.light_between`); 0 if there is one bounce.
     rims : Queries
         Places at silhouettes, in all frames, of which some view rays leave the cloth again.
     coverage : float32 (R,)
@@ -85,10 +85,11 @@ class ClothQueries:
 
     def light(self, components: npt.ArrayLike | None = None) -> Float64:
         """Return the light of each query, (M, 3), from a method's components (M, 4); the truth's if left out."""
-        values, colours = self.mean, self.colours
+        values: npt.ArrayLike = self.mean
+        colours = self.colours
         if components is not None:
             values, colours = components, colours_of(self.fabric, self.queries)
-        return np.asarray(self.weight * (coloured(values, colours) + (self.between * colours[:, 2:]).sum(axis=1)))
+        return np.asarray(self.weight * (coloured(values, colours) + seen_light(self.between, colours).sum(axis=1)))
 
     def noise(self) -> Float64:
         """Return the standard error of the truth's light, (M, 3), components taken to be uncorrelated."""
@@ -223,7 +224,7 @@ def read_shot(path: Path) -> Shot:
             colours = colours_of(cloth, queries) if cloth.colours is None else file[f"{key}.colours"]
             rims = Queries(*(file[f"{key}.{_RIM}{column}"] for column in Queries._fields))
             covered = file[f"{key}.{_RIM}coverage"]
-            between = file[f"{key}.between"] if f"{key}.between" in file else np.zeros((1, 1, 1), np.float32)
+            between = file[f"{key}.between"] if f"{key}.between" in file else np.zeros((1, 4, 1), np.float32)
             cloths.append(
                 ClothQueries(cloth, queries, **columns, colours=colours, between=between, rims=rims, coverage=covered)
             )

@@ -1,5 +1,7 @@
 """Variants of Mitsuba, of which the scalar one works everywhere and the other one needs LLVM; worn cloth."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -53,7 +55,8 @@ def worn_of(fabric, sigma=0.3, **other):
 @pytest.fixture
 def few_walks(monkeypatch):
     """Make small tables of light between yarns."""
-    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
+    for name, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
+        monkeypatch.setattr(bounces, name, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """`sample`, `pdf` and `eval` agree: chi-square over the sphere, means of weights, the delta lobe; bad input."""
 
 import math
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -111,7 +111,8 @@ def test_weights_have_the_integral_of_eval_as_their_mean():
 @pytest.mark.parametrize("name", ["front", slow("voile"), slow("grazing"), slow("behind")])
 def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name, monkeypatch):
     """A z-test at LEVEL of light that is no longer in the lobes' shares, against even directions."""
-    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
+    for table, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
+        monkeypatch.setattr(bounces, table, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
     one, count, wi = bsdf_of(name), 20_000, sphere(80, 160)
     every, queries, looks = PatchBSDF(one.fabric, bounces="all"), looks_of(name, len(wi), wi), looks_of(name, count)
     first, even = (bsdf.eval(queries) @ LUMINANCE for bsdf in (one, every))
