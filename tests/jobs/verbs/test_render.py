@@ -10,7 +10,9 @@ import pytest
 import jobs.verbs.render
 import jobs.verbs.show
 from jobs.cli import main
+from pipeline.analytic.bounces.table import bounce_table
 from pipeline.models.named import named_method
+from pipeline.scenes import bounces
 from pipeline.scenes.options import SceneOptions
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.options import TruthOptions
@@ -18,6 +20,7 @@ from reports.images.exr import read_exr
 from reports.images.tiles import displayed
 from reports.measure.scene.shot import read_shot, shoot
 from reports.options import ShotOptions
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 from weaves.families import Satin
 
@@ -110,6 +113,21 @@ def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
     changed = np.abs(after.stack(*"RGB") - before.stack(*"RGB")).max(axis=-1) > 0
     number = before.channels["fabric.id"]
     assert changed[(number == 1) | (number == 2)].mean() > 0.9 and not changed[(number == 0) | (number > 2)].any()
+
+
+def test_all_bounces_make_white_cloth_brighter(render, tmp_path, monkeypatch):
+    """Silk of albedo .85 lacks a sixth of its light with one bounce; the file says which it has."""
+    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
+    (tmp_path / "white.toml").write_text(woven("silk_charmeuse", specular=(0.0,) * 3, diffuse=(0.85,) * 3).to_toml())
+    light = {}
+    for number in ("1", "all"):
+        assert render("sphere", "--fabric", "white.toml", "--bounces", number, "--out", "a.exr", *FAST)[0] == 0
+        exr = read_exr(tmp_path / "a.exr")
+        light[number] = exr.stack(*"RGB")[exr.channels["A"] == 1].mean()
+        assert str(exr.attributes["bounces"]) == number
+    assert 1.1 < light["all"] / light["1"] < 1.5
+    code, _, complaint = render("sphere", "--bounces", "2", "--out", "a.exr", *FAST)
+    assert code == 2 and "--bounces" in complaint and '1, "all"' in complaint
 
 
 def test_a_folder_holds_the_frames_and_the_tone_changes_them(render, tmp_path):

@@ -1,5 +1,5 @@
 import math
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -102,6 +102,21 @@ def test_weights_have_the_integral_of_eval_as_their_mean():
         assert scattered + through <= 1.0, name
     limit = stats.norm.isf(0.5 * (1 - (1 - LEVEL) ** (1 / len(scores))))
     assert max(scores.values()) < limit, (limit, scores)
+
+
+@pytest.mark.parametrize("name", ["front", slow("voile"), slow("grazing"), slow("behind")])
+def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name, monkeypatch):
+    """A z-test at LEVEL of light that is no longer in the lobes' shares, against even directions."""
+    for table, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
+        monkeypatch.setattr(bounces, table, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
+    one, count, wi = bsdf_of(name), 20_000, sphere(80, 160)
+    every, queries, looks = PatchBSDF(one.fabric, bounces="all"), looks_of(name, len(wi), wi), looks_of(name, count)
+    first, even = (bsdf.eval(queries) @ LUMINANCE for bsdf in (one, every))
+    scattered = even.mean() * 4.0 * math.pi
+    assert scattered > 1.005 * first.mean() * 4.0 * math.pi
+    sample = every.sample(looks, np.random.default_rng(11).random((count, 3)))
+    values = np.where(sample.straight, 0.0, sample.weight @ LUMINANCE)
+    assert abs(values.mean() - scattered) < stats.norm.isf(0.5 * LEVEL) * values.std() / math.sqrt(count)
 
 
 @pytest.mark.parametrize("name", ["ellipse", "voile", "behind"])

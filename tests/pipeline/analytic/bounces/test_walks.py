@@ -45,6 +45,16 @@ def test_light_takes_each_way_in_both_directions():
     assert np.linalg.norm(there - back) < 0.03 * np.linalg.norm(there)
 
 
+def test_gaps_count_as_seen_where_neither_face_hides_them():
+    """From straight above all of them: what is seen is the plane. At 85 degrees yarns hide all gaps."""
+    fabric = woven("gauze")
+    sums = transport(height_field(fabric), 1 << 10, np.array([unit(0, 0), unit(85, 0), unit(85, 90)]), unit(0, 0)[None])
+    field = height_field(fabric)
+    start = starting_points(field, 1 << 10)
+    assert sums.seen[0] - start.area.sum() == pytest.approx(0.16 * different_cells(field), rel=2e-2)
+    assert (sums.seen[1:] < 2.0 * math.cos(math.radians(85.0)) * different_cells(field)).all()
+
+
 def test_light_that_is_not_sent_on_leaves():
     """White closed cloth: of what comes from third yarns, the share that leaves and the share that goes on are 1."""
     above = sphere(16, 16)
