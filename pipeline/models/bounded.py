@@ -53,7 +53,7 @@ class Bounded(Around):
     def __init__(self, method: Method) -> None:
         super().__init__(method, "bounded")
         domain: Domain | None = getattr(method, "domain", None)
-        self._tables = soft_tables(USUAL, parallax=domain is not None and domain.parallax)
+        self._tables = soft_tables(USUAL, False, False, *(domain.rays if domain else (False, False)))
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method, and tabulate the fabric."""

@@ -72,9 +72,12 @@ class Domain(Frozen):
         return frozenset(kind for kind, there in trained.items() if there)
 
     @property
-    def parallax(self) -> bool:
-        """True if footprints were patches of view rays; data sets of earlier versions do not say so."""
-        return bool(self.physics.get("parallax", False))
+    def rays(self) -> tuple[bool, bool]:
+        """Whether footprints were patches of view rays, and whether those that meet a wall see a rim.
+
+        Data sets of earlier versions do not say so.
+        """
+        return bool(self.physics.get("parallax", False)), self.physics.get("walls") == "rim"
 
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
         """Return which queries on a fabric lie outside the ranges trained on, (N,); all of them if its yarns do.

@@ -30,7 +30,8 @@ def test_what_was_taught_is_answered():
     wide = Domain.of({"queries": WIDE.model_dump()}, FABRICS)
     wide.refuse(draw_queries(WIDE, (4, 4), 1, 0, 32), "m")
     assert PLAIN.kinds == frozenset() and wide.kinds == {"behind", "stretch", "curvature"}
-    assert Domain.of({"truth": {"parallax": True}}, FABRICS).parallax and not PLAIN.parallax
+    rays = Domain.of({"truth": {"parallax": True, "walls": "rim"}}, FABRICS).rays
+    assert rays == (True, True) and PLAIN.rays == (False, False)
     assert not PLAIN.out_of_domain(DENIM, one(light=89.99, viewer=89.99)).any()
     PLAIN.refuse_fabric(DENIM, "m")
     PLAIN.refuse_truth(TruthOptions(relative_error=0.1), "m")
