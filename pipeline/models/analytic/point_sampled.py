@@ -50,9 +50,6 @@ class PointSampledOptions(AnalyticOptions):
     """A march through the cloth in double precision, or a look-up of tabulated horizons in single precision, as steps
     or as ramps."""
 
-    parallax: bool = False
-    """True if points are view rays, which end where they first meet the cloth; must be that of the truth."""
-
     horizon_nodes: ClassVar[int] = 32
     """Nodes of the horizon map on each piece of yarn in a cell, across and along; the nearest is taken."""
     azimuths: ClassVar[int] = 64

@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from pipeline.analytic.mip_levels import mip_levels
+from pipeline.analytic.parallax_mapping import HeightMaps
 from pipeline.materials.lobes import charlie, even_sky, ggx, reflectance, white_f0
 from pipeline.materials.lookup import answer, tabulate
 from pipeline.materials.planes import Layout, Planes
@@ -15,6 +17,9 @@ from weaves.fabric import load_fabric
 SPECULAR = 0.5
 SHEEN = np.array([0.02, 0.01, 0.06, 0.03])
 MATERIAL = Constants(1.5, 0.2, np.zeros(3), 0.0, False)
+
+
+LEVEL_GROUND = HeightMaps(mip_levels([np.zeros((1, 1, 1))], (4, 4)), 0.0, 0.0)
 
 
 def maps_of(pattern, sheen=SHEEN):
@@ -38,7 +43,7 @@ def maps_of(pattern, sheen=SHEEN):
         through=plane((0.1, 0.05, 0.0)),
     )
     found = Layout(4, 4, pattern.shape[1], pattern.shape[0])
-    return tabulate(level, MATERIAL, found, sheen, SPECULAR), normal, fibre
+    return tabulate(level, MATERIAL, found, sheen, SPECULAR, LEVEL_GROUND), normal, fibre
 
 
 def test_one_material_is_the_sum_of_its_lobes():
