@@ -50,8 +50,6 @@ class PointSampledOptions(AnalyticOptions):
     """A march through the cloth in double precision, or a look-up of tabulated horizons in single precision, as steps
     or as ramps."""
 
-    parallax: bool = False
-    """True if points are view rays, which end where they first meet the cloth; must be that of the truth."""
     walls: Walls = "left_out"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
 

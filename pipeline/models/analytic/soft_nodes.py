@@ -52,8 +52,6 @@ class SoftNodesOptions(AnalyticOptions):
     model: Literal["soft_nodes"] = "soft_nodes"
     levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
     """Levels of detail k, from few nodes to many; each is a row of the tables."""
-    parallax: bool = False
-    """True if footprints are patches of view rays; must be that of the truth."""
     walls: Walls = "left_out"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
 

@@ -1,4 +1,4 @@
-"""Footprints of view rays by soft nodes: against the truth with parallax, and what parallax cannot change."""
+"""Footprints of view rays by analytic methods: against the truth with parallax, and what parallax cannot change."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,11 @@ from scipy.stats import qmc
 from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA
+from pipeline.models.analytic.map_material import MapMaterialOptions
 from pipeline.models.analytic.point_sampled import PointSampledOptions
+from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodes
+from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.geometry.pieces import reference_plane
@@ -169,3 +172,56 @@ def test_points_along_view_rays_converge_to_the_truth(kind):
     error = _error(many, fabric, queries, truth)
     assert error < 0.05
     assert _error(few, fabric, queries, truth) > 2.0 * error
+
+
+AREAS = {"clusters": [64]}
+
+
+@pytest.mark.parametrize(
+    ("options", "choices", "fabric", "most", "ratio"),
+    [
+        (SummedAreaOptions, AREAS, woven("denim"), 0.05, 1.3),
+        slow(SummedAreaOptions, AREAS, woven("satin_8"), 0.07, 4.0),
+        slow(SummedAreaOptions, AREAS, LOPSIDED, 0.08, 1.3),
+        (PrefilteredOptions, {}, woven("silk_shantung"), 0.35, 1.2),
+        (MapMaterialOptions, {"size": 128}, woven("silk_shantung"), 0.45, 1.1),
+    ],
+)
+def test_tables_are_read_where_view_rays_end(options, choices, fabric, most, ratio):
+    """The error against the truth of view rays is below `most`, that of the fabric plane `ratio` times as large."""
+    queries = _queries(fabric, 100, 4)
+    truth = estimate(fabric, queries, RAYS, 1)
+    (rays,), (plane,) = (options(parallax=parallax, **choices).methods() for parallax in (True, False))
+    error = _error(rays, fabric, queries, truth)
+    assert error < most
+    assert _error(plane, fabric, queries, truth) > ratio * error
+    assert rays.bytes_stored(fabric) > plane.bytes_stored(fabric)
+
+
+@pytest.mark.parametrize(
+    ("options", "choices"),
+    [(SummedAreaOptions, AREAS), (PrefilteredOptions, {}), (MapMaterialOptions, {"size": 128})],
+)
+def test_neither_wide_footprints_nor_views_from_above_see_parallax(options, choices):
+    fabric = woven("denim")
+    (rays,), (plane,) = (options(parallax=parallax, **choices).methods() for parallax in (True, False))
+    wide, narrow = _queries(fabric, 40, 6, sigma=(16.0, 32.0)), _queries(fabric, 40, 7)
+    above = narrow._replace(wo=np.tile(np.float32([0, 0, 1]), (40, 1)))
+    np.testing.assert_array_equal(rays.predict(fabric, above), plane.predict(fabric, above))
+    np.testing.assert_allclose(rays.predict(fabric, wide), plane.predict(fabric, wide), rtol=1e-5, atol=1e-9)
+    assert not np.allclose(rays.predict(fabric, narrow), plane.predict(fabric, narrow), rtol=0.05)
+
+
+def test_close_ups_are_as_bright_as_wide_views():
+    """Pieces of an integral over view rays add up to it: 256 places of a repeat; walls take 3 % of it at most.
+
+    Without parallax the mean of close-ups is .86 of the wide view at 60 degrees on such cloth, or .96.
+    """
+    fabric, light, viewer = woven("wool_gabardine"), direction(30.0, 200.0), direction(60.0, 20.0)
+    (rays,) = SummedAreaOptions(clusters=[64], parallax=True).methods()
+    ends, picks = fabric.weave.repeat
+    u, v = ((np.arange(16) + 0.5) / 16 * extent for extent in (ends, picks))
+    near = equal_queries(light, viewer, sigma=0.15, rows=256)
+    near = near._replace(u=np.float32(np.tile(u, 16)), v=np.float32(np.repeat(v, 16)))
+    wide = rays.predict(fabric, equal_queries(light, viewer, sigma=16.0))[0].sum()
+    assert abs(rays.predict(fabric, near).sum(axis=1).mean() / wide - 1.0) < 0.05
