@@ -8,7 +8,7 @@ What a footprint of rays sees is cut out before, so every node is seen; the ligh
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,15 +34,12 @@ from pipeline.compiled.float32 import arcsine, remaining
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WARP
 
 AT, LENGTH, ACROSS, BY_ACROSS, ALONG_FROM, BY_ALONG, DENSITY, APART = range(8)
-"""Angle across the yarn, or place along the line plus `ON_LINE`; length; place across and along the yarn at s = 0, and
-their changes with s; greatest density of the line; distance of the lines."""
+"""Angle across the yarn, or place along the line; length, negative of the latter and 0 at a rim; place across and along
+the yarn at s = 0, and their changes with s; greatest density of the line, or a rim's weight; distance of the lines."""
 
 FLOAT_BEND, FLOAT_HALF, FLOAT_DROP, BENDING, STEEPEST_SINE, ROWS_FROM, ROWS_PER = range(8, DRAFT_ROWS)
 """Bend radius of the float, negative beneath and 0 if drawn flat, half length and drop; curve and largest sine as in
 `SoftNodeTable.bounds`; row of the grid for b = 0 and rows for each unit of b."""
-
-ON_LINE: Final = np.float32(1000.0)
-"""Added to places along a line, so that they differ from angles across a yarn; the sum is negative at a rim."""
 
 Falls = npt.NDArray[np.uint8] | None
 
@@ -92,14 +89,14 @@ def _node(
 ) -> LineNode:  # fmt: skip
     """Return a drafted node."""
     # Place across and along the yarn.
-    at, across, by_across = draft[AT, k], draft[ACROSS, k], draft[BY_ACROSS, k]
-    turned, on_line, rim = abs(at) < _RIGHT, abs(at) - ON_LINE, at < -_RIGHT
+    at, length, across, by_across = draft[AT, k], draft[LENGTH, k], draft[ACROSS, k], draft[BY_ACROSS, k]
+    turned, rim = length > _0, length == _0
     of_angle, _ = sine_cosine(min(max(at, -_RIGHT), _RIGHT))
-    sine = of_angle if turned else min(max((across + on_line * by_across) / radius, -_VERTICAL), _VERTICAL)
+    sine = of_angle if turned else min(max((across + at * by_across) / radius, -_VERTICAL), _VERTICAL)
     cosine = np.sqrt((_1 - sine) * (_1 + sine))
     part_a, part_b = abs(by_across), abs(draft[BY_ALONG, k])
-    s = (radius * sine - across) / by_across if turned else on_line
-    length = draft[LENGTH, k] * radius * cosine / part_a if turned else draft[LENGTH, k]
+    s = (radius * sine - across) / by_across if turned else at
+    length = length * radius * cosine / part_a if turned else -length
     b = draft[ALONG_FROM, k] + s * draft[BY_ALONG, k]
     # Height, and the density where the viewer sees it.
     bends, half, drop = draft[FLOAT_BEND, k], draft[FLOAT_HALF, k], draft[FLOAT_DROP, k]

@@ -44,7 +44,6 @@ from pipeline.analytic.soft_nodes.line_nodes import (
     FLOAT_DROP,
     FLOAT_HALF,
     LENGTH,
-    ON_LINE,
     ROWS_FROM,
     ROWS_PER,
     STEEPEST_SINE,
@@ -352,7 +351,8 @@ def _lines_across(
     while place < stop - _NEAREST and n < lines.shape[1] - MOST_ACROSS:
         after = min(next_cut(place, True, radius), stop)
         half, middle = 0.5 * (after - place), 0.5 * (after + place)
-        count = min(1 + int(2.0 * half / distance), MOST_ACROSS)
+        # Widths of yarns are round numbers, and so may be the quotient: it must not fall below.
+        count = min(1 + int((2.0 * half + _NEAREST) / distance), MOST_ACROSS)
         for i in range(count):
             lines[0, n] = (middle + half * GAUSS_PLACES[count, i] - centre) / factor
             lines[1, n] = half * GAUSS_WEIGHTS[count, i]
@@ -440,11 +440,10 @@ def _write_draft(
     if turned:
         first = arcsine(np.float32((curve.across + start * curve.by_across) * curve.per_radius))
         last = arcsine(np.float32((curve.across + stop * curve.by_across) * curve.per_radius))
-    half, middle = _HALF * (last - first), _HALF * (last + first) + (_0 if turned else ON_LINE)
+    half, middle = _HALF * (last - first), _HALF * (last + first)
+    extent = abs(half) if turned else -abs(half)
     for i in range(8):
-        line[0, i], line[1, i] = middle + half * GAUSS_PLACES[count, i], abs(half) * GAUSS_WEIGHTS[count, i]
-    if stop <= start:
-        line[0] = -middle
+        line[0, i], line[1, i] = middle + half * GAUSS_PLACES[count, i], extent * GAUSS_WEIGHTS[count, i]
     write_eight(draft[AT], k, line[0])
     write_eight(draft[LENGTH], k, line[1])
     fill_eight(draft[ACROSS], k, np.float32(curve.across))
@@ -510,7 +509,7 @@ def _fill_block(draft: Float32, firsts: npt.NDArray[np.uint32], stop: int) -> in
     for k in (stop, stop + 8):
         for row in range(DRAFT_ROWS):
             fill_eight(draft[row], k, draft[row, stop - 1])
-        fill_eight(draft[LENGTH], k, _0)
+        fill_eight(draft[DENSITY], k, _0)
         for i in range(8):
             firsts[k + i] = firsts[stop - 1]
     return -(-stop // BLOCK_NODES) * BLOCK_NODES
@@ -619,7 +618,7 @@ def _place_line(
             continue
         if stop <= start or k >= limit:
             continue
-        count = 1 + int(max((stop - start) / _LENGTH, seen / (_DEVIATIONS * sigma)) / table.spacing)
+        count = 1 + int(max((stop - start + _NEAREST) / _LENGTH, seen / (_DEVIATIONS * sigma)) / table.spacing)
         count = min(count, MOST_ACROSS)
         _write_draft(
             scratch.drafts[kind], k, start, stop, count, curve, view_line, bounds, family, size, scratch.line
