@@ -73,7 +73,7 @@ class Domain(Frozen):
 
     @property
     def rays(self) -> tuple[bool, bool]:
-        """Tell whether footprints were patches of view rays, and whether those that meet a wall see a rim.
+        """Two truths: footprints were patches of view rays, and those that meet a wall see a rim.
 
         Data sets of earlier versions do not say so.
         """

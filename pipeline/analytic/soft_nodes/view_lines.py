@@ -161,7 +161,7 @@ def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
 
 
 @inlined_kernel
-def _surface(curve: YarnCurve, s: float) -> tuple[float, float, float]:
+def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
     """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the yarn's border.
 
     The height is that of `torus_height` and `height_beneath`, sqrt((R +- rho)^2 - b^2) - R cos u_max times the relief.
@@ -185,7 +185,7 @@ def _surface(curve: YarnCurve, s: float) -> tuple[float, float, float]:
 @inlined_kernel
 def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
     """Return to where the point at s is displaced, and a number with the sign of n.o."""
-    height, slope, upright = _surface(curve, s)
+    height, slope, upright = _height_and_slope(curve, s)
     distance, steep = sunk(ray, height)
     return s - distance, upright * steep + ray.run * slope
 
@@ -193,7 +193,7 @@ def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
 @inlined_kernel
 def _seen_rising(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
     """Return the same for rays that rise: its place, and a number that is positive where they meet the flank."""
-    height, slope, upright = _surface(curve, s)
+    height, slope, upright = _height_and_slope(curve, s)
     steep = math.sqrt(max(1.0 + 2.0 * ray.bend * ray.run * ray.run * (height - ray.plane), 0.0))
     return s + (1.0 + steep) / (ray.bend * ray.run), ray.run * slope - upright * steep
 
@@ -205,15 +205,15 @@ def _reached(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> tuple[f
     left, right = low, high
     for _ in range(_THIRDS):
         third = (right - left) / 3.0
-        if _surface(curve, left + third)[0] < _surface(curve, right - third)[0]:
+        if _height_and_slope(curve, left + third)[0] < _height_and_slope(curve, right - third)[0]:
             left += third
         else:
             right -= third
     top = 0.5 * (left + right)
-    if _surface(curve, top)[0] <= ray.least:
+    if _height_and_slope(curve, top)[0] <= ray.least:
         return high, low
-    first = low if _surface(curve, low)[0] > ray.least else _halve(curve, ray, top, low)
-    return first, high if _surface(curve, high)[0] > ray.least else _halve(curve, ray, top, high)
+    first = low if _height_and_slope(curve, low)[0] > ray.least else _halve(curve, ray, top, low)
+    return first, high if _height_and_slope(curve, high)[0] > ray.least else _halve(curve, ray, top, high)
 
 
 @kernel
@@ -221,7 +221,7 @@ def _halve(curve: YarnCurve, ray: ViewRay, inside: float, outside: float) -> flo
     """Return the place between two at which rays just reach a piece."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (inside + outside)
-        if _surface(curve, middle)[0] > ray.least:
+        if _height_and_slope(curve, middle)[0] > ray.least:
             inside = middle
         else:
             outside = middle

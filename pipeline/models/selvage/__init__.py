@@ -67,7 +67,7 @@ class SelvageOptions(Options):
 
     @property
     def rays(self) -> tuple[bool, bool]:
-        """Tell whether footprints are patches of view rays, and whether those that meet a wall see a rim."""
+        """Two truths: footprints are patches of view rays, and those that meet a wall see a rim."""
         return self.parallax, self.walls == "rim"
 
     @property
