@@ -48,7 +48,8 @@ def _refuse_hidden_packages() -> None:
 
 _refuse_hidden_packages()
 
-from pipeline.truth.conventions import COMPONENTS  # noqa: E402, nothing of ours before the check
+from pipeline.scenes.options import BOUNCES, Bounces  # noqa: E402, nothing of ours before the check
+from pipeline.truth.conventions import COMPONENTS  # noqa: E402
 from pipeline.truth.query import Queries  # noqa: E402
 from weaves.errors import BadInput  # noqa: E402
 from weaves.fabric import Fabric, load_fabric  # noqa: E402
@@ -60,7 +61,6 @@ if TYPE_CHECKING:
 
     from pipeline.models.method import Method
     from pipeline.models.patch_bsdf import PatchBSDF
-    from pipeline.scenes.bounces import Bounces
     from pipeline.shards.manifest import Role, Split
     from pipeline.training.dataset import RowStream
     from pipeline.truth.query import Answers
@@ -163,7 +163,7 @@ def load_model(name_or_folder: str | Path) -> Method:
 
 
 def to_rgb(
-    fabric: Fabric, components: npt.ArrayLike, queries: Queries, bounces: Bounces = 1
+    fabric: Fabric, components: npt.ArrayLike, queries: Queries, bounces: Bounces = BOUNCES
 ) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear sRGB: the components times the colours of a fabric's yarns.
 

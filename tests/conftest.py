@@ -19,17 +19,10 @@ STARTED = {"cpp", "programs", "webgl", "llvm", "switch"}
 """Fixtures that start a compiler, a browser or a server: what uses one is `external`."""
 
 FIRST = (
-    "tests/jobs/verbs/test_render.py",
-    "tests/jobs/recipe/",
-    "tests/jobs/plan/",
-    "tests/jobs/run/",
-    "tests/weaves/",
-    "tests/pipeline/models/",
-    "tests/pipeline/analytic/",
-    "tests/pipeline/truth/",
-    "tests/pipeline/training/",
+    "tests/jobs/verbs/test_render.py", "tests/jobs/recipe/", "tests/jobs/plan/", "tests/jobs/run/", "tests/weaves/",
+    "tests/pipeline/models/", "tests/pipeline/analytic/", "tests/pipeline/truth/", "tests/pipeline/training/",
     "tests/reports/",
-)
+)  # fmt: skip
 """The order of tests: one process compiles most kernels while another does tests without kernels; then the long ones,
 so that no core waits for one at the end."""
 

@@ -18,6 +18,7 @@ from reports.tables.documents import README_BLOCK, block, with_block
 from weaves.fabric import PRESETS, load_fabric
 
 ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 ROOMS = ("weaves", "pipeline", "reports", "jobs")
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 DOCUMENTS += sorted((ROOT / "docs").glob("*.md"))
@@ -58,21 +59,17 @@ def by_name(path):
     return str(path.relative_to(ROOT))
 
 
-def test_the_readme_is_one_screen_and_a_half():
-    assert len(text_of(ROOT / "README.md")) <= LONGEST_README
-
-
-def test_no_number_of_the_readme_is_typed_by_hand():
-    prose = with_block(text_of(ROOT / "README.md"), README_BLOCK, "", "README.md")
+def test_the_readme_is_one_screen_and_a_half_and_no_number_of_it_is_typed_by_hand():
+    text = text_of(ROOT / "README.md")
+    assert len(text) <= LONGEST_README and "Recipe `quick`" in block(text, README_BLOCK, "README.md")
+    least = PROJECT["requires-python"].removeprefix(">=")
+    assert f"Python {least} or newer" in text
+    prose = with_block(text, README_BLOCK, "", "README.md")
     for pattern in (r"<!--.*?-->", r"^    .+$", r"`[^`\n]+`", r"\]\([^)]*\)"):
         prose = re.sub(pattern, "", prose, flags=re.M)
     for name in NAMES_WITH_DIGITS:
         prose = prose.replace(name, "")
     assert not re.findall(r".*\d.*", prose)
-
-
-def test_the_readme_shows_the_recipe_quick():
-    assert "Recipe `quick`" in block(text_of(ROOT / "README.md"), README_BLOCK, "README.md")
 
 
 def check_links_and_paths_exist(path):
@@ -142,41 +139,31 @@ def test_denim_is_the_example_of_weaves():
 
 def test_models_are_listed_with_what_they_know():
     text = text_of(ROOT / "pipeline" / "models" / "README.md")
-    known = {}
-    for names, *cells in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| (.+?) \| (.+?) \| (.+?) \|$", text, re.M):
+    known, of_rays = {}, {}
+    for names, *cells, rays in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|" + 4 * r" (.+?) \|" + "$", text, re.M):
         kinds = {kind for kind, cell in zip(("behind", "stretch", "curvature"), cells, strict=True) if cell == "yes"}
         known |= dict.fromkeys(re.findall(r"`(\w+)`", names), kinds)
+        of_rays |= dict.fromkeys(re.findall(r"`(\w+)`", names), (rays.startswith("learnt"), rays.startswith("with")))
+    fields = {name: options.model_fields for name, options in CLASSES.items()}
+    assert of_rays == {name: (CLASSES[name].any_physics, "parallax" in fields[name]) for name in CLASSES}
     assert known == {name: set(options().kinds) for name, options in CLASSES.items()}
 
 
-def test_estimators_are_listed():
-    cells = re.findall(r"^\| (`[^|]+`) \|", text_of(ROOT / "pipeline" / "truth" / "README.md"), re.M)
-    assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == set(ESTIMATORS)
+def listed(folder, cell=r"\w+"):
+    """Return the names in the first cells of the tables of a room's README; of such cells alone."""
+    cells = re.findall(rf"^\| (`{cell}`) \|", text_of(ROOT / folder / "README.md"), re.M)
+    return [name for cell in cells for name in re.findall(r"`(\w+)`", cell)]
 
 
-def test_kinds_of_rows_are_listed():
-    text = text_of(ROOT / "pipeline" / "shards" / "README.md")
-    assert re.findall(r"^\| `(\w+)` \|", text, re.M) == list(SCHEMAS)
-
-
-def test_recipes_and_scenes_are_listed():
-    listed = re.findall(r"^\| (`[^|]+`) \|", text_of(ROOT / "jobs" / "README.md"), re.M)
-    named = {name for cell in listed for name in re.findall(r"`(\w+)`", cell)}
-    extra = set(re.findall(r"`(trade_\w+)`", text_of(ROOT / "jobs" / "README.md")))
-    assert set(recipe_names()) <= named | extra
-    scenes = re.findall(r"^\| `(\w+)` \|", text_of(ROOT / "pipeline" / "scenes" / "README.md"), re.M)
-    assert set(scenes) == set(SHIPPED)
-
-
-def test_the_readme_asks_for_the_python_of_the_package():
-    project = tomllib.loads(text_of(ROOT / "pyproject.toml"))["project"]
-    least = project["requires-python"].removeprefix(">=")
-    assert f"Python {least} or newer" in text_of(ROOT / "README.md")
+def test_estimators_kinds_of_rows_scenes_and_recipes_are_listed():
+    assert set(listed("pipeline/truth", "[^|]+")) == set(ESTIMATORS) and listed("pipeline/shards") == list(SCHEMAS)
+    assert set(listed("pipeline/scenes")) == set(SHIPPED)
+    extra = re.findall(r"`(trade_\w+)`", text_of(ROOT / "jobs" / "README.md"))
+    assert set(recipe_names()) <= {*listed("jobs", "[^|]+"), *extra}
 
 
 def test_the_changelog_begins_with_the_package_version():
-    version = tomllib.loads(text_of(ROOT / "pyproject.toml"))["project"]["version"]
-    assert re.search(r"^## (\S+)", text_of(ROOT / "CHANGELOG.md"), re.M)[1] == version
+    assert re.search(r"^## (\S+)", text_of(ROOT / "CHANGELOG.md"), re.M)[1] == PROJECT["version"]
 
 
 def test_reference_keys_that_docstrings_cite_are_in_the_bibliography():

@@ -65,8 +65,7 @@ def test_notebooks_are_valid_and_kept_without_results(path):
 
 def test_a_fabric_from_draft_to_picture(folder):
     notebook = executed(ROOT / "notebooks" / "fabric_to_picture.ipynb", folder)
-    assert len(outputs(notebook, "image/png")) == 2
-    assert load_fabric(folder / "red_satin.toml").name == "red_satin"
+    assert len(outputs(notebook, "image/png")) == 2 and load_fabric(folder / "red_satin.toml").name == "red_satin"
     printed = [line.split() for line in outputs(notebook, "stream").splitlines()]
     assert [line[0] for line in printed] == ["specular_warp", "specular_weft", "diffuse_warp", "diffuse_weft"]
     assert all(float(line[1]) > 10 * float(line[3]) for line in printed), "errors are small beside the means"
@@ -79,13 +78,11 @@ def test_a_data_set_and_a_model(folder):
     roles = {"seen": seen, "population": [], "unseen": unseen}
     write_dataset(folder / "out" / "datasets" / "smoke-0", roles, parts, "smoke")
     notebook = executed(ROOT / "notebooks" / "dataset_and_model.ipynb", folder)
-    assert len(outputs(notebook, "image/png")) == 1
-    assert len(outputs(notebook, "text/html")) == 1
+    assert len(outputs(notebook, "image/png")) == 1 and len(outputs(notebook, "text/html")) == 1
     printed = outputs(notebook, "stream").splitlines()
     errors = {line.split()[0]: float(line.split(": ")[1].split("%")[0]) for line in printed[:3]}
     assert errors.keys() == {"polyester_lining", "denim", "twill_4_4"}
-    assert np.all(np.array(list(errors.values())) < 10)
-    assert "'fabric': (200,)" in printed[3]
+    assert np.all(np.array(list(errors.values())) < 10) and "'fabric': (200,)" in printed[3]
 
 
 @pytest.mark.slow

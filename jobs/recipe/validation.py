@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -11,6 +12,7 @@ from pipeline.shader.limits import MOST_REPEAT_CELLS
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA, TruthOptions
+from pipeline.truth.query import LOWEST_VIEWER
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
 
@@ -31,9 +33,9 @@ def validate_recipe(recipe: Recipe, where: str) -> None:
     ------
     BadInput
         For more shards than `MOST_SHARDS`, names given twice, an unseen draft in the population (also of random unseen
-        fabrics, unless a seen fabric has it), different physics in
-        two tables of truth options, models that do not know the queries or the physics of the data set, the
-        estimator `node_table` for cloth or queries that it does not know, and live pages of fabrics that it has not.
+        fabrics, unless a seen fabric has it), different physics in two tables of truth options, viewers too low for
+        parallax, models that do not know the queries or the physics of the data set, the estimator `node_table` for
+        cloth or queries that it does not know, and live pages of fabrics that it has not.
     """
     _check_number(recipe, where)
     _check_names(recipe, where)
@@ -124,6 +126,9 @@ def _check_truths(recipe: Recipe, where: str) -> None:
             if (value := getattr(truth, name)) != getattr(plain, name):
                 allowed = f"must be that of dataset.truth, {getattr(plain, name)!r}"
                 raise BadInput(where, f"{key}.{name}", value, allowed)
+        if truth.parallax and queries and math.cos(math.radians(queries.max_angle)) < LOWEST_VIEWER:
+            allowed = f"needs viewers within 89 degrees of the normal, max_angle is {queries.max_angle:g}"
+            raise BadInput(where, f"{key}.parallax", True, allowed)
         if truth.estimator == "node_table":
             reason = "footprints of pictures are not known before"
             if queries is None or (reason := table_refusal(truth, queries, fabrics)):
@@ -170,7 +175,7 @@ def _check_models(recipe: Recipe, where: str) -> None:
             if (value := getattr(truth, name)) != (own := getattr(_PLAIN, name)):
                 allowed = f"{options.name} (models.{index}) knows {name} = {own!r} only"
                 raise BadInput(where, f"dataset.truth.{name}", value, allowed)
-        for name in ("footprint", "parallax"):
+        for name in ("footprint", "parallax", "walls"):
             wanted = getattr(truth, name)
             if (own := getattr(options, name, wanted)) != wanted:
                 raise BadInput(where, f"models.{index}.{name}", own, f"must be that of dataset.truth, {wanted!r}")

@@ -20,7 +20,7 @@ from pipeline.atomic import atomic_write, refuse_unwritable
 from pipeline.cores import cores
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.loading import Loaded, load
-from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.options import BOUNCES, Bounces, SceneOptions
 from pipeline.scenes.picture import MOST_SAMPLES, PictureMethod, PicturePart, Plane, TruthAnswers, picture
 from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.sources import worn
@@ -62,12 +62,14 @@ class RenderLook:
     """Stops above the exposure of the page."""
 
 
-def look(size: str, samples: int, directions: int, tone: Tone, exposure: float) -> RenderLook:
+def look(
+    size: str, samples: int, directions: int, tone: Tone, exposure: float, bounces: Bounces = BOUNCES
+) -> RenderLook:
     """Return how a picture is made, from the command line; BadInput if a value cannot be used."""
     if samples not in (squares := [side**2 for side in range(1, MOST_SAMPLES + 1)]):
         raise BadInput(WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")
     try:
-        options = validated(SceneOptions, {"environment_directions": directions}, WHERE)
+        options = validated(SceneOptions, {"environment_directions": directions, "bounces": bounces}, WHERE)
     except BadInput as error:
         raise BadInput(WHERE, "--directions", directions, error.allowed) from error
     if not -STOPS <= exposure <= STOPS:
@@ -89,6 +91,7 @@ def render(
     frames: Annotated[int | None, Parameter(help="Frames of a film or folder; default: the scene's.")] = None,
     samples: Annotated[int, Parameter(help="Rays a pixel: 1, 4, 9, … 64; more smooth silhouettes.")] = 1,
     directions: Annotated[int, Parameter(help="Directions that an environment light is replaced by.")] = 8,
+    bounces: Annotated[Bounces, Parameter(help="Bounces of light between yarns.")] = BOUNCES,
     tone: Annotated[Literal["srgb", "reinhard"], Parameter(help="Tone curve; srgb cuts at 1.")] = "srgb",
     exposure: Annotated[float, Parameter(help="Exposure in stops; 0: that of the page.")] = 0.0,
 ) -> None:
@@ -97,7 +100,7 @@ def render(
     BadInput if a value, the scene, a fabric, the method or the path cannot be used; WorkFailed if the memory does not
     suffice.
     """
-    how = look(size, samples, directions, tone, exposure)
+    how = look(size, samples, directions, tone, exposure, bounces)
     found = dressed(load_scene(scene), fabric)
     start = time.monotonic()
     maker = make(found, method, _frames(frames, found, out), how, out)
@@ -235,6 +238,7 @@ class FilmMaker:
             "fabrics": ", ".join(fabrics),
             "samples": self.how.side**2,
             "directions": self.how.options.environment_directions,
+            "bounces": self.how.options.bounces,
             "fallback_share": 0.0 if isinstance(self.answerer, TruthAnswers) else self.share,
             "versions": f"truth {versions.TRUTH}, fallback {versions.FALLBACK}, scenes {versions.SCENES}{own}",
         }

@@ -9,7 +9,8 @@ widened by how much the tangents differ:
     lean      alpha'^2 = alpha^2 + h^T (E[t t^T] - E[t] E[t]^T) h   the variance of h.t itself, h the half vector
     none      alpha'   = alpha
 
-as Toksvig (2005) and LEAN mapping (Olano and Baker 2010) do for glossy normals. Nothing hides anything.
+as Toksvig (2005) and LEAN mapping (Olano and Baker 2010) do for glossy normals. Nothing hides anything; with parallax,
+a footprint is moved to the place that its middle ray sees (parallax_mapping).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.analytic.mip_levels import MipLevels, add_mean, halved, mip_levels
+from pipeline.analytic.parallax_mapping import HeightMaps, displaced, height_maps
 from pipeline.analytic.torus_frame import sigma, spread
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel
@@ -51,14 +53,17 @@ class PrefilteredMaps(NamedTuple):
         Alpha and blend of both families.
     thickness : float32
         Optical thickness.
+    heights : HeightMaps
+        Heights of the same texels; gaps have the lowest.
     """
 
     maps: MipLevels
     yarn: Float32
     thickness: np.float32
+    heights: HeightMaps
 
 
-def tabulate(fabric: Fabric, texels_per_yarn: int) -> PrefilteredMaps:
+def tabulate(fabric: Fabric, texels_per_yarn: int, parallax: bool = False) -> PrefilteredMaps:
     """Average the maps of a fabric's surface, down to one texel; sides are powers of two.
 
     The finest level has at least `texels_per_yarn` texels along a yarn spacing.
@@ -77,10 +82,13 @@ def tabulate(fabric: Fabric, texels_per_yarn: int) -> PrefilteredMaps:
     while levels[-1].shape[:2] != (1, 1):
         levels.append(halved(levels[-1]))
     yarns = (fabric.warp, fabric.weft)
+    seen = np.isfinite(surface.height)
+    heights = np.where(seen, surface.height, surface.height[seen].min())
     return PrefilteredMaps(
         maps=mip_levels(levels, (ends, picks)),
         yarn=np.array([(yarn.roughness, yarn.blend) for yarn in yarns], np.float32),
         thickness=np.float32(fabric.optical_thickness),
+        heights=height_maps(fabric, heights, (ends, picks), parallax),
     )
 
 
@@ -99,7 +107,9 @@ def _answer(
     yarn, thickness = tables.yarn, tables.thickness
     for row in range(len(u)):
         read[:] = _0
-        add_mean(tables.maps, np.float64(u[row]), np.float64(v[row]), np.float64(deviation[row]), 1.0, read)
+        wide = np.float64(deviation[row])
+        x, y = displaced(tables.heights, np.float64(u[row]), np.float64(v[row]), wide, wo[row])
+        add_mean(tables.maps, x, y, wide, 1.0, read)
         ix, iy, iz = wi[row, 0], wi[row, 1], wi[row, 2]
         ox, oy, oz = wo[row, 0], wo[row, 1], wo[row, 2]
         hx, hy, hz = ix + ox, iy + oy, iz + oz

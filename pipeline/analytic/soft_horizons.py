@@ -42,12 +42,17 @@ def around(x: np.float32, y: np.float32) -> tuple[int, int, np.float32]:
     return low, (low + 1 if low + 1 < AZIMUTHS else 0), t - np.float32(low)
 
 
+def azimuth_at(share: Float64) -> tuple[Float64, Float64]:
+    """Return azimuths, |dx| + |dy| = 1, at shares of the whole turn of the diamond angle."""
+    t = 4.0 * share
+    dy = np.where(t <= 2.0, 1.0 - t, t - 3.0)
+    return np.where(t <= 2.0, 1.0, -1.0) * (1.0 - np.abs(dy)), dy
+
+
 def from_even(values: Float64) -> Float64:
     """Return values known for azimuths even in the angle from +x, (rows, N), at the AZIMUTHS of the diamond angle."""
     count = len(values)
-    t = 4.0 * np.arange(AZIMUTHS) / AZIMUTHS
-    dy = np.where(t <= 2.0, 1.0 - t, t - 3.0)
-    dx = np.where(t <= 2.0, 1.0, -1.0) * (1.0 - np.abs(dy))
+    dx, dy = azimuth_at(np.arange(AZIMUTHS) / AZIMUTHS)
     turn = np.mod(np.arctan2(dy, dx), 2.0 * np.pi) * (0.5 * count) / np.pi
     low = np.floor(turn + 1e-9).astype(np.int64)
     share = (turn - low)[:, None]

@@ -9,7 +9,8 @@ sources are in pipeline.materials.lobes):
 
 F is Schlick's term, s the sheen, E the reflectance of a white sheen. The normal and the cosine are those of the map.
 Where the map's normal turns away from light or viewer the material is black. Maps are in unit colours, red for the
-warp and green for the weft; each component has its share of F.
+warp and green for the weft; each component has its share of F. With parallax, each reading is moved to the place of the
+height map that its viewer sees (pipeline.analytic.parallax_mapping).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 
 from pipeline.analytic.gauss_rules import taps
 from pipeline.analytic.mip_levels import MipLevels, add_mean, mip_levels
+from pipeline.analytic.parallax_mapping import HeightMaps, displaced
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.materials.lobes import SHEEN_ROUGHNESS, sheen_reflectance
@@ -56,6 +58,8 @@ class MaterialMaps(NamedTuple):
         Reflectance of a white sheen, by the viewer's cosine from 0 to 1.
     taps : float64 (TAPS + 1, TAPS)
         In row n the places of n readings along an axis: of mean 0 and variance 1.
+    heights : HeightMaps
+        Heights of the same texels.
     """
 
     maps: MipLevels
@@ -63,13 +67,16 @@ class MaterialMaps(NamedTuple):
     specular: np.float32
     white: Float32
     taps: Float64
+    heights: HeightMaps
 
 
-def tabulate(level: Planes, material: Constants, shown: Layout, sheen: Float64, specular: float) -> MaterialMaps:
+def tabulate(
+    level: Planes, material: Constants, shown: Layout, sheen: Float64, specular: float, heights: HeightMaps
+) -> MaterialMaps:
     """Return the maps of a cloth at all levels, down to one texel.
 
     The sums of the finest `level` have red for the warp and green for the weft; `sheen`, (4,), is the share of the
-    sheen of each component, `specular` the specular colour of the yarns in the maps.
+    sheen of each component, `specular` the specular colour of the yarns in the maps, `heights` those of `level`.
     """
     levels = []
     while True:
@@ -96,6 +103,7 @@ def tabulate(level: Planes, material: Constants, shown: Layout, sheen: Float64, 
         specular=np.float32(specular),
         white=np.array([sheen_reflectance(view) for view in views], np.float32),
         taps=taps(TAPS),
+        heights=heights,
     )
 
 
@@ -120,14 +128,16 @@ def _answer(
     read = np.zeros(TEXEL_CHANNELS, np.float32)
     for row in range(len(u)):
         read[:] = _0
-        _read(tables, u[row], v[row], major[row], minor[row], angle[row], read)
+        _read(tables, u[row], v[row], major[row], minor[row], angle[row], wo[row], read)
         if read[0] > _0:
             _evaluate(tables, read, wi[row], wo[row], result[row])
     return result
 
 
 @kernel
-def _read(tables: MaterialMaps, u: float, v: float, major: float, minor: float, angle: float, read: Float32) -> None:
+def _read(
+    tables: MaterialMaps, u: float, v: float, major: float, minor: float, angle: float, wo: Float32, read: Float32
+) -> None:
     """Add the mean of the maps over a footprint to `read`."""
     narrow = max(minor, major / TAPS)
     count = min(max(math.ceil(major / narrow - 0.01), 1), TAPS)
@@ -135,6 +145,7 @@ def _read(tables: MaterialMaps, u: float, v: float, major: float, minor: float, 
     for tap in range(count):
         along = spread * tables.taps[count, tap]
         x, y = np.float64(u) + along * math.cos(angle), np.float64(v) + along * math.sin(angle)
+        x, y = displaced(tables.heights, x, y, np.float64(narrow), wo)
         add_mean(tables.maps, x, y, narrow, 1.0 / count, read)
 
 

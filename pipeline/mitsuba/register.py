@@ -50,7 +50,9 @@ def dress(loaded: Loaded, method: str = USUAL_METHOD) -> Any:
     worn = {}
     for key, (cloth, fabric) in loaded.cloths.items():
         properties = {"fabric": cloth.fabric or fabric.name, "yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1]}
-        worn[key] = mi.load_dict({"type": BSDF, "method": method, "turn": cloth.turn, **properties})
+        worn[key] = mi.load_dict(
+            {"type": BSDF, "method": method, "bounces": loaded.options.bounces, "turn": cloth.turn, **properties}
+        )
     for shape in loaded.world.shapes():
         name = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
         if name.startswith(PREFIX):

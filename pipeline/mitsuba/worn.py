@@ -34,7 +34,7 @@ from pipeline.models.named import TRUTH, named_method
 from pipeline.models.network import one_thread
 from pipeline.models.patch_bsdf import USUAL_METHOD, PatchBSDF, Sample
 from pipeline.scenes.gbuffer import reduced
-from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.options import BOUNCES, Bounces, SceneOptions
 from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.places import LEAST_CURVATURE, tilted
 from pipeline.scenes.scene import Yarns
@@ -71,6 +71,8 @@ class ClothOptions(Frozen):
     method: str = USUAL_METHOD
     """The method that evaluates the cloth: a model that comes with the package or learns nothing, with ``:k`` for a
     setting; the folder of a trained model; or ``truth``."""
+    bounces: Bounces = BOUNCES
+    """Bounces of light within the cloth: ``all`` adds what its yarns give to each other."""
     yarns: Yarns = 100.0
     """Yarn spacings in one unit of u and of v."""
     yarns_v: Yarns | None = None
@@ -156,7 +158,7 @@ class Worn:
 
     def __init__(self, options: ClothOptions) -> None:
         self.options = options
-        self._bsdf = _bsdf(load_fabric(options.fabric), options.method)
+        self._bsdf = _bsdf(load_fabric(options.fabric), options.method, options.bounces)
         turn = math.radians(options.turn)
         self._turn = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
         self._known: tuple[Queries, list[Lobes]] | None = None
@@ -328,9 +330,9 @@ def _pool() -> ThreadPoolExecutor:
 
 
 @lru_cache(maxsize=64)
-def _bsdf(fabric: Fabric, method: str) -> PatchBSDF:
+def _bsdf(fabric: Fabric, method: str, bounces: Bounces) -> PatchBSDF:
     """Return a fabric's BSDF; Mitsuba may make the plugin of a scene many times."""
-    return PatchBSDF(fabric, _method(method))
+    return PatchBSDF(fabric, _method(method), bounces=bounces)
 
 
 @lru_cache(maxsize=16)

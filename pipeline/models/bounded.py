@@ -30,6 +30,7 @@ from pipeline.analytic.soft_nodes.groups import USUAL
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import nbytes
 from pipeline.models.analytic.soft_nodes import soft_tables
+from pipeline.models.domain import Domain
 from pipeline.models.method import Around, Method, in_chunks, refuse_other, row_by_row
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
@@ -45,12 +46,14 @@ class Bounded(Around):
     Parameters
     ----------
     method : Method
-        Anything that answers for flat cloth, lit from either side.
+        Anything that answers for flat cloth, lit from either side. One that was trained with parallax is bounded by
+        footprints of view rays.
     """
 
     def __init__(self, method: Method) -> None:
         super().__init__(method, "bounded")
-        self._tables = soft_tables(USUAL)
+        domain: Domain | None = getattr(method, "domain", None)
+        self._tables = soft_tables(USUAL, False, False, *(domain.rays if domain else (False, False)))
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method, and tabulate the fabric."""

@@ -71,6 +71,14 @@ class Domain(Frozen):
         trained = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
         return frozenset(kind for kind, there in trained.items() if there)
 
+    @property
+    def rays(self) -> tuple[bool, bool]:
+        """Two truths: footprints were patches of view rays, and those that meet a wall see a rim.
+
+        Data sets of earlier versions do not say so.
+        """
+        return bool(self.physics.get("parallax", False)), self.physics.get("walls") == "rim"
+
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
         """Return which queries on a fabric lie outside the ranges trained on, (N,); all of them if its yarns do.
 

@@ -81,7 +81,8 @@ class Options(Design):
     blends: ClassVar[bool] = False
     """True if blended latents of two fabrics give the fabrics between them."""
     any_physics: ClassVar[bool] = False
-    """True if it can learn any physics of the truth (frame, normaliser, shadows); else only the default."""
+    """True if it can learn any physics of the truth (`pipeline.models.domain.PHYSICS`); else only the default, and what
+    it has an option for."""
     seconds: ClassVar[tuple[float, float]] = (2.4e-5, 3e-6)
     """Estimate of the time of one query in training and in prediction, on one core of a server of 2022."""
     prepare_seconds: ClassVar[float] = 0.1
@@ -170,7 +171,7 @@ class TextureOptions(ComponentLossOptions):
     hidden: int = Field(default=25, ge=4, le=256)
     """Width of the three hidden layers of all perceptrons."""
     offset: bool = True
-    """Shift the centre along the view by a learnt depth before the look-up."""
+    """Shift the centre along the view by a learnt depth before the look-up, as parallax does."""
     blur: float = Field(default=8.0, ge=0, le=64)
     """Standard deviation, in finest texels, of the Gaussian blur on the textures at the first step; 0 means none."""
     blur_halving: float = Field(default=0.11, gt=0, le=1)

@@ -24,9 +24,10 @@ from pipeline.analytic.importance.surface import LobeSurface, tabulate_surface
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
 from pipeline.models.named import named_method
-from pipeline.scenes.bounces import Bounces, check_bounces, later_bounces
+from pipeline.scenes.bounces import check_bounces
+from pipeline.scenes.options import BOUNCES, Bounces
 from pipeline.scenes.picture import TruthAnswers
-from pipeline.scenes.shade import coloured
+from pipeline.scenes.shade import shade
 from pipeline.truth.footprint.mixture import footprints
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
@@ -108,7 +109,7 @@ class PatchBSDF:
         method: str | Fallback | TruthAnswers = USUAL_METHOD,
         points: int = 8,
         widening: float = 2.0,
-        bounces: Bounces = 1,
+        bounces: Bounces = BOUNCES,
     ) -> None:
         check_bounces(bounces, "PatchBSDF")
         if points < 1:
@@ -196,8 +197,7 @@ class PatchBSDF:
         """Return f_P of each query in linear RGB, (N, 3), 1/sr, with the incident cosine inside."""
         components = self.method.predict(self.fabric, queries, seed)
         colours = self.method.colours(self.fabric, queries, seed)
-        rgb = coloured(components, colours)
-        return rgb if self.bounces == 1 else rgb + later_bounces(self.fabric, queries, colours).sum(axis=1)
+        return shade(self.fabric, components, queries, self.bounces, colours)
 
     def eval_pdf(self, queries: Queries, lobes: Lobes | None = None, seed: int = 0) -> tuple[Float64, Float32]:
         """Return `eval` and `pdf` of each query."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import Field
 
@@ -10,6 +10,12 @@ from weaves.validation import Frozen
 
 View = Literal["sphere", "plane"]
 """The views of one fabric: cloth on a sphere, and on a plane running to the horizon."""
+
+Bounces = Literal[1, "all"]
+"""Bounces of light: one, as the components have it, or all bounces between diffuse yarns."""
+
+BOUNCES: Final[Bounces] = 1
+"""Bounces of light unless others are chosen."""
 
 
 class PixelOptions(Frozen):
@@ -57,6 +63,8 @@ class SceneOptions(PixelOptions):
     """Curvature of the cloth along the view ray: from the shading normal's derivative `at_point`, concave places being
     flat; the `minimum` of it over the ray's way past the point, where a ray may leave the cloth again; or `none`, for a
     benchmark of flat materials."""
+    bounces: Bounces = BOUNCES
+    """Bounces of light in pictures: `all` adds what the yarns of a cloth give to each other."""
     environment_directions: int = Field(default=64, ge=4, le=16384)
     """Directions of the quadrature of an environment light: a Fibonacci lattice of equal solid angles."""
     environment_samples: int = Field(default=64, ge=1, le=1024)

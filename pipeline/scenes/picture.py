@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32
 from pipeline.fingerprint import fingerprint
+from pipeline.scenes.bounces import light_between, seen_light
 from pipeline.scenes.frame import SceneFrame, render
 from pipeline.scenes.loading import FilmWindow, Loaded
 from pipeline.scenes.shade import coloured, compose
@@ -169,6 +170,8 @@ class _UnderWay:
         queries = {key: gbuffer.queries(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
         self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
+        all_bounces = loaded.options.bounces == "all"
+        self._between = {key: self._ask(_between, key, asked, "later") for key, asked in queries.items() if all_bounces}
         rims = {key: gbuffer.rims(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._coverage = {key: self._ask(answerer.coverage, key, asked, "rim") for key, asked in rims.items()}
 
@@ -177,6 +180,7 @@ class _UnderWay:
         frame = self._frame
         answers = {key: _gathered(asked, (0, 5)) for key, asked in self._asked.items()}
         colours = {key: _gathered(asked, (0, 4, 3)) for key, asked in self._colours.items()}
+        later = {key: seen_light(_gathered(light, (0, 4, 3)), colours[key]) for key, light in self._between.items()}
         through = {key: self._transparency(key, answers[key][:, 4]) for key in answers}
         covered = {key: frame.gbuffers[key].coverage(_gathered(rims, (0,))) for key, rims in self._coverage.items()}
         planes = {"backdrop": frame.backdrop.astype(np.float32)}
@@ -188,7 +192,10 @@ class _UnderWay:
             planes[name] = np.zeros(frame.backdrop.shape, np.float32)
             for key, gbuffer in frame.gbuffers.items():
                 own = np.where(chosen, answers[key][:, :4], np.float32(0.0))
-                planes[name] = compose(gbuffer, coloured(own, colours[key]), planes[name], coverage=covered[key])
+                rgb = coloured(own, colours[key])
+                if key in later:
+                    rgb += np.where(np.broadcast_to(chosen, 4)[2:, None], later[key], 0.0).sum(axis=1)
+                planes[name] = compose(gbuffer, rgb, planes[name], coverage=covered[key])
         if layers:
             planes["cloth"] = np.zeros((*frame.backdrop.shape[:2], 1), np.float32)
             for key, gbuffer in frame.gbuffers.items():
@@ -222,6 +229,11 @@ class _UnderWay:
             seed = int(fingerprint([*self._names, key, kind, start]), 16)
             asked.append(self._pool.submit(ask, self._fabrics[key], queries.take(slice(start, start + CHUNK)), seed))
         return asked
+
+
+def _between(fabric: Fabric, queries: Queries, seed: int) -> Float32:
+    """Return the light between yarns as methods answer."""
+    return light_between(fabric, queries).astype(np.float32)
 
 
 def _gathered(asked: Sequence[Future[Float32]], shape: tuple[int, ...]) -> Float32:

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.footprint_colours import footprint_colours
-from pipeline.scenes.bounces import Bounces, check_bounces, later_bounces
+from pipeline.scenes.bounces import check_bounces, later_bounces
 from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.options import BOUNCES, Bounces
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -39,13 +40,20 @@ def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
     return np.where(through[:, None, None], colours(fabric, transmitted=True), colours(fabric))
 
 
-def shade(fabric: Fabric, components: npt.ArrayLike, queries: Queries, bounces: Bounces = 1) -> npt.NDArray[np.float64]:
+def shade(
+    fabric: Fabric,
+    components: npt.ArrayLike,
+    queries: Queries,
+    bounces: Bounces = BOUNCES,
+    colours: npt.NDArray[np.floating] | None = None,
+) -> npt.NDArray[np.float64]:
     """Return the patch BSDF in linear RGB, (N, 3), from components with unit colour, (N, 4), and their queries.
 
-    With all bounces, light that yarns give to each other is added. BadInput for another number of bounces.
+    With all bounces, light that yarns give to each other is added. Colours, (N, 4, 3), are those of `colours_of` unless
+    given. BadInput for another number of bounces.
     """
     check_bounces(bounces, "shade")
-    colours = colours_of(fabric, queries)
+    colours = colours_of(fabric, queries) if colours is None else colours
     rgb = coloured(components, colours)
     return rgb if bounces == 1 else rgb + later_bounces(fabric, queries, colours).sum(axis=1)
 

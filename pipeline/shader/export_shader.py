@@ -122,6 +122,8 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
         return soft_nodes_shader(fabric, level, kinds)
     method = covering_model(model, fabric, "export", "model")
     if isinstance(method, Selvage):
+        if method.options.parallax:
+            raise BadInput("export", "model", model, "was trained with parallax, which soft nodes of the shader lack")
         return selvage_shader(method, fabric, level, kinds)
     if isinstance(method, Neumip):
         return neumip_shader(method, fabric, level, kinds)

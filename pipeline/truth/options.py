@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from weaves.validation import Frozen
 
 EstimatorName = Literal["mc", "r2", "owen", "quadrature", "node_table", "auto"]
+Walls = Literal["left_out", "rim"]
 
 REPLACED_ESTIMATORS: Final = {"jittered": "r2"}
 """Estimators of earlier versions, and those to take in their place."""
@@ -55,7 +56,7 @@ class TruthOptions(Frozen):
     """True if a footprint is a patch of view rays: its density belongs to the points where they cross the reference
     plane (`pipeline.truth.geometry.pieces`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
     which heights displace nothing [Chen2024Woven]. Known to the estimators `mc`, `r2`, `owen` and `auto`."""
-    walls: Literal["left_out", "rim"] = "left_out"
+    walls: Walls = "left_out"
     """Meaning of a view ray that meets the step between two floats: it does not count, or it sees the rim of the yarn
     above, so that the mean over all places does not depend on the footprint."""
     shadows: bool = True

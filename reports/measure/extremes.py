@@ -3,7 +3,7 @@
 All methods evaluate one set of queries on one set of cloths, one of them as lustrous as yarns may be (alpha = .01):
 
     error       relative RMSE of the colour measure against the truth: at each footprint without grazing angles, and at
-                grazing angles
+                grazing angles; with parallax of the light alone, because the truth knows no viewer beyond 89 degrees
     rounding    relative RMSE between the answers of a lower precision and the method's own, at all queries
     far         the same footprints a million yarns away: largest difference, over the largest answer
     large       1e4 repeats against 1e2: both are the average of the repeat
@@ -25,7 +25,7 @@ from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.method import Method
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
+from pipeline.truth.query import LOWEST_VIEWER, Queries
 from reports.error import COLOUR_WEIGHTS
 from reports.options import EXTREME_TRUTH, Role
 from reports.record import Metric, Record
@@ -107,7 +107,7 @@ def measure_extremes(
         covering = [[method for method in family if method.covers(fabric)] for family in families]
         if not any(covering):
             continue
-        true = estimate(fabric, inputs.queries, truth, 0).mean.astype(np.float64)
+        true = _true(fabric, inputs.queries, truth)
         for family in covering:
             own: Float64 | None = None
             for method in family:
@@ -119,6 +119,14 @@ def measure_extremes(
                     records += _of(subject, "extreme_rounding", _relative(answers, own), len(own))
                 own = answers if own is None else own
     return records
+
+
+def _true(fabric: Fabric, queries: Queries, options: TruthOptions) -> Float64:
+    """Return the truth, NaN for viewers too low for parallax."""
+    known = queries.wo[:, 2] >= (LOWEST_VIEWER if options.parallax else 0.0)
+    result = np.full((len(known), 4), np.nan)
+    result[known] = estimate(fabric, queries.take(known), options, 0).mean
+    return result
 
 
 def _measured(

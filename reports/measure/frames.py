@@ -74,7 +74,7 @@ def measure_aliasing(method: Method, fabric: Fabric, options: FrameOptions, fram
         seed = int(fingerprint(["aliasing", fabric.name, index, options.seed]), 16)
         queries = gbuffer.queries(fabric.repeat)
         values = method.predict(fabric, queries, seed)
-        planes.append(_spread(gbuffer, shade(fabric, values, queries) @ _LUMINANCE))
+        planes.append(_spread(gbuffer, shade(fabric, values, queries, bounces=1) @ _LUMINANCE))
     shown = np.array(planes)
     lit, rows = reference.lit, reference.lit.all(axis=1)  # the spectrum is of rows that are lit from end to end
     subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, scene="plane")

@@ -19,7 +19,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.models.method import Method
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import View
-from pipeline.scenes.shade import coloured, compose, shade
+from pipeline.scenes.shade import compose, shade
 from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
 from pipeline.truth.scattering.thread_colours import component_colours
@@ -41,7 +41,7 @@ def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Pat
     answers = estimate(fabric, queries, options.truth, seed)
     colours = component_colours(fabric, queries, options.truth, seed).mean
     noise = compose(gbuffer, colour_noise(answers, colours))
-    picture = compose(gbuffer, coloured(answers.mean, colours))
+    picture = compose(gbuffer, shade(fabric, answers.mean, queries, colours=colours))
     write_picture(path, picture, gbuffer.mask, {**_about(fabric, scene, gbuffer), "method": TRUTH}, noise)
 
 

@@ -37,8 +37,7 @@ def test_a_signal_at_five_moments(recipe, undisturbed, tmp_path, name):
         ended = end(process, timeout=60.0)
         assert ended.code in CODES[name], ended
         assert ended.code <= 0 or ended.sentence.startswith("stopped")
-        assert "Traceback" not in ended.stderr or ended.code < 0
-        assert not gone(children)
+        assert ("Traceback" not in ended.stderr or ended.code < 0) and not gone(children)
     finish(recipe, out, undisturbed)
 
 
@@ -51,8 +50,7 @@ def test_a_second_run_on_one_folder_is_refused_and_disturbs_nothing(recipe, undi
     assert second.sentence and "another run is at work in this folder" in second.stderr
     ended = end(first)
     assert ended.code == 0, ended.stderr
-    assert hashes(recipe, out) == undisturbed[1]
-    assert not leftovers(out)
+    assert hashes(recipe, out) == undisturbed[1] and not leftovers(out)
 
 
 def test_two_runs_on_one_scheduler_each_fill_their_folder(recipe, undisturbed, tmp_path):

@@ -8,30 +8,16 @@ import pytest
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from tests.faults.runs import hashes, leftovers, run
+from tests.jobs.made_up import flip
 
 pytestmark = pytest.mark.faults
 
 KINDS = (
-    "datasets/*/*.parquet",
-    "datasets/*/manifest.json",
-    "ledger/*.json",
-    "models/*/model.safetensors",
-    "models/*/card.json",
-    "records/*.exr",
-    "records/*[!e].json",
-    "records/*.machine.json",
-    "report/*/index.html",
-    "report/*/files.json",
-    "report/*/figures/*.png",
-    "report/*/tables/*.csv",
+    *("datasets/*/*.parquet", "datasets/*/manifest.json", "ledger/*.json", "models/*/model.safetensors"),
+    *("models/*/card.json", "records/*.exr", "records/*[!e].json", "records/*.machine.json"),
+    *("report/*/index.html", "report/*/files.json", "report/*/figures/*.png", "report/*/tables/*.csv"),
 )
 ROUNDS, FLIPS = 13, 16
-
-
-def flip(path, seeded):
-    content = bytearray(path.read_bytes())
-    content[seeded.randrange(len(content))] ^= seeded.randrange(1, 256)
-    path.write_bytes(content)
 
 
 @pytest.mark.parametrize("seed", range(ROUNDS))

@@ -19,19 +19,13 @@ pytestmark = pytest.mark.faults
 
 ROOT = Path(__file__).parents[2]
 KILLS = 12
-RECIPE = """
-name = "tiny"
-[dataset]
-seen = ["denim", "satin_8", "crepe", "voile"]
-shard_rows = 4096
-rows = { train = 65536 }
-"""
 
 
 def test_a_killed_run_leaves_nothing_and_is_continued(tmp_path):
-    (tmp_path / "tiny.toml").write_text(RECIPE)
-    made_up.finished(tmp_path / "tiny.toml", tmp_path / "out", ["generate"])
-    folder = tmp_path / "out" / DataSet(load_recipe(tmp_path / "tiny.toml")).folder
+    large = {"seen": ["denim", "satin_8", "crepe", "voile"], "shard_rows": 4096, "rows": {"train": 65536}}
+    recipe = made_up.write_recipe(tmp_path, "tiny", **large)
+    made_up.finished(recipe, tmp_path / "out", ["generate"])
+    folder = tmp_path / "out" / DataSet(load_recipe(recipe)).folder
     whole, target, staging = tmp_path / "whole", tmp_path / "target", tmp_path / ".tmp-target"
     command = [sys.executable, "-m", "jobs.cli", "publish", str(folder), "--licence", "MIT", "--to"]
 
@@ -57,6 +51,4 @@ def test_a_killed_run_leaves_nothing_and_is_continued(tmp_path):
         kills += 1
         inside += staging.exists()
     assert inside >= KILLS // 2, "most kills were before anything was written"
-    assert start(target).wait() == 0
-    assert made_up.contents(target) == made_up.contents(whole)
-    assert not staging.exists()
+    assert start(target).wait() == 0 and made_up.contents(target) == made_up.contents(whole) and not staging.exists()

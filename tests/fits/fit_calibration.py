@@ -31,22 +31,17 @@ from reports.truth.calibration import samples
 SEED = 2_000
 LEAST = 150
 SHARE = 0.9975
-STAGES = {
-    "COARSE_TABLE": COARSE_TABLE,
-    "FINE_TABLE": FINE_TABLE,
-    "REFINED": REFINED,
-    "SAMPLED": SAMPLED,
-    "QUADRATURE": QUADRATURE,
-    "QUADRATURE_CURVED": QUADRATURE_CURVED,
-}
+STAGES = {"COARSE_TABLE": COARSE_TABLE, "FINE_TABLE": FINE_TABLE, "REFINED": REFINED, "SAMPLED": SAMPLED}
+STAGES |= {"QUADRATURE": QUADRATURE, "QUADRATURE_CURVED": QUADRATURE_CURVED}
 REPORTED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4)
 LARGEST = (0.03, 0.1, 0.3, math.inf)
 MISSED = (0.0, 0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.006)
 
 
-def fitted(
-    groups: dict[str, tuple[np.ndarray, ...]],
-) -> list[tuple[float, float, float, float, float, dict[str, float]]]:
+Fit = tuple[float, float, float, float, float, dict[str, float]]
+
+
+def fitted(groups: dict[str, tuple[np.ndarray, ...]]) -> list[Fit]:
     """Return penalty, a, c, b, k and the ratios of each class for every triple of factors, the best first."""
     found = []
     for a, c, b in itertools.product(REPORTED, LARGEST, MISSED):

@@ -8,15 +8,10 @@ surface turns across the part: pi for a whole float. The rate is fitted to root 
 (seed 19), for three fabrics without shadows, alpha from .1 to .3 and n = 4, 8, 16, by least squares where the share
 lies between 1e-8 and .3.
 
-Seen: rate 6.8 and factor .22 over 43 rules, in use 14 and 2. At n alpha / angle = .25 that is a share of .04, in use
-.06; at .5 it is .007, in use .002: for fine rules the value in use is too optimistic as a bound on its own. The
-reported error also holds the last change of each part.
-
 SAFETY is the factor between the estimated and the reported error: the 95th percentile of the norm of the true error
 over the norm of the estimated one, for queries of three fabrics (seed 18) at 2 % and .3 %. The reference has rules of
 32 and 64 nodes an axis on every part.
-
-Seen, with ``--rows 20``: fitted .97, in use 1.5, which covers 96.7 % of 120 answers.
+What was seen is in reports/LOG.md.
 """
 
 from __future__ import annotations

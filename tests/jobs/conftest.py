@@ -53,20 +53,9 @@ frames = 4
 FABRIC = """
 name = "own"
 source = "made up"
-
-[draft]
-family = "satin"
-ends = 5
-move = 2
-
-[warp]
-bend = 20.0
-roughness = 0.3
-diffuse = "#804020"
-
-[weft]
-bend = 30.0
-roughness = 0.4
+draft = { family = "satin", ends = 5, move = 2 }
+warp = { bend = 20.0, roughness = 0.3, diffuse = "#804020" }
+weft = { bend = 30.0, roughness = 0.4 }
 """
 
 

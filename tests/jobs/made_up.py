@@ -1,10 +1,12 @@
 """Products of real plans without their work: each task writes bytes that depend on its id alone, times excepted."""
 
 import json
+import random
 import time
 from pathlib import Path
 
 import numpy as np
+import tomli_w
 
 from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.page import Page
@@ -23,6 +25,23 @@ from pipeline.shards.queries import draw_queries
 from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.query import Answers
 from reports.page.files import write_files
+
+
+def write_recipe(folder, name, *models, bench=None, **dataset):
+    """Write a recipe of denim and small shards, with models by name or with options; return its path."""
+    dataset = {"seen": ["denim"], "shard_rows": 64, "rows": {"train": 128, "validation": 32, "test": 64}} | dataset
+    models = [{"model": model} if isinstance(model, str) else model for model in models]
+    content = {"name": name, "dataset": dataset, "models": models, "bench": bench or {"views": ["plane"]}}
+    path = folder / f"{name}.toml"
+    path.write_text(tomli_w.dumps(content), encoding="utf-8")
+    return path
+
+
+def flip(path, chance=random.Random(0)):  # noqa: B008, any byte will do
+    """Change a byte of a file."""
+    content = bytearray(path.read_bytes())
+    content[chance.randrange(len(content))] ^= chance.randrange(1, 256)
+    path.write_bytes(content)
 
 
 def make(task, out):

@@ -51,12 +51,18 @@ truth = { estimator = "owen", relative_error = 0.2, min_count = 64, max_count = 
 """
 
 
-def write_smallest(folder, name, dataset=None, model=None):
-    """Write the smallest recipe with a name, and other values of the data set and the network; return its path."""
+def write_smallest(folder, name, dataset=None, model=None, variant=None, bench=None):
+    """Write the smallest recipe with a name, and other values of its tables; return its path.
+
+    A variant of the network, with other values, takes the place of the points.
+    """
     content = {"name": name} | tomllib.loads(SMALLEST)
-    for table, changes in ((content["dataset"], dataset), (content["models"][0], model)):
+    network = content["models"][0]
+    for table, changes in ((content["dataset"], dataset), (network, model), (content["bench"], bench)):
         for key, value in (changes or {}).items():
             table[key] = table.get(key, {}) | value if isinstance(value, dict) else value
+    if variant:
+        content["models"][1] = network | variant
     path = folder / f"{name}.toml"
     path.write_text(tomli_w.dumps(content), encoding="utf-8")
     return path

@@ -51,15 +51,20 @@ def cluster_spec(name, image, env, worker_command):
     return {"spec": {"worker": {"spec": {"containers": [{"image": image, "env": env, "args": worker_command}]}}}}
 
 
+SERVICES = {
+    "dask_jobqueue": {"SLURMCluster": Service},
+    "dask_kubernetes": {},
+    "dask_kubernetes.operator": {"KubeCluster": Service, "make_cluster_spec": cluster_spec},
+    "dask_cloudprovider": {},
+    "dask_cloudprovider.aws": {"FargateCluster": Service},
+}
+"""Modules that are not installed, and what the snippets import from them."""
+
+
 @pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```$", TEXT, re.M | re.S), ids=["slurm", "k8s", "aws"])
 def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, monkeypatch, code):
-    for name in ("dask_jobqueue", "dask_kubernetes", "dask_kubernetes.operator", "dask_cloudprovider"):
-        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
-    monkeypatch.setitem(sys.modules, "dask_cloudprovider.aws", types.ModuleType("aws"))
-    monkeypatch.setattr(sys.modules["dask_jobqueue"], "SLURMCluster", Service, raising=False)
-    monkeypatch.setattr(sys.modules["dask_kubernetes.operator"], "KubeCluster", Service, raising=False)
-    monkeypatch.setattr(sys.modules["dask_kubernetes.operator"], "make_cluster_spec", cluster_spec, raising=False)
-    monkeypatch.setattr(sys.modules["dask_cloudprovider.aws"], "FargateCluster", Service, raising=False)
+    for name, members in SERVICES.items():
+        monkeypatch.setitem(sys.modules, name, types.SimpleNamespace(**members))
     monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
     summaries = []
     started = types.SimpleNamespace(run=lambda command, check: summaries.append(run(command, tmp_path)))

@@ -162,8 +162,7 @@ def test_finished_tasks_cost_one_request_a_receipt_and_then_none(switch, tmp_pat
     listings = 2 + 3 * 3  # of five folders; s3fs asks twice more about each that is empty
     for expected in (len(tasks) + listings, listings):
         switch.paths.clear()
-        assert Counter(map(Ledger(there).state, tasks)) == {"done": 200}
-        assert len(switch.paths) <= expected
+        assert Counter(map(Ledger(there).state, tasks)) == {"done": 200} and len(switch.paths) <= expected
     # What has changed is seen: a receipt that is gone, one with other content, a product that is cut.
     (there / here.receipt_path(tasks[0])).unlink()
     (there / here.receipt_path(tasks[1])).write_bytes(b"{}")
@@ -186,8 +185,7 @@ def test_a_ledger_sees_what_it_has_written(switch, tmp_path):
     twin = fake_stages.task("a", folder="datasets/b")
     assert twin.id == task.id and ledger.adopt(twin) and ledger.state(twin) == "done"
     product.write_bytes(b"flaw!")
-    assert ledger.discard(task) == [task.products[0]] and ledger.state(task) == "missing"
-    assert not product.exists()
+    assert ledger.discard(task) == [task.products[0]] and ledger.state(task) == "missing" and not product.exists()
 
 
 def test_a_storage_that_does_not_answer_ends_with_a_sentence(switch, call, monkeypatch):
@@ -261,8 +259,7 @@ def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, recipe, call):
     whole = weights.read_bytes(), picture.read_bytes()
     for path in (weights, picture):
         path.unlink()
-    assert call("check", address)[0] == 1
-    assert call("check", address, "--repair", "--workers", "1")[0] == 0
+    assert call("check", address)[0] == 1 and call("check", address, "--repair", "--workers", "1")[0] == 0
     assert weights.read_bytes() == whole[0] and picture.exists()
     # Another recipe needs none of it but what both measure without the data set.
     other = small(tmp_path, "other", seed=9)

@@ -103,8 +103,7 @@ def test_the_text_is_enough(entered):
     assert len(re.findall(r"<tr[^>]*>\s*<t[hd][^>]*>(?:<[^>]*>|\s)*nearest[ _]table", html)) > 3, "a row in each table"
     assert "nothing to do" in run(COMMAND, entered).stdout
     without = run(COMMAND.partition(" --add")[0], entered)
-    assert without.returncode == 2
-    assert "'nearest_table'" in without.stderr and "--add FILE.py:CLASS" in without.stderr
+    assert without.returncode == 2 and "'nearest_table'" in without.stderr and "--add FILE.py:CLASS" in without.stderr
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +171,6 @@ def test_methods_that_fail_leave_the_others_their_results(entered):
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
     assert "hangs: predict took longer than 5 s, its limit" in last and "--add late.py:Late" in last
-
     records = [path for path in (entered / "out" / "records").glob("*.json") if "machine" not in path.name]
     timing = {path.name: read_records([path]) for path in records if "tim" in path.name}
     frame = next(found for name, found in timing.items() if "plane" in name)

@@ -1,5 +1,3 @@
-"""The models that come with the package: small, whole, and as good as their cards say."""
-
 import json
 
 import numpy as np

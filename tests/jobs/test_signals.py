@@ -16,5 +16,4 @@ def test_a_signal_ends_a_run_with_one_sentence(tmp_path):
     children = family(process)
     process.send_signal(signal.SIGTERM)
     ended = end(process, timeout=300)
-    assert ended.code == 143 and ended.sentence.startswith("stopped")
-    assert not gone(children, seconds=300)
+    assert ended.code == 143 and ended.sentence.startswith("stopped") and not gone(children, seconds=300)

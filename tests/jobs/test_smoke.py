@@ -18,28 +18,22 @@ def test_the_smoke_recipe_from_fabrics_to_the_page(tmp_path, capsys):
     assert all(Ledger(out).state(task) == "done" for task in tasks)
     # What a run leaves: nothing half-written, nothing outside these folders.
     assert {path.name for path in out.iterdir()} == {"datasets", "ledger", "models", "records", "report"}
-    assert not list(out.rglob(".tmp-*"))
-
-    assert main(["run", "smoke", "--out", str(out)]) == 0
+    assert not list(out.rglob(".tmp-*")) and main(["run", "smoke", "--out", str(out)]) == 0
     assert f"nothing to do: {len(tasks)} tasks done" in capsys.readouterr().out
-
     # What a scene requires is chosen from that page, and its recipe is one.
     asked = ["require", "curtain", "--out", str(out), "--recipe", "smoke", "--frames", "1"]
     assert main([*asked, "--error", "0.5"]) == 0, capsys.readouterr().err
     assert "measured here" in capsys.readouterr().out
     narrow = load_recipe(out / "recipes" / "require-curtain.toml")
     assert [fabric.name for fabric in narrow.seen] == ["voile"]
-    assert narrow.dataset.queries.sigma[1] < load_recipe("smoke").dataset.queries.sigma[1]
-    assert plan(narrow)
+    assert narrow.dataset.queries.sigma[1] < load_recipe("smoke").dataset.queries.sigma[1] and plan(narrow)
     # A wish that nothing meets is answered with the nearest points of the front.
     assert main([*asked, "--error", "1e-9", "--time", "1e-3"]) == 2
     assert "nearest points of the front" in capsys.readouterr().err
-
     shard = out / tasks[0].products[0]
     whole = shard.read_bytes()
     shard.write_bytes(whole[: len(whole) // 2])
     assert main(["check", "smoke", "--out", str(out)]) == 2
     assert f"{shard}: cut: it has" in " ".join(capsys.readouterr().err.split())
-    assert main(["check", "smoke", "--repair", "--out", str(out)]) == 0
-    assert shard.read_bytes() == whole
+    assert main(["check", "smoke", "--repair", "--out", str(out)]) == 0 and shard.read_bytes() == whole
     assert main(["check", "smoke", "--out", str(out)]) == 0

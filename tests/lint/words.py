@@ -8,34 +8,20 @@ from collections.abc import Iterator
 from tests.lint.tree import DOORS, MODULES, Source
 
 NAMES = {
-    "knob": "parameter",
-    "teacher": "trained_by",
-    "verdict": "result",
-    "contradictions": "validation",
-    "leftovers": "fallback_share",
-    "errs": "error",
-    "elliptic": "auto",
-    "oblique": "rotated",
-    "placed": "nodes placed in the footprint",
-    "stand_in": "fallback",
-    "left_to": "fallback",
+    "knob": "parameter", "teacher": "trained_by", "verdict": "result", "contradictions": "validation",
+    "leftovers": "fallback_share", "errs": "error", "elliptic": "auto", "oblique": "rotated",
+    "placed": "nodes placed in the footprint", "stand_in": "fallback", "left_to": "fallback",
     "not_its_own": "fallback_share",
-}
+}  # fmt: skip
 """Words that are no part of any name, and the term to use."""
 
 OPENINGS = re.compile(r"(What|Say|Says|Tell|Tells|Whether)\b")
 """Openings of docstrings that are neither a noun nor an imperative of the field; bools open with "True if"."""
 
 PROSE = {
-    "asked": "query, evaluate",
-    "asks": "query, evaluate",
-    "taught": "trained on",
-    "told": "report, receive",
-    "errs": "error",
-    "teacher": "trained_by",
-    "knob": "parameter",
-    "leftovers": "fallback_share",
-}
+    "asked": "query, evaluate", "asks": "query, evaluate", "taught": "trained on", "told": "report, receive",
+    "errs": "error", "teacher": "trained_by", "knob": "parameter", "leftovers": "fallback_share",
+}  # fmt: skip
 """Words that are not in docstrings and comments outside of code spans, and the terms to use."""
 
 

@@ -11,9 +11,7 @@ ALONE = Choices(macro=False, shadows=False)
 
 def _shares(fabric, x, y, wi, wo):
     """Return area, specular, diffuse of warp, weft and gaps (by columns 0 to 2), each (N, 3), at points of the repeat.
-
-    `wi` and `wo` are one direction, or one for each point.
-    """
+    `wi` and `wo` are one direction, or one for each point."""
     front = height_field(fabric)
     found = np.zeros((3, len(x), 3))
     for k, at in enumerate(zip(np.asarray(x, np.float64), np.asarray(y, np.float64), strict=True)):

@@ -1,5 +1,3 @@
-"""Canonical bytes: the same specification, the same fingerprint."""
-
 import hashlib
 
 import pytest

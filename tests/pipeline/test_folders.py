@@ -1,5 +1,3 @@
-"""A folder that is written again keeps everything that is not the command's own."""
-
 import json
 import subprocess
 import sys
@@ -85,7 +83,7 @@ def test_what_is_not_its_own_is_refused_by_name_before_anything_is_touched(folde
     assert content(folder) == before
 
 
-def test_an_error_leaves_the_files_of_before(folder):
+def test_an_error_leaves_the_files_of_before_and_two_processes_do_not_write_one_folder(folder):
     before = content(folder)
     with pytest.raises(WorkFailed), own_files(folder, LISTING) as new:
         (new / "a").write_text("half")
@@ -94,6 +92,8 @@ def test_an_error_leaves_the_files_of_before(folder):
     with pytest.raises(RuntimeError), own_files(folder.parent / "none", LISTING):
         raise RuntimeError
     assert not (folder.parent / "none").exists()
+    with own_files(folder, LISTING), pytest.raises(WorkFailed, match="another process"):
+        write(folder, a="2")
 
 
 KILLED = """
@@ -136,8 +136,3 @@ def test_after_a_kill_a_changed_file_is_refused_too(folder):
     with pytest.raises(BadInput, match="x: was changed"):
         write(folder, b="2")
     assert content(folder) == before
-
-
-def test_two_processes_do_not_write_the_same_folder(folder):
-    with own_files(folder, LISTING), pytest.raises(WorkFailed, match="another process"):
-        write(folder, a="2")

@@ -1,5 +1,3 @@
-"""A process of its own: what it returns, raises and inherits, and that it ends with its parent."""
-
 import os
 import subprocess
 import sys
@@ -10,19 +8,10 @@ import psutil
 import pytest
 
 from pipeline.own_process import ProcessEnded, in_own_process
+from tests.pipeline.sent_code import Code
 from weaves.errors import BadInput
 
 ROOT = Path(__file__).parents[2]
-
-
-class Code:
-    """A function that the other process reads from its text: this module is unknown there."""
-
-    def __init__(self, text):
-        self.text = text
-
-    def __reduce__(self):
-        return eval, (self.text,)
 
 
 def test_the_result_and_the_progress_come_back_from_a_process_with_the_paths_of_this_one(tmp_path, monkeypatch):

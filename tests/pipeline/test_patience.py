@@ -1,5 +1,3 @@
-"""Requests to a storage that fails: how often they are repeated, for how long, and what is said."""
-
 import asyncio
 
 import pytest
@@ -93,13 +91,13 @@ def test_a_storage_that_never_answered_is_given_up_soon(clock, said):
     assert clock.now - begun < 10 and not said
 
 
-def test_one_that_answered_a_process_of_the_run_is_waited_for(clock, said):
-    patience.expect()
-    assert ask(failing(20)[0], "unreached") == "answer"
-    assert len(said) == 1
-
-
 def test_an_error_that_would_come_again_is_raised_at_once(clock, said):
     with pytest.raises(LastingError):
         ask(failing(1, LastingError)[0])
     assert clock.pauses == [] and not said
+
+
+def test_one_that_answered_a_process_of_the_run_is_waited_for(clock, said):
+    patience.expect()
+    assert ask(failing(20)[0], "unreached") == "answer"
+    assert len(said) == 1

@@ -1,5 +1,3 @@
-"""What is made once a fabric is made once for equal optics, and never given to another fabric."""
-
 from pipeline.per_fabric import PerFabric
 from weaves.fabric import load_fabric
 

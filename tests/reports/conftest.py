@@ -15,17 +15,8 @@ from weaves.fabric import load_fabric
 
 COARSE = TruthOptions(relative_error=0.2, min_count=256, max_count=256)
 
-OPTIONS = BenchOptions(
-    sphere_size=(32, 32),
-    plane_size=(40, 32),
-    frames=3,
-    frame_size=(32, 24),
-    truth=COARSE,
-    frame_truth=COARSE,
-    timing_rows=64,
-    timing_repeats=20,
-    warm_up=1,
-)
+FEW = {"frames": 3, "timing_rows": 64, "timing_repeats": 20, "warm_up": 1, "truth": COARSE, "frame_truth": COARSE}
+OPTIONS = BenchOptions(sphere_size=(32, 32), plane_size=(40, 32), frame_size=(32, 24), **FEW)
 
 
 class Oracle(FakeMethod):

@@ -4,15 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.truth.query import Answers
-from reports.error import (
-    COLOUR_WEIGHTS,
-    colour_error,
-    colour_noise,
-    component_errors,
-    most_error,
-    ratio,
-    squared_error,
-)
+from reports.error import COLOUR_WEIGHTS, colour_error, colour_noise, component_errors, most_error, ratio, squared_error
 
 
 def answers(mean, standard_error):
@@ -30,11 +22,9 @@ def test_noise_of_the_truth_is_subtracted_without_bias():
     noise = np.full_like(field, 0.1)
     truth = field + noise * random.standard_normal(field.shape)
     error = squared_error(field + 0.05, truth, noise)
-    assert error.measured == pytest.approx(0.0125, rel=0.05)
-    assert error.noise == pytest.approx(0.01)
+    assert error.measured == pytest.approx(0.0125, rel=0.05) and error.noise == pytest.approx(0.01)
     assert error.value == pytest.approx(0.0025, abs=5 * 9e-5)
-    assert error.standard_error == pytest.approx(9e-5, rel=0.15)
-    assert error.mean == pytest.approx(truth.mean())
+    assert error.standard_error == pytest.approx(9e-5, rel=0.15) and error.mean == pytest.approx(truth.mean())
     perfect = squared_error(field, truth, noise)
     assert abs(perfect.value) < 5 * perfect.standard_error
 
@@ -71,8 +61,7 @@ def test_error_of_99_per_cent_leaves_the_largest_errors_out():
     off = np.where(np.arange(200) == 7, 40.0, 0.4)
     values = truth.mean + off[:, None] * np.array([0, 0, 1, 0])
     assert most_error(values, truth).value == pytest.approx(0.2**2 - 0.1**2, rel=1e-6)
-    assert most_error(values, truth).count == 198
-    assert colour_error(values, truth, COLOUR_WEIGHTS).value > 1.0
+    assert most_error(values, truth).count == 198 and colour_error(values, truth, COLOUR_WEIGHTS).value > 1.0
 
 
 def test_colour_noise_adds_in_squares():
@@ -84,8 +73,7 @@ def test_components_stay_apart():
     truth = answers(np.tile([1, 2, 4, 0], (6, 1)), np.zeros((6, 4)))
     values = truth.mean + np.array([0.1, 0.1, 0.1, 0])
     found = [error.relative_rmse for error in component_errors(values, truth)]
-    assert found[:3] == pytest.approx([0.1, 0.05, 0.025], rel=1e-5)
-    assert math.isnan(found[3])
+    assert found[:3] == pytest.approx([0.1, 0.05, 0.025], rel=1e-5) and math.isnan(found[3])
 
 
 def test_ratio_has_the_delta_methods_interval():
@@ -93,5 +81,4 @@ def test_ratio_has_the_delta_methods_interval():
     value, low, high = ratio((4.0, 0.04), (2.0, 0.02))
     random = np.random.default_rng(3)
     draws = random.normal(4, 0.04, 200_000) / random.normal(2, 0.02, 200_000)
-    assert value == 2
-    assert (low, high) == pytest.approx(tuple(np.percentile(draws, [2.5, 97.5])), abs=0.003)
+    assert value == 2 and (low, high) == pytest.approx(tuple(np.percentile(draws, [2.5, 97.5])), abs=0.003)

@@ -1,5 +1,3 @@
-"""Means and ranges over trainings."""
-
 import math
 
 import pandas as pd
@@ -58,8 +56,7 @@ def test_each_training_is_seen_with_all_that_learns_nothing():
         [("a", 4.0), ("a", 50.0)],
         [("a", 1.0), ("a", 50.0)],
     ]
-    assert all(RECORDS[-1] in part for part in parts)
-    assert by_seed(RECORDS[3:5]) == by_seed([]) == []
+    assert all(RECORDS[-1] in part for part in parts) and by_seed(RECORDS[3:5]) == by_seed([]) == []
 
 
 @over_seeds(["method", "setting"], ["ratio"])

@@ -1,6 +1,6 @@
 """Measure the driver: its time for each task and its memory, at 10^3, 10^4 and 10^5 tasks.
 
-Command: ``PYTHONPATH=. python tests/scale/measure_driver.py [--tasks 1000 10000 100000]``
+Command: ``PYTHONPATH=. python tests/scale/measure_driver.py [--tasks 1000 --tasks 10000 --tasks 100000]``
 
 A recipe with so many shards is planned. Tasks with the same fields, which only write a short file, are then finished
 on a scheduler with two workers of eight threads, all in processes of their own; then everything is resumed. Each
@@ -11,7 +11,6 @@ is mostly theirs.
 
 from __future__ import annotations
 
-import argparse
 import io
 import json
 import resource
@@ -23,6 +22,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
+import cyclopts
 from rich.console import Console
 
 from jobs.plan.dataset import DataSet, Shard
@@ -109,24 +109,18 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
     return result
 
 
-def main() -> None:
-    """Measure each number of tasks and print a table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--tasks", type=int, nargs="+", default=[10**3, 10**4, 10**5])
-    parser.add_argument("--here", action="store_true", help="a cluster of the driver's own, its scheduler included")
-    parser.add_argument("--one", action="store_true", help="measure in this process and print JSON")
-    options = parser.parse_args()
-    if options.one:
-        print(json.dumps(measure(options.tasks[0], options.here)))
+def main(tasks: tuple[int, ...] = (10**3, 10**4, 10**5), here: bool = False, one: bool = False) -> None:
+    """Measure each number of tasks and print a table; `here` on a cluster of the driver's own, `one` as JSON."""
+    if one:
+        print(json.dumps(measure(tasks[0], here)))
         return
-    print("| tasks | plan | run | resume | peak memory |")
-    print("|---|---|---|---|---|")
-    for count in options.tasks:
-        command = [sys.executable, __file__, "--one", "--tasks", str(count), *(["--here"] if options.here else [])]
+    print("| tasks | plan | run | resume | peak memory |\n|---|---|---|---|---|")
+    for count in tasks:
+        command = [sys.executable, __file__, "--one", "--tasks", str(count), *(["--here"] if here else [])]
         found = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout)
         cells = [f"{found[name]['wall']:.2f} ({found[name]['cpu']:.2f})" for name in ("plan", "run", "resume")]
         print(f"| {count:,} | {' | '.join(cells)} | {found['resume']['memory']:.0f} MiB |", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    cyclopts.run(main)

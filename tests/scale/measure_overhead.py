@@ -8,12 +8,12 @@ time of the workers is counted from the first start to the last start of a task,
 
 from __future__ import annotations
 
-import argparse
 import io
 import json
 import tempfile
 from pathlib import Path
 
+import cyclopts
 from rich.console import Console
 
 from jobs.plan.plan import plan
@@ -23,31 +23,28 @@ from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from tests.scale.measure_driver import write_many
 
+SHARD_ROWS = DatasetOptions.model_fields["shard_rows"].default
 
-def main() -> None:
+
+def main(shards: int = 16, workers: int = 2, rows: int = SHARD_ROWS) -> None:
     """Generate the shards and print the share."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--shards", type=int, default=16)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--rows", type=int, default=DatasetOptions.model_fields["shard_rows"].default)
-    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        recipe = write_many(folder, options.shards, options.rows)
+        recipe = write_many(folder, shards, rows)
         tasks = [task for task in plan(load_recipe(recipe)) if task.stage == "generate" and " train " in task.title]
         log = io.StringIO()
         ledger = Ledger(folder)
-        execute(tasks, ledger, workers=options.workers, console=Console(file=log), progress="json")
+        execute(tasks, ledger, workers=workers, console=Console(file=log), progress="json")
         seconds = {task.id: ledger.seconds(task) for task in tasks}
     events = [json.loads(line) for line in log.getvalue().splitlines()]
     ends = {event["task"]: event["time"] for event in events if event["event"] == "end"}
     starts = {id: ends[id] - seconds[id] for id in seconds}
     first, last = min(starts.values()), max(starts.values())
     busy = sum(min(ends[id], last) - starts[id] for id in seconds)
-    share = 1 - busy / (options.workers * (last - first))
+    share = 1 - busy / (workers * (last - first))
     mean = sum(seconds.values()) / len(seconds)
-    print(f"{len(tasks)} shards of {options.rows:,} rows, {mean:.1f} s each, {options.workers} workers: {share:.2%}")
+    print(f"{len(tasks)} shards of {rows:,} rows, {mean:.1f} s each, {workers} workers: {share:.2%}")
 
 
 if __name__ == "__main__":
-    main()
+    cyclopts.run(main)

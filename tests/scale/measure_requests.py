@@ -9,14 +9,13 @@ kept from line to line: the first look at the receipts fetches them.
 
 from __future__ import annotations
 
-import argparse
 import io
 import os
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
+import cyclopts
 from rich.console import Console
 
 from jobs.plan.dataset import Shard
@@ -28,7 +27,7 @@ from jobs.run.receipt import Product
 from jobs.verbs.plan import facts_of
 from pipeline.storage import place
 from tests.jobs.s3_server import serving
-from tests.scale.measure_driver import write_many
+from tests.scale.measure_driver import timed, write_many
 
 
 def fill(tasks: list[Shard], folder: Path, address: str) -> None:
@@ -46,39 +45,32 @@ def fill(tasks: list[Shard], folder: Path, address: str) -> None:
     storage.put(str(folder) + "/", address + "/", recursive=True)
 
 
-def main() -> None:
+def main(tasks: int = 1000) -> None:
     """Measure and print a table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--tasks", type=int, default=1000)
-    count = parser.parse_args().tasks
     with tempfile.TemporaryDirectory() as name, serving() as (server, switch):
         secret = {"AWS_ACCESS_KEY_ID": "key", "AWS_SECRET_ACCESS_KEY": "secret", "AWS_DEFAULT_REGION": "us-east-1"}
         os.environ |= {"AWS_ENDPOINT_URL": server, "XDG_CACHE_HOME": f"{name}/cache"} | secret
-        recipe = load_recipe(write_many(Path(name), count - 2))
-        tasks = [task for task in plan(recipe) if isinstance(task, Shard)]
-        fill(tasks, Path(name) / "out", "s3://products/many")
+        recipe = load_recipe(write_many(Path(name), tasks - 2))
+        shards = [task for task in plan(recipe) if isinstance(task, Shard)]
+        fill(shards, Path(name) / "out", "s3://products/many")
         out = place("s3://products/many")
 
         def resume() -> None:
-            summary = execute(tasks, Ledger(out), console=Console(file=io.StringIO()))
-            assert len(summary.before) == len(tasks)
+            summary = execute(shards, Ledger(out), console=Console(file=io.StringIO()))
+            assert len(summary.before) == len(shards)
 
         looks: dict[str, Callable[[], object]] = {
-            "status, first": lambda: list(map(Ledger(out).state, tasks)),
-            "status": lambda: list(map(Ledger(out).state, tasks)),
-            "plan": lambda: facts_of(tasks, Ledger(out)),
+            "status, first": lambda: list(map(Ledger(out).state, shards)),
+            "status": lambda: list(map(Ledger(out).state, shards)),
+            "plan": lambda: facts_of(shards, Ledger(out)),
             "resume": resume,
         }
-        print(f"{len(tasks):,} finished tasks")
-        print("| | requests | seconds |")
-        print("|---|---|---|")
+        print(f"{len(shards):,} finished tasks\n| | requests | seconds |\n|---|---|---|")
         for what, look in looks.items():
             switch.paths.clear()
-            wall, cpu = time.perf_counter(), time.process_time()
-            look()
-            wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-            print(f"| {what} | {len(switch.paths):,} | {wall:.1f} ({cpu:.1f}) |", flush=True)
+            took = timed(1000, look)  # in seconds
+            print(f"| {what} | {len(switch.paths):,} | {took['wall']:.1f} ({took['cpu']:.1f}) |", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    cyclopts.run(main)

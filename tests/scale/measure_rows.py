@@ -1,6 +1,6 @@
 """Measure generating, checking and reading for training at 10^5, 10^6 and 10^7 rows.
 
-Command: ``PYTHONPATH=. python tests/scale/measure_rows.py [--rows 100000 1000000 10000000] [--workers 2]``
+Command: ``PYTHONPATH=. python tests/scale/measure_rows.py [--rows 100000 --rows 1000000] [--workers 2]``
 
 The rows are training rows of one plain fabric, answered by 64 points each, which costs a hundredth of what real rows
 cost, in shards of the default size. Each step is a process of its own: `twillight generate`, `twillight check`, and the
@@ -11,7 +11,6 @@ process had open; for the reading, the same two times from its start to the firs
 
 from __future__ import annotations
 
-import argparse
 import resource
 import subprocess
 import sys
@@ -19,6 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import cyclopts
 import psutil
 
 ROOT = Path(__file__).parents[2]
@@ -73,32 +73,26 @@ def watched(command: list[str]) -> tuple[list[str], list[str]]:
     return [f"{wall:.0f} ({cpu:.0f})", f"{memory / 2**20:.0f} MiB", str(files)], said.strip().splitlines()
 
 
-def main() -> None:
-    """Measure each number of rows and print a table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--rows", type=int, nargs="+", default=[10**5, 10**6, 10**7])
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--read", type=Path, help="read this data set in this process")
-    options = parser.parse_args()
-    if options.read:
-        read(options.read)
+def main(rows: tuple[int, ...] = (10**5, 10**6, 10**7), workers: int = 2, dataset: Path | None = None) -> None:
+    """Measure each number of rows and print a table; with a data set, only read it."""
+    if dataset:
+        read(dataset)
         return
-    print("| rows | step | seconds | memory | files | first batch |")
-    print("|---|---|---|---|---|---|")
-    for rows in options.rows:
+    print("| rows | step | seconds | memory | files | first batch |\n|---|---|---|---|---|---|")
+    for count in rows:
         with tempfile.TemporaryDirectory() as name:
             recipe, out = Path(name) / "rows.toml", Path(name) / "out"
-            recipe.write_text(RECIPE.format(rows=rows))
+            recipe.write_text(RECIPE.format(rows=count))
             for step in ("generate", "check", "read"):
                 command = [sys.executable, "-c", START, step, str(recipe), "--out", str(out)]
                 if step == "generate":
-                    command += ["--workers", str(options.workers)]
+                    command += ["--workers", str(workers)]
                 if step == "read":
-                    command = [sys.executable, __file__, "--read", str(next(out.glob("datasets/*")))]
+                    command = [sys.executable, __file__, "--dataset", str(next(out.glob("datasets/*")))]
                 cells, said = watched(command)
                 first = said[-1] if step == "read" else ""
-                print(f"| {rows:,} | {step} | {' | '.join(cells)} | {first} |", flush=True)
+                print(f"| {count:,} | {step} | {' | '.join(cells)} | {first} |", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    cyclopts.run(main)

@@ -1,5 +1,3 @@
-"""Colours: three notations, one linear sRGB."""
-
 import numpy as np
 import pytest
 
@@ -8,8 +6,7 @@ from weaves.colour import Spectrum, delta_e, encoded, linear_rgb
 
 def test_hex_is_decoded_by_the_srgb_curve():
     """IEC 61966-2-1: below 0.04045 a line, above it ((c + 0.055)/1.055)^2.4."""
-    assert linear_rgb("#000000") == (0, 0, 0)
-    assert linear_rgb("#FFFFFF") == pytest.approx((1, 1, 1))
+    assert linear_rgb("#000000") == (0, 0, 0) and linear_rgb("#FFFFFF") == pytest.approx((1, 1, 1))
     assert linear_rgb("#0a80ff") == pytest.approx((10 / 255 / 12.92, ((128 / 255 + 0.055) / 1.055) ** 2.4, 1))
 
 
@@ -20,16 +17,11 @@ def test_a_flat_spectrum_is_grey_of_its_own_level(level):
     assert np.allclose(rgb, level, atol=1e-3)
 
 
-def test_a_spectrum_rising_to_the_red_is_red():
+def test_a_spectrum_rising_to_the_red_is_red_and_saturated_ones_are_clipped_to_the_gamut():
     red, green, blue = linear_rgb(Spectrum(wavelengths=(380, 570, 600, 780), values=(0.05, 0.05, 0.6, 0.6)))
-    assert red > 3 * green > 0
-    assert green >= blue
-
-
-def test_saturated_spectra_are_clipped_to_the_gamut():
+    assert red > 3 * green > 0 and green >= blue
     rgb = linear_rgb(Spectrum(wavelengths=(500, 505, 515, 520), values=(0, 1, 1, 0)))
-    assert all(0 <= channel <= 1 for channel in rgb)
-    assert min(rgb) == 0
+    assert min(rgb) == 0 and max(rgb) <= 1
 
 
 def test_encoding_inverts_the_srgb_curve():

@@ -1,5 +1,3 @@
-"""Families of weaves: plain, rib, basket, satins, and twills straight, broken and in herringbone."""
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -19,24 +17,18 @@ def test_every_end_takes_the_same_steps_and_the_twill_rises_to_the_side_it_is_na
         draft = Twill(over=over, under=under, direction=direction).build()
         # One pick up and one end to the side is the same crossing again.
         assert np.array_equal(np.roll(draft.warp_over, (1, side), (0, 1)), draft.warp_over)
-        assert draft.repeat == (sum(over) + sum(under),) * 2
-        assert set(draft.warp_over.sum(axis=0)) == {sum(over)}
+        assert draft.repeat == (sum(over) + sum(under),) * 2 and set(draft.warp_over.sum(axis=0)) == {sum(over)}
 
 
-def test_a_3_1_twill_is_drawn_as_weavers_draw_it():
-    draft = Twill(over=3, under=1).build()
-    assert draft.rows() == [".###", "###.", "##.#", "#.##"] and draft.name == "twill 3/1"
-
-
-def test_the_four_end_broken_twill_takes_its_ends_as_0_1_3_2():
+def test_a_3_1_twill_is_drawn_as_weavers_draw_it_and_broken_it_takes_its_ends_as_0_1_3_2():
     straight, broken = (Twill(family=family, over=3, under=1).build() for family in ("twill", "broken_twill"))
+    assert straight.rows() == [".###", "###.", "##.#", "#.##"] and straight.name == "twill 3/1"
     assert np.array_equal(broken.warp_over, straight.warp_over[:, [0, 1, 3, 2]])
 
 
 def test_herringbone_is_cut_where_it_turns():
     over = Herringbone(over=2, under=2).build().warp_over
-    assert over.shape == (4, 8)
-    assert np.array_equal(over[:, :4], Twill(over=2, under=2).build().warp_over)
+    assert over.shape == (4, 8) and np.array_equal(over[:, :4], Twill(over=2, under=2).build().warp_over)
     # Either side of a cut, every pick changes side: opposite ends.
     assert np.array_equal(over[:, [4, 0]], ~over[:, [3, 7]])
     # The second stripe falls to the right.
@@ -81,9 +73,7 @@ def test_a_satin_binds_every_end_once_apart_from_its_neighbours_or_is_refused(en
     except ValidationError:
         assert not possible
         return
-    assert possible
-    assert (bound.sum(axis=0) == 1).all()
-    assert [int(np.flatnonzero(pick)[0]) for pick in bound] == points
+    assert possible and (bound.sum(axis=0) == 1).all() and [int(np.flatnonzero(pick)[0]) for pick in bound] == points
     assert np.array_equal(Satin(family="sateen", ends=ends, move=move).build().warp_over, bound)
 
 
@@ -103,6 +93,5 @@ def test_a_satin_binds_every_end_once_apart_from_its_neighbours_or_is_refused(en
 def test_floats_span_the_groups_and_the_steps(weave, repeat, warp, weft):
     draft = weave.build()
     floats = cells(draft)
-    assert draft.repeat == repeat
-    assert set(floats.top_length[floats.top == 0]) == warp
+    assert draft.repeat == repeat and set(floats.top_length[floats.top == 0]) == warp
     assert set(floats.top_length[floats.top == 1]) == weft

@@ -1,5 +1,3 @@
-"""The mesh against the oracle of heights, and against areas and volumes in closed form."""
-
 import math
 from functools import partial
 
@@ -29,9 +27,9 @@ def _areas(mesh):
 
 @pytest.mark.parametrize("widths", WIDTHS)
 @pytest.mark.parametrize("name", PRESETS)
-def test_every_vertex_lies_on_its_yarn(name, widths):
+def test_every_vertex_lies_on_its_yarn_and_no_point_is_covered_twice(name, widths):
     fabric = _cloth(name, widths)
-    mesh = repeat_mesh(fabric, 6)
+    mesh = repeat_mesh(fabric, 5)
     for family, yarn in enumerate((mesh.warp, mesh.weft)):
         x, y, z = yarn.vertices.T
         # On the border of a piece one of the four sides is its own; a yarn rises from its side as a square root.
@@ -41,15 +39,8 @@ def test_every_vertex_lies_on_its_yarn(name, widths):
         inside = np.all([side.yarn == family for side in sides], axis=0) & (np.ptp([s.height for s in sides], 0) < 1e-9)
         assert inside.any()
         np.testing.assert_allclose(z[inside], surface_at(fabric, x, y).height[inside], rtol=0, atol=5e-6)
-
-
-@pytest.mark.parametrize("widths", WIDTHS)
-@pytest.mark.parametrize("name", PRESETS)
-def test_projected_areas_are_those_of_the_drawing(name, widths):
-    fabric = _cloth(name, widths)
-    over = fabric.weave.warp_over
-    warp, weft = widths
-    mesh = repeat_mesh(fabric, 5)
+    # Projected areas are those of the drawing.
+    over, (warp, weft) = fabric.weave.warp_over, widths
     areas = [_areas(part)[0][:, 2] for part in mesh]
     expected = [warp * (over + (1 - weft) * ~over).sum(), weft * (~over + (1 - warp) * over).sum(), 0.0]
     np.testing.assert_allclose([area.sum() for area in areas], expected, atol=1e-9)

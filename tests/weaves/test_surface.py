@@ -1,5 +1,3 @@
-"""The torus geometry: closed forms, symmetries, and the normal as the gradient of the height."""
-
 import mpmath
 import numpy as np
 import pytest
@@ -42,19 +40,17 @@ def random_points(fabric, count=4000, seed=1):
     return np.random.default_rng(seed).random((2, count)) * np.array([[ends], [picks]])
 
 
-def test_crown_of_a_plain_float_by_hand():
-    """L = 1, u_max = 30°: R = 1, r = 1/2, so the crown is 1 + 1/2 - cos 30° high; the fibres lie at psi to the yarn."""
+def test_a_plain_float_by_hand():
+    """L = 1, u_max = 30°: R = 1, r = 1/2, so the crown is 1 + 1/2 - cos 30° high; the fibres lie at psi to the yarn.
+
+    Off the axis sin v = x/r, sin u = y/(R + r cos v): at x = .25, y = .3.
+    """
     fabric = cloth({"family": "plain"}, {"bend": 30, "twist": 20}, {"bend": 30, "twist": 20})
     sine, cosine = np.sin(np.radians(20)), np.cos(np.radians(20))
     seen = surface_at(fabric, [0.5, 1.5], [0.5, 0.5])
-    assert seen.yarn.tolist() == [WARP, WEFT]
-    assert np.allclose(seen.height, 1.5 - np.sqrt(0.75), rtol=1e-15)
+    assert seen.yarn.tolist() == [WARP, WEFT] and np.allclose(seen.height, 1.5 - np.sqrt(0.75), rtol=1e-15)
     assert np.allclose(seen.normal, [0, 0, 1], atol=1e-16)
     assert np.allclose(seen.tangent, [[-sine, cosine, 0], [-cosine, -sine, 0]], atol=1e-15)
-
-
-def test_a_point_off_the_axis_by_hand():
-    """Closed form: sin v = x/r, sin u = y/(R + r cos v); at x = .25, y = .3 of a float with R = 1, r = 1/2."""
     fabric = cloth({"family": "plain"}, {"bend": 30, "twist": 0}, {"bend": 30, "twist": 0})
     cos_v = np.sqrt(0.75)
     sin_u = 0.3 / (1 + 0.5 * cos_v)
@@ -77,8 +73,7 @@ def test_normal_and_tangent_are_unit_and_orthogonal(fabric):
     yarn = seen.yarn != GAP
     assert np.allclose(np.linalg.norm(seen.normal, axis=-1), 1, atol=1e-14)
     assert np.allclose(np.linalg.norm(seen.tangent[yarn], axis=-1), 1, atol=1e-14)
-    assert np.abs((seen.normal * seen.tangent).sum(-1)).max() < 1e-14
-    assert (seen.normal[..., 2] >= 0).all()
+    assert np.abs((seen.normal * seen.tangent).sum(-1)).max() < 1e-14 and (seen.normal[..., 2] >= 0).all()
     assert np.isfinite(seen.height[yarn]).all()
 
 
@@ -102,8 +97,7 @@ def test_normal_is_the_gradient_of_the_height(fabric):
     right, left, up, down = (other.height[inside] for other in shifted)
     gradient = np.stack([left - right, down - up, np.full(inside.sum(), 2 * step)], axis=-1)
     gradient /= np.linalg.norm(gradient, axis=-1, keepdims=True)
-    assert inside.sum() > 500
-    assert np.abs(gradient - seen.normal[inside]).max() < 2e-6
+    assert inside.sum() > 500 and np.abs(gradient - seen.normal[inside]).max() < 2e-6
     if (fabric.warp.width < 1) or (fabric.weft.width < 1):
         assert seen.under[inside].any()
 
@@ -117,8 +111,7 @@ def test_yarn_beneath_is_smooth_and_ends_with_the_bend():
     assert seen.under.all()
     slope = np.diff(seen.height, axis=1) / np.diff(x)
     # On the axis |dz/dx| = tan |u|: at most tan u_max, and constant once the arc has ended.
-    assert np.abs(slope[0]).max() < np.tan(np.radians(70)) + 1e-6
-    assert np.abs(np.diff(slope, axis=1)).max() < 1e-3
+    assert np.abs(slope[0]).max() < np.tan(np.radians(70)) + 1e-6 and np.abs(np.diff(slope, axis=1)).max() < 1e-3
 
 
 def oracle_height(k, half_length, bend, r, x, y):
@@ -143,8 +136,7 @@ def test_height_is_exact_for_any_bend(bend):
         for dx, dy in ((0.0, 0.0), (0.125, 0.25), (-0.234375, -0.46875)):
             exact = oracle_height(1, half, bend, 0.25, dx, dy + offset)
             seen = surface_at(fabric, end + 0.5 + dx, pick + 0.5 + dy)
-            assert not seen.under
-            assert abs(float(seen.height) / exact - 1) < 1e-12
+            assert not seen.under and abs(float(seen.height) / exact - 1) < 1e-12
         # Beside the warp the weft shows; its frame is (y, -x), and its run beneath the warps is one float.
         offset, half = found.under_offset[pick, end], found.under_length[pick, end] / 2
         dx, dy = 0.3125, 0.125
@@ -220,8 +212,7 @@ def test_flat_floats():
         seen = surface_at(CLOTHS[name], 0.5 + 0.125, np.linspace(0, 4, 33))
         warp = seen.yarn == WARP
         width, relief = CLOTHS[name].warp.width, CLOTHS[name].warp.relief
-        assert warp.any()
-        assert np.allclose(seen.height[warp], relief * np.sqrt(width**2 / 4 - 0.125**2))
+        assert warp.any() and np.allclose(seen.height[warp], relief * np.sqrt(width**2 / 4 - 0.125**2))
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -232,5 +223,4 @@ def test_maps_sample_texel_centres_row_by_row_from_pick_0(name):
     assert maps.height.shape == (3 * picks, 3 * ends)
     assert np.array_equal(maps.yarn[1::3, 1::3] == WARP, fabric.weave.warp_over)
     one = surface_at(fabric, (4 + 0.5) / 3, (2 + 0.5) / 3)
-    assert maps.height[2, 4] == one.height
-    assert np.array_equal(maps.tangent[2, 4], one.tangent)
+    assert maps.height[2, 4] == one.height and np.array_equal(maps.tangent[2, 4], one.tangent)

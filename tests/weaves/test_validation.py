@@ -1,10 +1,9 @@
-"""Whatever is wrong with a file or a table, one sentence says where, what, and what is allowed."""
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from weaves.errors import MOST_LETTERS, BadInput
+from tests.refusals import accepted, refusal
+from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.population import Population
 from weaves.validation import read_toml, validated
@@ -20,12 +19,6 @@ trees = st.recursive(
     lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(words, inner, max_size=4)),
     max_leaves=8,
 )
-
-
-def refusal(change, model=Fabric):
-    with pytest.raises(BadInput) as refused:
-        validated(model, change, "cloth.toml")
-    return str(refused.value)
 
 
 def with_warp(**change):
@@ -56,30 +49,23 @@ def with_draft(**draft):
         (with_warp(diffuse="red"), "warp.diffuse = 'red': a colour is three numbers"),
         (with_warp(diffuse=[0.1, 0.2]), "warp.diffuse = [0.1, 0.2]: a colour is three numbers"),
         (with_warp(diffuse=[0.1, 0.2, 7]), "warp.diffuse.2 = 7: Input should be less than or equal to 1"),
-        (
-            with_warp(diffuse={"wavelengths": [400, 500], "value": [0, 1]}),
-            "warp.diffuse.value = [0, 1]: unknown key; did you mean 'values'? known: values, wavelengths (and 1 more)",
-        ),
+        (with_warp(diffuse={"wavelengths": [400, 500], "value": [0, 1]}), "warp.diffuse.value = [0, 1]: unknown key; "
+         "did you mean 'values'? known: values, wavelengths (and 1 more)"),
         ({**GOOD, "yarns_per_cm": [float("nan"), 20.0]}, "yarns_per_cm.0 = nan: Input should be a finite number"),
         ({}, "name is missing: it is required (and 3 more)"),
     ],
-)
+)  # fmt: skip
 def test_sentence(change, sentence):
-    assert refusal(change).startswith(f"cloth.toml: {sentence}")
+    assert refusal(validated, Fabric, change, "cloth.toml").startswith(f"cloth.toml: {sentence}")
 
 
 def test_other_models_complain_in_the_same_words():
-    assert "twill.bend = [3, 99]: Input should be less" in refusal({"twill": {"bend": [3, 99]}}, Population)
-    assert "did you mean 'bend'" in refusal({"twill": {"ben": [3, 9]}}, Population)
-    assert "called twill 4/4" in refusal({"exclude": ["twil 4/4"]}, Population)
-
-
-def accepted(call, *arguments):
-    """Return the result of a call, or None if it refuses its arguments in one short line."""
-    try:
-        return call(*arguments)
-    except BadInput as refused:
-        assert str(refused).isprintable() and len(str(refused)) <= MOST_LETTERS
+    for table, words in (
+        ({"twill": {"bend": [3, 99]}}, "twill.bend = [3, 99]: Input should be less"),
+        ({"twill": {"ben": [3, 9]}}, "did you mean 'bend'"),
+        ({"exclude": ["twil 4/4"]}, "called twill 4/4"),
+    ):
+        assert words in refusal(validated, Population, table, "random.toml")
 
 
 @settings(deadline=None, max_examples=300)
@@ -134,13 +120,3 @@ def test_broken_files_are_refused(tmp_path, content, words):
     (tmp_path / "torn.toml").write_bytes(content)
     with pytest.raises(BadInput, match=words):
         load_fabric(tmp_path / "torn.toml")
-
-
-def test_what_is_no_fabric_is_refused(tmp_path):
-    for name, words in (
-        (str(tmp_path / "none.toml"), "no such file"),
-        (tmp_path, "Is a directory"),
-        ("denmi", "did you mean 'denim'"),
-    ):
-        with pytest.raises(BadInput, match=words):
-            load_fabric(name)

@@ -1,12 +1,10 @@
-"""Yarns: the colours with which they make no light, and what is said of others."""
-
 import math
 
 import numpy as np
 import pytest
 
 from tests.presets import slow
-from weaves.errors import BadInput
+from tests.refusals import refusal
 from weaves.fabric import Fabric, load_fabric
 from weaves.validation import validated
 from weaves.yarn import Yarn
@@ -80,12 +78,9 @@ def test_a_yarn_at_the_limit_is_legal_and_one_above_it_is_one_sentence():
     assert 1.0 > most[0] > most[1] > most[2] > 0.4
     given = {"specular": (0.2, 0.9, 1.0), "diffuse": most}
     assert read(given).warp.diffuse == most
-    with pytest.raises(BadInput) as refused:
-        read(given | {"diffuse": (*most[:2], most[2] + 0.001)})
-    sentence = str(refused.value)
+    sentence = refusal(read, given | {"diffuse": (*most[:2], most[2] + 0.001)})
     for part in ("cloth.toml: warp.diffuse = (", "specular 1 and optical_thickness 2", "at most 0.4497 in blue"):
         assert part in sentence
-    assert "\n" not in sentence and refused.value.exit_code == 2
 
 
 @pytest.mark.parametrize(
@@ -99,9 +94,7 @@ def test_a_yarn_at_the_limit_is_legal_and_one_above_it_is_one_sentence():
     ],
 )  # fmt: skip
 def test_what_makes_light_is_refused(yarn, table, named):
-    with pytest.raises(BadInput) as refused:
-        read(yarn, **table)
-    assert named in str(refused.value) and len(str(refused.value)) < 300
+    assert named in refusal(read, yarn, **table)
 
 
 def test_a_thread_keeps_as_much_of_the_light_through_the_yarn_as_its_colour_leaves():

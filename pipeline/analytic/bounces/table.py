@@ -11,6 +11,8 @@ over the families right, and so does m in the fourth. All later ones are a geome
 transfers. Each C2_ab is a sum of RANK products of a function of the viewer and one of the light, and s of
 `RANK_OF_THIRD`, the largest of a singular value decomposition. All functions are known on a grid of directions and
 linear between.
+
+With light that comes through yarns and gaps, a to d have two ways each and two faces, the sun two sides (`walks`).
 """
 
 from __future__ import annotations
@@ -36,7 +38,6 @@ _ANGLES: Final = 16
 _AZIMUTHS: Final = 24
 _STEEPEST: Final = math.radians(89.0)
 """Angle to the normal of the last directions of the grid; beyond, functions are those of these."""
-_PRODUCTS: Final = 4 * RANK + RANK_OF_THIRD
 _LEAST: Final = 1e-12
 """Least divisor: where nothing is seen or lit, the quotients are 0."""
 _PASSES: Final = 3
@@ -45,14 +46,17 @@ _PASSES: Final = 3
 class BounceTable(NamedTuple):
     """Light that the yarns of one side of a cloth give to each other.
 
+    Colours, P of them, are those of `pipeline.analytic.bounces.walks.Transport`: k_d of warp and weft and, with two
+    ways, k_dt; Q is P of one way, 2 P of two.
+
     Attributes
     ----------
-    viewer : float32 (G, 4 RANK + RANK_OF_THIRD + 9)
-        On the grid: the viewer's factors of C2 and of s, R, and m; families in the order of the indices, warp first.
-    light : float32 (G, 4 RANK + RANK_OF_THIRD + 6)
-        The light's factors, e and e'; all but the factors of s are over the cosine of the light.
-    transfers : float64 (6, 2)
-        M in four rows, and M': the share of what a family sends on that has its light from each family.
+    viewer : float32 (G, P P RANK + W RANK_OF_THIRD + P P P + W)
+        On the grid: the viewer's factors of C2 and of s, R, and m; of s and m one for each way of what is seen.
+    light : float32 (W G, P P RANK + W RANK_OF_THIRD + P Q + Q)
+        The light's factors, e and e', in front, then behind; all but the factors of s are over the cosine of the light.
+    transfers : float64 (P Q + Q, P)
+        M in P Q rows, and M': the share of what a family sends on in one way that has its light from each place.
     """
 
     viewer: Float32
@@ -60,27 +64,39 @@ class BounceTable(NamedTuple):
     transfers: Float64
 
 
-def bounce_table(fabric: Fabric, walks: int = WALKS) -> BounceTable:
-    """Tabulate the side of a fabric that is seen from z > 0; its colours play no part. It takes some seconds."""
+def bounce_table(fabric: Fabric, walks: int = WALKS, through: bool = False) -> BounceTable:
+    """Tabulate the side of a fabric that is seen from z > 0; its colours play no part. It takes some seconds.
+
+    With light that comes `through` yarns and gaps, from either side, it takes about four times as long.
+    """
     grid = _grid()
-    sums = transport(height_field(fabric), walks, grid, grid)
+    back = height_field(fabric.back()) if through else None
+    sums = transport(height_field(fabric), walks, grid, grid, back)
     count, seen, whole = len(grid), np.maximum(sums.seen, _LEAST)[:, None], np.maximum(sums.later[..., -1:], _LEAST)
-    reached, later = sums.reached.reshape(count, 8) / seen, sums.later[..., :count] / whole / grid[:, 2]
+    ways, places = sums.third.shape[1], sums.reached.shape[1]
+    cosine, events = np.tile(grid[:, 2], ways), places * ways
+    reached, later = sums.reached.reshape(count, -1) / seen, sums.later[..., :count] / whole / grid[:, 2]
+    # What is reflected has its light from the side of its own face, what is transmitted from the other one.
+    event = np.arange((places + 1) * events) % events
+    behind = event // places ^ event // 2 % ways
+    later = np.concatenate([np.where((behind == side)[:, None], later, 0.0) for side in range(ways)], axis=1)
     factors = []
-    for k in range(4):
-        second = sums.second.reshape(count, 4, count)[:, k] / seen / grid[:, 2]
+    for k in range(places * places):
+        second = sums.second.reshape(count, places * places, ways * count)[:, k] / seen / cosine
         # In units of each viewer's and each light's own mean, so that grazing ones count as much.
         of_viewer, of_light = (np.maximum(second.mean(axis=axis), _LEAST) for axis in (1, 0))
         viewers, lights = _products(second / of_viewer[:, None] / of_light, RANK)
         factors.append((viewers * of_viewer[:, None], lights * of_light[:, None]))
-    transfers = sums.transfers / whole
-    going_on = np.maximum(reached.reshape(count, 2, 4).sum(axis=1) @ transfers[:4].sum(axis=1), _LEAST)
-    series = np.maximum(reached.reshape(count, 2, 4).sum(axis=1) @ later[:4], _LEAST)
-    factors.append(_products(sums.third / seen / grid[:, 2] / series, RANK_OF_THIRD))
+    transfers, further = sums.transfers / whole, []
+    for way in range(ways):
+        of_way = reached.reshape(count, ways, 2, places, places)[:, way].sum(axis=1)
+        of_way = np.tile(of_way, ways).reshape(count, places * events)
+        going_on = np.maximum(of_way @ transfers[:-events].sum(axis=1), _LEAST)
+        series = np.maximum(of_way @ later[:-events], _LEAST)
+        factors.append(_products(sums.third[:, way] / seen / cosine / series, RANK_OF_THIRD))
+        further.append(sums.further[:, way, None] / seen / going_on[:, None])
     return BounceTable(
-        np.concatenate(
-            [*(viewers for viewers, _ in factors), reached, sums.further[:, None] / seen / going_on[:, None]], axis=1
-        ).astype(np.float32),
+        np.concatenate([*(viewers for viewers, _ in factors), reached, *further], axis=1).astype(np.float32),
         np.concatenate([*(lights for _, lights in factors), later.T], axis=1).astype(np.float32),
         transfers,
     )
@@ -107,17 +123,31 @@ def _grid() -> Float64:
     return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=-1).reshape(-1, 3)
 
 
-def bounced(table: BounceTable, wi: Float32, wo: Float32, diffuse: Float64) -> Float64:
-    """Return g of N pairs of directions, both with z > 0, for diffuse colours of warp and weft, (2, 3): (N, 2, 3)."""
-    rows = len(wi)
-    second, reached, later = np.empty((rows, 2, 2)), np.empty((rows, 2, 2, 2)), np.empty((rows, 6))
-    _read(table, wi, wo, second, reached, later, np.empty(_PRODUCTS + 9), np.empty(_PRODUCTS + 6))
-    result = np.einsum("nab,bx->nax", second, diffuse)
-    for channel in range(diffuse.shape[1]):
-        k = diffuse[:, channel]
-        series = table.transfers[:4] * k @ np.linalg.inv(np.eye(2) - table.transfers[4:] * k)
-        lit = (later[:, :4] + later[:, 4:] @ series.T).reshape(rows, 2, 2)
-        result[:, :, channel] += np.einsum("nabc,b,c,nbc->na", reached, k, k, lit)
+def bounced(table: BounceTable, wi: Float32, wo: Float32, colours: Float64) -> Float64:
+    """Return light of N pairs of directions before the colours of what is seen, wo.z > 0: (N, P, 3).
+
+    Colours, (P, 3), are k_d of warp and weft and, for a table of light that comes through, k_dt of both. The light
+    that is seen is the sum over all P of colour times result. A table without such light needs wi.z > 0.
+    """
+    rows, places = len(wi), table.transfers.shape[1]
+    ways, events = places // 2, places * places // 2
+    second, reached = np.empty((rows, places, places)), np.empty((rows, places, places, places))
+    later = np.empty((rows, ways, (places + 1) * events))
+    scratch = (np.empty(columns.shape[1]) for columns in (table.viewer, table.light))
+    _read(table, wi, wo, second, reached, later, *scratch)
+    result = np.einsum("nab,bx->nax", second, colours)
+    event = np.arange(events)
+    transfers = np.tile(table.transfers, ways)
+    for channel in range(colours.shape[1]):
+        k = colours[:, channel]
+        of_event = k[event // places * 2 + event % 2]
+        going_on = np.linalg.inv(np.eye(events) - transfers[-events:] * of_event)
+        series = transfers[:-events] * of_event @ going_on
+        for way in range(ways):
+            own = later[:, way]
+            lit = (own[:, :-events] + own[:, -events:] @ series.T).reshape(rows, places, events)
+            seen = slice(2 * way, 2 * way + 2)
+            result[:, seen, channel] += np.einsum("nabc,b,c,nbc->na", np.tile(reached[:, seen], ways), k, of_event, lit)
     return np.asarray(np.maximum(result, 0.0))
 
 
@@ -133,17 +163,27 @@ def _read(
     light: Float64,
 ) -> None:
     """Write C2, R, s e and m e' of pairs of directions; `viewer` and `light` are scratch."""
+    places, ways, rows = second.shape[1], later.shape[1], later.shape[2]
+    factors = places * places * RANK
+    products = factors + ways * RANK_OF_THIRD
+    shares = products + places * places * places
+    directions = len(table.viewer)
     for row in range(len(wi)):
         _interpolate(table.viewer, wo[row, 0], wo[row, 1], wo[row, 2], viewer)
-        _interpolate(table.light, wi[row, 0], wi[row, 1], wi[row, 2], light)
-        cosine = wi[row, 2]
-        for k in range(4):
-            second[row, k // 2, k % 2] = cosine * _product(viewer, light, k * RANK, (k + 1) * RANK)
-        factor = max(_product(viewer, light, 4 * RANK, _PRODUCTS), 0.0)
-        for k in range(8):
-            reached[row, k // 4, k // 2 % 2, k % 2] = viewer[_PRODUCTS + k]
-        for k in range(6):
-            later[row, k] = (factor if k < 4 else viewer[_PRODUCTS + 8]) * cosine * light[_PRODUCTS + k]
+        side = table.light[directions:] if wi[row, 2] < 0.0 else table.light[:directions]
+        _interpolate(side, wi[row, 0], wi[row, 1], abs(wi[row, 2]), light)
+        cosine = abs(wi[row, 2])
+        for k in range(places * places):
+            second[row, k // places, k % places] = cosine * _product(viewer, light, k * RANK, (k + 1) * RANK)
+        for k in range(places * places * places):
+            a, b = k // places // places, k // places % places
+            reached[row, a, b, k % places] = viewer[products + k]
+        for way in range(ways):
+            begin = factors + way * RANK_OF_THIRD
+            factor = max(_product(viewer, light, begin, begin + RANK_OF_THIRD), 0.0)
+            for k in range(rows):
+                own = factor if k < rows - rows // (places + 1) else viewer[shares + way]
+                later[row, way, k] = own * cosine * light[products + k]
 
 
 @inlined_kernel

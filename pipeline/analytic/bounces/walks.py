@@ -15,6 +15,12 @@ which has it from c; e_bc(wi), the mean of the sun's light on c there; M_bcd, th
 from d. Later points have e'_d and M'_de of their own, the mean of some of them. Where light and transfers are those of
 the same points, none is made or lost. What directions of viewer and light have to do with one another in the third
 bounce, and what goes on from there of what a viewer sees, is known for all families together.
+
+Yarns that transmit light, and gaps, take walks to the other face of the cloth, whose heights are those of its back,
+reflected in the fabric plane. A point sends on light in two ways. It reflects what comes from its own side. It
+transmits what its place on the other face receives, by the same rule with opposite directions, if that face sees where
+it comes from; walls transmit nothing. A walk that passes the fabric plane in a gap goes on over the other face. Light
+is that of the sun on either side, and a, b, c, d are families with a way each: colours k_d, then k_dt.
 """
 
 from __future__ import annotations
@@ -37,6 +43,8 @@ _FEWEST: Final = 16
 """Points of the smallest piece."""
 _OFF: Final = 1e-9
 """Distance from a wall at which walks go on, in yarn spacings: beyond its rounding, on the open side."""
+_IN_GAP: Final = 64
+"""Points of a gap."""
 _LONGEST: Final = 4
 """Yarns at which a walk counts the sun's light, from its third on."""
 _FOUR: Final = 1.16730397826141868
@@ -64,25 +72,29 @@ class Start(NamedTuple):
 
 
 class Transport(NamedTuple):
-    """Sums of walks; families a, b, c are 0 for the warp, 1 for the weft.
+    """Sums of walks of W ways: 1 if yarns reflect light alone, 2 if they transmit it as well.
+
+    Families f are 0 for the warp, 1 for the weft. Places are 2 face + f, P = 2 W of them; colours, a and b, are
+    2 way + f; c and d are P way + place, Q = W P of them. With two ways, lights behind follow those in front.
 
     Attributes
     ----------
     seen : float64 (O,)
-        Visible area towards each viewer.
-    reached : float64 (O, 2, 2, 2)
-        Of it, what has its light from two yarns and more: seen on a, from b, which has it from c.
-    second : float32 (O, 2, 2, I)
-        The sun's light of each direction that is seen on a and comes from b.
-    third : float32 (O, I)
-        The sun's light of each direction that comes from c.
-    further : float64 (O,)
-        Of the visible area, what has its light from three yarns and more.
-    transfers : float64 (6, 2)
-        Of walks that have met b and c, in four rows, those that go on to each family; of walks that meet d later, in
-        two rows, the same.
-    later : float64 (6, I + 1)
-        The sun's light of each direction on c, and on d, and the number of these walks in the last column.
+        Visible area towards each viewer, gaps included.
+    reached : float64 (O, P, P, P)
+        Of it, what has its light from two yarns and more: seen as a, from b, which has it from a place.
+    second : float32 (O, P, P, W I)
+        The sun's light of each direction that is seen as a and comes from b.
+    third : float32 (O, W, W I)
+        The sun's light of each direction that comes from c, by the way of a.
+    further : float64 (O, W)
+        Of the visible area, what has its light from three yarns and more, by the way of a.
+    transfers : float64 (P Q + Q, P)
+        Of walks that have met b and then c, in P Q rows, those that go on to each place; of walks that meet d later, in
+        Q rows, the same.
+    later : float64 (P Q + Q, I + 1)
+        The sun's light on c, and on d, of each direction on the side where they have it from, and the number of these
+        walks in the last column.
     """
 
     seen: Float64
@@ -95,8 +107,9 @@ class Transport(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """A point of a walk: place, side and family of its yarn, and normal."""
+    """A point of a walk: its face of the cloth, and there place, side and family of its yarn, and normal."""
 
+    face: int
     x: float
     y: float
     z: float
@@ -129,19 +142,65 @@ def starting_points(field: HeightField, count: int) -> Start:
     return Start(*np.ascontiguousarray(np.concatenate(columns, axis=1)))
 
 
-def transport(field: HeightField, count: int, viewers: Float64, lights: Float64) -> Transport:
-    """Return the sums over about `count` walks, for unit vectors of viewers, (O, 3), and of lights, (I, 3), z > 0."""
-    o, i = len(viewers), len(lights)
-    second, third = np.zeros((o, 2, 2, i), np.float32), np.zeros((o, i), np.float32)
-    seen, reached, further = np.zeros(o), np.zeros((o, 2, 2, 2)), np.zeros(o)
-    sums = Transport(seen, reached, second, third, further, np.zeros((6, 2)), np.zeros((6, i + 1)))
-    _walk(field, starting_points(field, count), viewers, lights, sums, np.empty(o, np.float32), np.empty(i, np.float32))
+def transport(
+    field: HeightField, count: int, viewers: Float64, lights: Float64, back: HeightField | None = None
+) -> Transport:
+    """Return the sums over about `count` walks, for unit vectors of viewers, (O, 3), and of lights, (I, 3), z > 0.
+
+    With the back of the cloth, yarns transmit light as well, and lights are on both sides, those behind reflected.
+    """
+    o, i, ways = len(viewers), len(lights), 1 if back is None else 2
+    places, events = 2 * ways, 2 * ways * ways
+    sums = Transport(
+        np.zeros(o),
+        np.zeros((o, places, places, places)),
+        np.zeros((o, places, places, ways * i), np.float32),
+        np.zeros((o, ways, ways * i), np.float32),
+        np.zeros((o, ways)),
+        np.zeros(((places + 1) * events, places)),
+        np.zeros(((places + 1) * events, i + 1)),
+    )
+    faces = field, field if back is None else back
+    start, scratch = starting_points(field, count), (np.empty(o, np.float32), np.empty(i, np.float32))
+    _see_gaps(*faces, *_gap_points(field), viewers, sums.seen)
+    _walk(*faces, ways, start, viewers, lights, sums, *scratch)
     return sums
+
+
+def _gap_points(field: HeightField) -> tuple[Float64, Float64, Float64]:
+    """Return places spread evenly over the gaps of the first cell of each kind, and the area that each stands for."""
+    columns = [np.empty((3, 0))]
+    for orbit in orbits(field):
+        pick, end = orbit[0]
+        for piece in cell_pieces(field, pick, end):
+            if piece.family == GAP:
+                (left, right), (low, high) = piece.box
+                x, y = (0.5 + _FOUR ** -np.arange(1.0, 3.0)[:, None] * np.arange(_IN_GAP)) % 1.0
+                share = np.full(_IN_GAP, (right - left) * (high - low) / _IN_GAP)
+                columns.append(np.stack([end + left + (right - left) * x, pick + low + (high - low) * y, share]))
+    x, y, area = np.concatenate(columns, axis=1)
+    return x, y, area
+
+
+@kernel
+def _see_gaps(
+    front: HeightField, back: HeightField, x: Float64, y: Float64, area: Float64, viewers: Float64, seen: Float64
+) -> None:
+    """Add the area of gaps that each viewer sees through: neither face hides it."""
+    for p in range(len(x)):
+        for k in range(len(viewers)):
+            dx, dy, dz = viewers[k, 0], viewers[k, 1], viewers[k, 2]
+            if visible(front, x[p], y[p], 0.0, UNDER, ray(dx, dy, dz, 0.0)) and visible(
+                back, x[p], y[p], 0.0, UNDER, ray(-dx, -dy, dz, 0.0)
+            ):
+                seen[k] += area[p] * dz
 
 
 @kernel
 def _walk(
-    field: HeightField,
+    front: HeightField,
+    back: HeightField,
+    ways: int,
     start: Start,
     viewers: Float64,
     lights: Float64,
@@ -150,50 +209,85 @@ def _walk(
     light: Float32,
 ) -> None:
     """Add walks to the sums; `area` and `light` are scratch."""
+    events = 2 * ways * ways
     for p in range(len(start.x)):
         x, y = start.x[p], start.y[p]
-        family, side, z, nx, ny, nz, _, _, _ = surface_at(field, x, y, int(x), int(y))
+        family, side, z, nx, ny, nz, _, _, _ = surface_at(front, x, y, int(x), int(y))
         if family == GAP or nz <= 0.0:
             continue
-        place = _Place(x, y, z, side, family, nx, ny, nz)
+        first = _Place(0, x, y, z, side, family, nx, ny, nz)
         for k in range(len(viewers)):
-            area[k] = start.area[p] / nz * _facing(field, place, viewers[k, 0], viewers[k, 1], viewers[k, 2])[0]
+            area[k] = start.area[p] / nz * _facing(front, first, viewers[k, 0], viewers[k, 1], viewers[k, 2])[0]
             sums.seen[k] += area[k]
-        key, choice = derive(np.uint64(1), p), uniform(np.uint64(2), p, 0)
-        met, place = _next(field, place, choice, start.first[p], start.second[p])
-        if not met:
-            continue
-        _count(field, place, lights, light)
-        b = place.family
-        for k in range(len(viewers)):
-            if area[k] > 0.0:
-                for i in range(len(lights)):
-                    sums.second[k, family, b, i] += area[k] * light[i]
-        met, place = _next(field, place, *_numbers(key, 0))
-        if not met:
-            continue
-        _count(field, place, lights, light)
-        for k in range(len(viewers)):
-            if area[k] > 0.0:
-                sums.reached[k, family, b, place.family] += area[k]
-                for i in range(len(lights)):
-                    sums.third[k, i] += area[k] * light[i]
-        weight = start.area[p]
-        kind = 2 * b + place.family
-        for depth in range(_LONGEST):
-            if depth:
-                _count(field, place, lights, light)
-            for i in range(len(lights)):
-                sums.later[kind, i] += weight * light[i]
-            sums.later[kind, len(lights)] += weight
-            met, place = _next(field, place, *_numbers(key, 1 + depth))
+        choice = uniform(np.uint64(2), p, 0)
+        for way_of_a in range(ways):
+            a, key = 2 * way_of_a + family, derive(np.uint64(1 + 2 * way_of_a), p)
+            met, second = _next(front, back, ways, first, way_of_a, choice, start.first[p], start.second[p])
             if not met:
-                break
-            if depth == 0:
+                continue
+            for way_of_b in range(ways):
+                b, begin = 2 * way_of_b + second.family, (second.face ^ way_of_b) * len(lights)
+                _count(front, back, second, way_of_b, lights, light)
                 for k in range(len(viewers)):
-                    sums.further[k] += area[k]
-            sums.transfers[kind, place.family] += weight
-            kind = 4 + place.family
+                    if area[k] > 0.0:
+                        for i in range(len(lights)):
+                            sums.second[k, a, b, begin + i] += area[k] * light[i]
+                met, third = _next(front, back, ways, second, way_of_b, *_numbers(key, 0))
+                if not met:
+                    continue
+                at = 2 * third.face + third.family
+                for k in range(len(viewers)):
+                    sums.reached[k, a, b, at] += area[k]
+                for way in range(ways):
+                    begin = (third.face ^ way) * len(lights)
+                    _count(front, back, third, way, lights, light)
+                    for k in range(len(viewers)):
+                        if area[k] > 0.0:
+                            for i in range(len(lights)):
+                                sums.third[k, way_of_a, begin + i] += area[k] * light[i]
+                    kind = b * events + 2 * ways * way + at
+                    if _go_on(front, back, ways, third, way, kind, key, start.area[p], lights, sums, light):
+                        for k in range(len(viewers)):
+                            sums.further[k, way_of_a] += area[k]
+
+
+@kernel
+def _go_on(
+    front: HeightField,
+    back: HeightField,
+    ways: int,
+    place: _Place,
+    way: int,
+    kind: int,
+    key: np.uint64,
+    weight: float,
+    lights: Float64,
+    sums: Transport,
+    light: Float32,
+) -> bool:
+    """Add what a walk meets from its third yarn on, whose `light` is known; return whether it meets a fourth."""
+    events = 2 * ways * ways
+    for depth in range(_LONGEST):
+        if depth:
+            _count(front, back, place, way, lights, light)
+        for i in range(len(lights)):
+            sums.later[kind, i] += weight * light[i]
+        sums.later[kind, len(lights)] += weight
+        met, place = _next(front, back, ways, place, way, *_numbers(key, 1 + depth))
+        if not met:
+            return depth > 0
+        at = 2 * place.face + place.family
+        sums.transfers[kind, at] += weight
+        # From the fourth yarn on a walk takes one way of all.
+        way = _way(ways, key, depth)
+        kind = 2 * ways * events + 2 * ways * way + at
+    return True
+
+
+@inlined_kernel
+def _way(ways: int, key: np.uint64, depth: int) -> int:
+    """Return one of the ways in which a point sends on light: 0 reflects, 1 transmits."""
+    return 0 if ways == 1 else int(2.0 * uniform(key, depth, 3))
 
 
 @inlined_kernel
@@ -211,36 +305,76 @@ def _facing(field: HeightField, place: _Place, x: float, y: float, z: float) -> 
 
 
 @kernel
-def _count(field: HeightField, place: _Place, lights: Float64, light: Float32) -> None:
-    """Write the share of the sun's light that a point sends on, 1/sr, for each direction of the sun."""
+def _count(front: HeightField, back: HeightField, place: _Place, way: int, lights: Float64, light: Float32) -> None:
+    """Write the share of the sun's light that a point sends on, 1/sr, for each direction of the sun.
+
+    They are on the point's own side of the cloth or, for what it transmits, on the other one.
+    """
+    field, other = (front, back) if place.face == 0 else (back, front)
     blend = field.yarn[place.family, BLEND]
+    there = _across(other, place)
     for i in range(len(lights)):
-        ply, macro = _facing(field, place, lights[i, 0], lights[i, 1], lights[i, 2])
+        x, y, z = lights[i, 0], lights[i, 1], lights[i, 2]
+        if way == 0:
+            ply, macro = _facing(field, place, x, y, z)
+        else:
+            # Light from behind, reflected: its opposite as the point's own face sees it is (-x, -y, z).
+            ply, macro = z * place.nz - x * place.nx - y * place.ny, z
+            if ply <= 0.0 or place.nz == 0.0 or _facing(other, there, x, y, z)[0] <= 0.0:
+                ply, macro = 0.0, 0.0
         light[i] = (blend * ply + (1.0 - blend) * macro) / math.pi
 
 
+@inlined_kernel
+def _across(other: HeightField, place: _Place) -> _Place:
+    """Return the same place on the other face of the cloth."""
+    family, side, z, nx, ny, nz, _, _, _ = surface_at(other, place.x, place.y, int(place.x), int(place.y))
+    return _Place(1 - place.face, place.x, place.y, z, side, family, nx, ny, nz)
+
+
 @kernel
-def _next(field: HeightField, place: _Place, choice: float, a: float, b: float) -> tuple[bool, _Place]:
-    """Return whether a walk goes on to another yarn, and where it meets it; three numbers in [0, 1) choose the way."""
+def _next(
+    front: HeightField, back: HeightField, ways: int, place: _Place, way: int, choice: float, a: float, b: float
+) -> tuple[bool, _Place]:
+    """Return whether a walk goes on to another yarn, and where it meets it; three numbers in [0, 1) choose where to."""
+    field, other = (front, back) if place.face == 0 else (back, front)
     if choice < field.yarn[place.family, BLEND]:
         dx, dy, dz = _cosine_about(place.nx, place.ny, place.nz, a, b)
     else:
         dx, dy, dz = _cosine_about(0.0, 0.0, 1.0, a, b)
     if dx * place.nx + dy * place.ny + dz * place.nz <= 0.0:
         return False, place
-    hit = next_hit(field, place.x, place.y, place.z, place.side, ray(dx, dy, dz, 0.0))
+    if way == 1:
+        if place.nz == 0.0:
+            return False, place
+        field, other, place = other, field, _across(other, place)
+        dx, dy = -dx, -dy
+        if dx * place.nx + dy * place.ny + dz * place.nz <= 0.0:
+            return False, place
+    x, y, z = place.x, place.y, place.z
+    hit = next_hit(field, x, y, z, place.side, ray(dx, dy, dz, 0.0))
+    face = place.face
+    if ways == 2 and dz < 0.0 and z > 0.0:
+        down = -z / dz
+        if hit.what == MISSED or hit.distance > down * math.hypot(dx, dy):
+            picks, ends = field.top.shape
+            x, y = wrap(x + down * dx, ends), wrap(y + down * dy, picks)
+            family, _, _, _, _, _, _, _, _ = surface_at(field, x, y, int(x), int(y))
+            if family == GAP:
+                face, field, z, dz = 1 - face, other, 0.0, -dz
+                hit = next_hit(field, x, y, z, UNDER, ray(dx, dy, dz, 0.0))
     if hit.what == MISSED:
         return False, place
     if hit.what != ON_WALL:
         family, side, z, nx, ny, nz, _, _, _ = surface_at(field, hit.x, hit.y, hit.end, hit.pick)
-        return family != GAP, _Place(hit.x, hit.y, z, side, family, nx, ny, nz)
+        return family != GAP, _Place(face, hit.x, hit.y, z, side, family, nx, ny, nz)
     picks, ends = field.top.shape
-    z = place.z + hit.distance / math.sqrt(dx * dx + dy * dy) * dz
+    z = z + hit.distance / math.sqrt(dx * dx + dy * dy) * dz
     nx, ny = _wall_normal(field, hit.x - hit.end, hit.y - hit.pick, dx, dy)
     # The wall is the end of the yarn behind it; walks go on before it.
     family, _, _, _, _, _, _, _, _ = surface_at(field, hit.x - _OFF * nx, hit.y - _OFF * ny, hit.end, hit.pick)
     x, y = wrap(hit.x + _OFF * nx, ends), wrap(hit.y + _OFF * ny, picks)
-    return family != GAP, _Place(x, y, z, UNDER, family, nx, ny, 0.0)
+    return family != GAP, _Place(face, x, y, z, UNDER, family, nx, ny, 0.0)
 
 
 @kernel

@@ -87,11 +87,7 @@ def sum_queries(
 
 @kernel
 def _rises(table: SoftNodeTable, wo: Float32, bend: np.float32) -> bool:
-    """Return whether rays over curved cloth rise again before they have sunk to the least height that is seen.
-
-    They may meet a yarn as they rise, which view lines do not know: then the footprint counts as one of the fabric
-    plane.
-    """
+    """Return whether rays over curved cloth rise again before they have sunk to the least height that is seen."""
     depth = np.float32(table.plane) - table.shown[0]
     return bool(wo[2] * wo[2] < np.float32(2.0) * bend * (wo[0] * wo[0] + wo[1] * wo[1]) * depth)
 
@@ -138,8 +134,10 @@ def _sum_rows(
             x, y, dx, dy, rho, narrowest, wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2], low_i, high_i,
             turn_i, low_o, high_o, turn_o, bend_i, bend_o,
         )  # fmt: skip
-        if table.parallax and not _rises(table, wo[n], bend_o):
-            if narrowest < table.view_lines and nodes_on_lines(dx, dy, narrowest) <= MOST_ON_LINES:
+        if table.parallax:
+            # Where rays turn, nodes are seen far from one another.
+            lines = table.view_lines * (2.0 if _rises(table, wo[n], bend_o) else 1.0)
+            if narrowest < lines and nodes_on_lines(dx, dy, narrowest, table.spacing) <= MOST_ON_LINES:
                 gaps[n] = sum_view_lines(table, scratch, look, result[n])
             else:
                 gaps[n] = sum_fixed(table, scratch, look, widest, result[n])

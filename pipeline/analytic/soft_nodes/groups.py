@@ -44,6 +44,8 @@ class Detail(NamedTuple):
         Deviation, in yarn spacings, below which a footprint places its nodes; at most `NARROW`.
     lines : float
         The same of a footprint of view rays, which places them on lines.
+    spacing : float
+        Distance of these lines and of their nodes, as a multiple of that at level 2.
     """
 
     most: int
@@ -52,13 +54,14 @@ class Detail(NamedTuple):
     legendre: int
     narrow: float
     lines: float
+    spacing: float
 
 
 DETAILS: Final = {
-    1: Detail(most=64, along=0.5, parts=1, legendre=5, narrow=0.15, lines=0.15),
-    2: Detail(most=256, along=1.0, parts=1, legendre=6, narrow=0.25, lines=0.3),
-    4: Detail(most=1024, along=1.0, parts=2, legendre=6, narrow=0.25, lines=0.5),
-    8: Detail(most=2048, along=2.0, parts=2, legendre=6, narrow=0.25, lines=0.8),
+    1: Detail(most=64, along=0.5, parts=1, legendre=5, narrow=0.15, lines=0.15, spacing=1.3),
+    2: Detail(most=256, along=1.0, parts=1, legendre=6, narrow=0.25, lines=0.3, spacing=1.0),
+    4: Detail(most=1024, along=1.0, parts=2, legendre=6, narrow=0.25, lines=0.5, spacing=0.7),
+    8: Detail(most=2048, along=2.0, parts=2, legendre=6, narrow=0.25, lines=0.8, spacing=0.5),
 }
 """The details of every level k."""
 

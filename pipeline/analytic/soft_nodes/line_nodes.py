@@ -34,8 +34,8 @@ from pipeline.compiled.float32 import arcsine, remaining
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WARP
 
 AT, LENGTH, ACROSS, BY_ACROSS, ALONG_FROM, BY_ALONG, DENSITY, APART = range(8)
-"""Angle across the yarn, or place along the line; length, negative of the latter; place across and along the yarn at
-s = 0, and their changes with s; greatest density of the line; distance of the lines."""
+"""Angle across the yarn, or place along the line; length, negative of the latter and 0 at a rim; place across and along
+the yarn at s = 0, and their changes with s; greatest density of the line, or a rim's weight; distance of the lines."""
 
 FLOAT_BEND, FLOAT_HALF, FLOAT_DROP, BENDING, STEEPEST_SINE, ROWS_FROM, ROWS_PER = range(8, DRAFT_ROWS)
 """Bend radius of the float, negative beneath and 0 if drawn flat, half length and drop; curve and largest sine as in
@@ -90,7 +90,7 @@ def _node(
     """Return a drafted node."""
     # Place across and along the yarn.
     at, length, across, by_across = draft[AT, k], draft[LENGTH, k], draft[ACROSS, k], draft[BY_ACROSS, k]
-    turned = length > _0
+    turned, rim = length > _0, length == _0
     of_angle, _ = sine_cosine(min(max(at, -_RIGHT), _RIGHT))
     sine = of_angle if turned else min(max((across + at * by_across) / radius, -_VERTICAL), _VERTICAL)
     cosine = np.sqrt((_1 - sine) * (_1 + sine))
@@ -115,6 +115,7 @@ def _node(
     # A(wo) is that of straight rays: dq / ds of the bent ones in its place.
     steep = -(nx * by_across + ny * draft[BY_ALONG, k]) / nz * rays.run
     weight *= (fall - steep) / (fall * max(_1 - steep, _GRAZING)) if rays.bent > _0 else _1
+    weight = draft[DENSITY, k] / max(_1 - steep, _GRAZING) if rim else weight
     t = tangent(angles, fibre)
     by_u, by_v = turning(d.ix + d.ox, d.iy + d.oy, d.iz + d.oz, t, angles, fibre)
     half_v = min(_HALF * (length * part_a + draft[APART, k] * part_b) / (radius * cosine), _HALF)

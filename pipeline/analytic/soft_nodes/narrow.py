@@ -60,6 +60,7 @@ MOST_OF_FOOTPRINT: Final = max(3 * _MOST_CELLS * MOST_ACROSS**2, MOST)
 _LEAST = 0.1  # of a deviation, that a footprint must cover of a piece
 _0, _1 = np.float32(0.0), np.float32(1.0)
 _FROM_ABOVE = np.float32(1e-6)
+_JUST = 0.5 - 1e-7  # a half, less what rounding takes: the height at which rays turn has a root
 _BETWEEN = np.float32(0.1)  # deviation of the box of a node on a line
 
 
@@ -202,7 +203,10 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
     run = np.hypot(look.ox, look.oy)
     dx, dy = (look.ox / run, look.oy / run) if run > _FROM_ABOVE else (_1, _0)
     run = run / look.oz
-    ray = ViewRay(float(dx), float(dy), float(run), float(look.bend_o), table.plane)
+    bend, least = float(look.bend_o), table.lowest
+    if bend > 0.0 and run > _FROM_ABOVE:
+        least = max(least, table.plane - _JUST / (bend * float(run) ** 2))
+    ray = ViewRay(float(dx), float(dy), float(run), bend, table.plane, least)
     gaps, inverse = place_on_view_lines(table, scratch, look, ray)
     rays = LineRays(run, np.float32(table.plane), np.float32(2.0) * look.bend_o * run * run, inverse)
     back, of_warp, size = look.iz < _0, table.kinds[0], table.grid.shape[2]

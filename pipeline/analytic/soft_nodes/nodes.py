@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ from pipeline.analytic.soft_nodes.groups import (
     gather,
     piece_rows,
 )
+from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES, rays_left, seen_areas
 from pipeline.analytic.soft_nodes.waves import TOGETHER, tabulate_waves
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import ClothSide, cloth_side
@@ -67,6 +69,7 @@ EVEN: Final = 0.42
 _NO_RAYS: Final[dict[str, Any]] = {
     "floats": np.zeros((0, 4)), "crowns": np.zeros(0), "heights": np.zeros((0, 8)), "highest": 0.0, "lowest": 0.0,
     "plane": 0.0, "spots": np.zeros((0, 4, COLUMNS), np.float32), "shown": np.zeros(0, np.float32),
+    "areas": np.zeros((0, 0, 0, BLOCK_NODES), np.float32),
 }  # fmt: skip
 
 _SHARPEST = 0.02  # least spread of a horizon
@@ -146,10 +149,16 @@ class SoftNodeTable(NamedTuple):
         Of every line of nodes: places in x and y from the corner of the cell, shares of the cell, heights.
     shown : float32 (2,)
         Least and greatest of these heights.
+    areas : float32 (AZIMUTHS, SEEN_ANGLES, B, BLOCK_NODES)
+        Area that a viewer sees of each node's box (seen_areas).
     view_lines : float
         Deviation below which a footprint of rays places its nodes on lines.
+    spacing : float
+        Distance of lines and of their nodes, as a multiple of that at level 2.
     parallax : bool
         Whether footprints are patches of view rays; without, columns that only these need have no rows.
+    rims : bool
+        Whether view rays that meet a wall see the yarn's rim above it.
     """
 
     repeat: Index
@@ -194,8 +203,11 @@ class SoftNodeTable(NamedTuple):
     plane: float
     spots: Float32
     shown: Float32
+    areas: Float32
     view_lines: float
+    spacing: float
     parallax: bool
+    rims: bool
 
 
 def tabulate(
@@ -205,12 +217,13 @@ def tabulate(
     level: int = USUAL,
     curved: bool = False,
     parallax: bool = False,
+    rims: bool = False,
 ) -> SoftNodeTable:
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
     With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind,
     with `curved` cloth that is curved towards the viewer. `level` is one of DETAILS. With `parallax` a footprint is a
-    patch of view rays.
+    patch of view rays; with `rims` those that meet a wall see the rim above it.
     """
     detail = DETAILS[level]
     model = cloth_side(fabric, TruthOptions())
@@ -239,7 +252,7 @@ def tabulate(
     behind_mean, behind_variance = (part[:, : stop if behind else 0].copy() for part in (mean, variance))
     falls = np.zeros((len(grid_falls), AZIMUTHS, stop))
     for group, (across, along), start in zip(groups, rules, first_nodes, strict=True):
-        indices = (start + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
+        indices = _node_indices(group, across, start)
         nodes[:, indices] = piece_rows(front.yarn, group.piece, across, along)
         evenly[indices] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
         mean[:, indices], variance[:, indices] = _soft_horizons(group, across, along, grid)
@@ -258,6 +271,9 @@ def tabulate(
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
+    rays = partial(
+        _ray_columns, model, located, grid, groups, rules, first_nodes, evenly, starts[-2] * BLOCK_NODES, rims
+    )
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
@@ -291,8 +307,8 @@ def tabulate(
         grid_falls=grid_falls,
         legendre=detail.legendre,
         narrow=np.float32(detail.narrow),
-        **(_ray_columns(model, located, groups, rules, first_nodes, stop) if parallax else _NO_RAYS),
-        view_lines=detail.lines, parallax=parallax,
+        **(rays() if parallax else _NO_RAYS),
+        view_lines=detail.lines, spacing=detail.spacing, parallax=parallax, rims=rims,
     )  # fmt: skip
 
 
@@ -318,14 +334,24 @@ def _horizon_grids(
 def _ray_columns(
     model: ClothSide,
     located: _Located,
+    grid: npt.NDArray[np.uint8],
     groups: list[PieceGroup],
     rules: list[tuple[Rule, Rule]],
     first_nodes: list[int],
-    stop: int,
+    evenly: Float64,
+    gaps: int,
+    rims: bool,
 ) -> dict[str, Any]:
     """Return the columns of `SoftNodeTable` by which view rays meet heights."""
+    stop = len(evenly)
     front, spots = model.front, _spots(model.front, groups, rules, first_nodes, stop)
     shown = spots[:, 3][spots[:, 2] > 0.0]
+    areas = np.zeros((AZIMUTHS, SEEN_ANGLES, stop))
+    of_groups = seen_areas(front, located.samples, grid, list(zip(groups, rules, strict=True)), rims)
+    for group, (across, _), first, own in zip(groups, rules, first_nodes, of_groups, strict=True):
+        areas[..., _node_indices(group, across, first)] = own
+    if rims:
+        areas[..., :gaps] *= rays_left(areas * evenly, gaps)[..., None]
     return {
         "floats": np.array([front.floats[pick, end, piece.side] for (end, pick), piece, _ in located.pieces]),
         "crowns": np.array([front.crown[pick, end] for (end, pick), _, _ in located.pieces]),
@@ -335,7 +361,13 @@ def _ray_columns(
         "plane": model.plane,
         "spots": spots,
         "shown": np.array([shown.min(), shown.max()], np.float32),
+        "areas": _in_blocks(areas),
     }
+
+
+def _node_indices(group: PieceGroup, across: Rule, first: int) -> Index:
+    """Return which nodes are those of a group, given its first one."""
+    return (first + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
 
 
 def _spots(

@@ -105,6 +105,8 @@ class Scratch(NamedTuple):
         Nodes on view lines, and the first cells of their grids.
     seen : float32 (lines, 2, COLUMNS)
         Where the viewer sees the fixed nodes, in x and in y.
+    areas, freed : float32 (B, BLOCK_NODES)
+        Area seen of the boxes of the fixed nodes, and by how much more of them is seen over curved cloth.
     """
 
     weight: Float32
@@ -134,6 +136,8 @@ class Scratch(NamedTuple):
     drafts: Float32
     firsts: npt.NDArray[np.uint32]
     seen: Float32
+    areas: Float32
+    freed: Float32
 
 
 @allocating_kernel
@@ -172,4 +176,6 @@ def scratch_for(table: SoftNodeTable, most: int) -> Scratch:
         np.empty((kinds, DRAFT_ROWS, on_lines), np.float32),
         np.empty((kinds, on_lines), np.uint32),
         np.empty((len(table.spots), 2, COLUMNS), np.float32),
+        np.zeros((fixed if table.parallax else 0, BLOCK_NODES), np.float32),
+        np.zeros((fixed if table.parallax else 0, BLOCK_NODES), np.float32),
     )

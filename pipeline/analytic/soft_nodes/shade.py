@@ -66,6 +66,8 @@ _0, _1 = np.float32(0.0), np.float32(1.0)
 _SHORTEST = np.float32(1e-6)  # least squared length of a half vector
 _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) of the density
 _GAUSS = np.float32(1.0 / math.sqrt(3.0))
+_WHOLE = np.float32(1.001)  # a box that is seen, with the tail of its ramp
+_AWAY = np.float32(0.05)  # cosine to the viewer of a fixed node that faces away; a part of its box may not
 _LEVELS = np.float32(LEVELS)
 # A horizon's ramp has a faint tail, so that a patch hidden almost wholly still has a colour: that of its edge.
 _TAIL = np.float32(0.0005)
@@ -176,12 +178,18 @@ def shade_node(
     lit: np.float32,
     weight: np.float32,
     layer: YarnLayer,
+    least: np.float32 = _0,
 ) -> Eight:
-    """Return a node's shares of the first six sums and of the last two; `along`, `across` as for `_flakes`."""
+    """Return a node's shares of the first six sums and of the last two; `along`, `across` as for `_flakes`.
+
+    A node that faces away from the viewer has the cosine `least` to it. Of `seen`, what exceeds 1 are walls, which are
+    lit as the whole box.
+    """
     facing_o = d.ox * at.nx + d.oy * at.ny + d.oz * at.nz
     facing_i = d.ix * at.nx + d.iy * at.ny + d.iz * at.nz
-    cos_o, cos_i = max(facing_o, _0), max(facing_i, _0)
-    both = seen_and_lit(seen, lit, d.alike, d.right, d.opposite)
+    cos_o, cos_i = max(facing_o, least), max(facing_i, _0)
+    of_box = min(seen, _WHOLE)
+    both = seen_and_lit(of_box, lit, d.alike, d.right, d.opposite) + (seen - of_box) * lit
     wide = weight * at.inverse
     area = wide * cos_o
     diffuse = area * ((layer.blend * cos_i + (_1 - layer.blend) * d.iz) if facing_i > _0 else _0)
@@ -203,9 +211,10 @@ def add_node(
     lit: np.float32,
     weight: np.float32,
     layer: YarnLayer,
+    least: np.float32 = _0,
 ) -> Ten:
     """Return the ten sums with a node's shares added; arguments as for `shade_node`."""
-    a, c, s, a0, c0, s0, open_c, open_s = shade_node(d, at, along, across, seen, lit, weight, layer)
+    a, c, s, a0, c0, s0, open_c, open_s = shade_node(d, at, along, across, seen, lit, weight, layer, least)
     doubt = lit * (_1 - lit) + seen * (_1 - seen)
     return (
         total[0] + a, total[1] + c, total[2] + s, total[3] + a0, total[4] + c0, total[5] + s0,
@@ -223,9 +232,10 @@ def node_behind(
     lit: np.float32,
     weight: np.float32,
     layer: YarnLayer,
+    least: np.float32 = _0,
 ) -> Five:
     """Return a node's shares of the five sums with the light behind; arguments as for `shade_node`."""
-    cos_o = max(d.ox * at.nx + d.oy * at.ny + d.oz * at.nz, _0)
+    cos_o = max(d.ox * at.nx + d.oy * at.ny + d.oz * at.nz, least)
     cos_i = max(-(d.ix * at.nx + d.iy * at.ny + d.iz * at.nz), _0)
     wide = weight * at.inverse
     area = wide * cos_o
@@ -242,6 +252,14 @@ def node_behind(
 def _seen(over: np.float32) -> np.float32:
     """Return the share of a node that the viewer sees, `over` widths of the ramp above its horizon."""
     return ramp(over) + _TAIL / (_1 + over * over)
+
+
+@inlined_fast_kernel
+def _seen_of(at: NodeFrame, area: np.float32, freed: np.float32, d: YarnDirections) -> np.float32:
+    """Return the share of a node's box that the viewer sees, walls included, given its area over flat cloth."""
+    facing = d.ox * at.nx + d.oy * at.ny + d.oz * at.nz
+    share = area * at.nz / max(facing, _AWAY)
+    return min(max(share + freed, _0), max(share, _1)) if facing > _AWAY else share
 
 
 @inlined_fast_kernel
@@ -283,21 +301,27 @@ def shade_fixed(
     weight: Float32,
     light: NodeHorizons,
     viewer: NodeHorizons,
+    areas: Float32 | None,
+    freed: Float32,
     d: YarnDirections,
     alpha: np.float32,
     thickness: np.float32,
     blend: np.float32,
 ) -> Ten:
-    """Return the sums over fixed nodes of one family."""
+    """Return the sums over fixed nodes of one family; `areas` and `freed` as in `Scratch`, None without parallax."""
     layer = yarn_layer(alpha, thickness, blend)
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
-            seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
             lit = ramp(above(d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
-            total = add_node(total, d, at, along, across, seen, lit, weight[b, k], layer)
+            if areas is None:
+                seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
+                total = add_node(total, d, at, along, across, seen, lit, weight[b, k], layer)
+            else:
+                seen = _seen_of(at, areas[b, k], freed[b, k], d)
+                total = add_node(total, d, at, along, across, seen, lit, weight[b, k], layer, _AWAY)
     return total
 
 
@@ -307,6 +331,8 @@ def shade_fixed_behind(
     weight: Float32,
     light: NodeHorizons,
     viewer: NodeHorizons,
+    areas: Float32 | None,
+    freed: Float32,
     d: YarnDirections,
     alpha: np.float32,
     thickness: np.float32,
@@ -318,10 +344,14 @@ def shade_fixed_behind(
     a, c, s, a0, through = _0, _0, _0, _0, _0
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
-            seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
             lit = ramp(above(-d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
-            of_node = node_behind(d, at, along, across, seen, lit, weight[b, k], layer)
+            if areas is None:
+                seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
+                of_node = node_behind(d, at, along, across, seen, lit, weight[b, k], layer)
+            else:
+                seen = _seen_of(at, areas[b, k], freed[b, k], d)
+                of_node = node_behind(d, at, along, across, seen, lit, weight[b, k], layer, _AWAY)
             a += of_node[0]
             c += of_node[1]
             s += of_node[2]
@@ -410,3 +440,23 @@ def shade_gaps(
         for k in range(BLOCK_NODES):
             area += weight[b, k] * ramp(above(oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k]))
     return area * oz
+
+
+@fast_kernel
+def shares_of(weight: Float32, areas: Float32) -> np.float32:
+    """Return the sum of weights times areas, of fixed nodes."""
+    area = _0
+    for b in range(len(weight)):
+        for k in range(BLOCK_NODES):
+            area += weight[b, k] * areas[b, k]
+    return area
+
+
+@fast_kernel
+def write_freed(bent: NodeHorizons, flat: NodeHorizons, oz: np.float32, freed: Float32) -> None:
+    """Write by how much more of the boxes of fixed nodes is seen if their horizons are bent."""
+    for b in range(len(freed)):
+        for k in range(BLOCK_NODES):
+            over_bent = above(oz, bent.low[b, k], bent.high[b, k], bent.turn, bent.sharpness[b, k])
+            over_flat = above(oz, flat.low[b, k], flat.high[b, k], flat.turn, flat.sharpness[b, k])
+            freed[b, k] = ramp(over_bent) - ramp(over_flat)

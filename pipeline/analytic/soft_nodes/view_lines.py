@@ -5,10 +5,13 @@ s is displaced to q = s - d, with d the distance in which a ray sinks from h to 
 displaced. So a footprint is cut into lines in that azimuth, and each line is a curve h(s). Going away from the viewer,
 a point is seen if its q is less than all q before it. On a torus h is concave, so q(s) falls to its least at the crest
 that the viewer sees and rises from there: what is seen of a piece is one interval, found by its two ends. Gauss's rule
-is used in it, with the density at q; across the lines the trapezoidal rule.
+is used in it, with the density at q; across the lines the trapezoidal rule. Rays between what is covered and the near
+end of a piece meet the wall below it: with `SoftNodeTable.rims` they see the surface at this end, which is one node.
 
 Over a cloth of curvature kappa the ray is a parabola: with T = |o_xy| / o_z and g the height over the plane,
-d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) [Kuznetsov2022Curved].
+d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) [Kuznetsov2022Curved]. A steep view's ray rises again before it has sunk to
+the lowest yarns, and may meet the flank of a yarn then: this is the other root of the parabola, on which q grows
+towards the crest. What it clears leaves the cloth.
 """
 
 from __future__ import annotations
@@ -75,21 +78,21 @@ from pipeline.truth.geometry.heightfield import (
     WEFT,
 )
 
-_BETWEEN: Final = 0.2  # yarn spacings: distance of the lines
-_COARSEST: Final = 1.2  # the same in deviations
-_FOOTPRINT_ENDS: Final = 2.6  # where the footprint ends, in deviations
+_BETWEEN: Final = 0.25  # yarn spacings: distance of the lines at level 2
+_COARSEST: Final = 0.9  # the same in deviations
+_FOOTPRINT_ENDS: Final = 2.4  # where the footprint ends, in deviations
 _LENGTH: Final = 0.2  # yarn spacings of an interval for each node beyond the first
-_DEVIATIONS: Final = 1.2  # and deviations
+_DEVIATIONS: Final = 0.6  # and deviations
 _NEAREST: Final = 1e-5  # least length of a segment
 _CREST_STEPS: Final = 8
 _CREST_CLOSE: Final = 1e-2
 _ROOT_STEPS: Final = 8
+_THIRDS, _HALVINGS = 16, 24
 _CLOSE: Final = 0.02  # of a deviation: how near the end of an interval is found where something hides the rest,
 _WHERE_IT_ENDS: Final = 0.3  # and where the footprint ends
 _NEVER: Final = 1e9
 _FARTHEST: Final = 200.0  # yarn spacings that a line is followed
 _STEEP: Final = 0.05  # of a radius, across the yarn: shorter intervals take places even along the line
-_ALMOST_NOTHING = np.float32(1e-30)
 _0, _HALF, _LEVELS = np.float32(0.0), np.float32(0.5), np.float32(LEVELS)
 _SMEARED: Final = 0.2  # yarn spacings across, in which a line crosses the border of a yarn
 
@@ -107,6 +110,8 @@ class ViewRay(NamedTuple):
         Curvature of the cloth in this azimuth, 1/yarn spacings.
     plane : float
         Height of the reference plane.
+    least : float
+        Height at which the rays rise again; that of the lowest yarn if they do not before.
     """
 
     dx: float
@@ -114,6 +119,7 @@ class ViewRay(NamedTuple):
     run: float
     bend: float
     plane: float
+    least: float
 
 
 class YarnCurve(NamedTuple):
@@ -144,19 +150,19 @@ class YarnCurve(NamedTuple):
 
 @kernel
 def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
-    """Return how far before the plane a ray has a height, and the change of this distance with height."""
+    """Return how far before the plane a ray has a height, and its slope there, as a share of that at the plane."""
     if ray.bend == 0.0:
-        return (height - ray.plane) * ray.run, ray.run
+        return (height - ray.plane) * ray.run, 1.0
     square = 1.0 + 2.0 * ray.bend * ray.run * ray.run * (height - ray.plane)
     if square <= 0.0:
         return -_NEVER, 0.0
     root = math.sqrt(square)
-    return 2.0 * (height - ray.plane) * ray.run / (1.0 + root), ray.run / root
+    return 2.0 * (height - ray.plane) * ray.run / (1.0 + root), root
 
 
 @inlined_kernel
-def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
-    """Return to where the point at s is displaced, and a number with the sign of n.o, smooth up to the yarn's border.
+def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
+    """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the yarn's border.
 
     The height is that of `torus_height` and `height_beneath`, sqrt((R +- rho)^2 - b^2) - R cos u_max times the relief.
     """
@@ -164,20 +170,106 @@ def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     rho, b = curve.radius * cosine, curve.along + s * curve.by_along
     if curve.bend == 0.0:
-        height, slope = rho, sine * curve.by_across
-        upright = cosine
-    else:
-        ring, beyond = curve.bend + curve.side * rho, 0.0
-        if curve.side < 0.0:
-            bound = ring * curve.half / curve.bend
-            on_arc = min(max(b, -bound), bound)
-            beyond = abs(b - on_arc) * curve.half / curve.drop
-            b = on_arc
-        root = math.sqrt((ring - b) * (ring + b))
-        height = curve.side * (root - curve.drop) + beyond
-        upright, slope = cosine * root, ring * sine * curve.by_across + curve.side * b * cosine * curve.by_along
-    distance, run = sunk(ray, curve.beta * height)
-    return s - distance, upright + run * curve.beta * slope
+        return curve.beta * rho, curve.beta * sine * curve.by_across, cosine
+    ring, beyond = curve.bend + curve.side * rho, 0.0
+    if curve.side < 0.0:
+        bound = ring * curve.half / curve.bend
+        on_arc = min(max(b, -bound), bound)
+        beyond = abs(b - on_arc) * curve.half / curve.drop
+        b = on_arc
+    root = math.sqrt((ring - b) * (ring + b))
+    slope = ring * sine * curve.by_across + curve.side * b * cosine * curve.by_along
+    return curve.beta * (curve.side * (root - curve.drop) + beyond), curve.beta * slope, cosine * root
+
+
+@inlined_kernel
+def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
+    """Return to where the point at s is displaced, and a number with the sign of n.o."""
+    height, slope, upright = _height_and_slope(curve, s)
+    distance, steep = sunk(ray, height)
+    return s - distance, upright * steep + ray.run * slope
+
+
+@inlined_kernel
+def _seen_rising(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
+    """Return the same for rays that rise: its place, and a number that is positive where they meet the flank."""
+    height, slope, upright = _height_and_slope(curve, s)
+    steep = math.sqrt(max(1.0 + 2.0 * ray.bend * ray.run * ray.run * (height - ray.plane), 0.0))
+    return s + (1.0 + steep) / (ray.bend * ray.run), ray.run * slope - upright * steep
+
+
+@kernel
+def _reached(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> tuple[float, float]:
+    """Return between which places of a piece rays reach it that rise at `ViewRay.least`; none: the second is first."""
+    # The highest place, by thirds.
+    left, right = low, high
+    for _ in range(_THIRDS):
+        third = (right - left) / 3.0
+        if _height_and_slope(curve, left + third)[0] < _height_and_slope(curve, right - third)[0]:
+            left += third
+        else:
+            right -= third
+    top = 0.5 * (left + right)
+    if _height_and_slope(curve, top)[0] <= ray.least:
+        return high, low
+    first = low if _height_and_slope(curve, low)[0] > ray.least else _halve(curve, ray, top, low)
+    return first, high if _height_and_slope(curve, high)[0] > ray.least else _halve(curve, ray, top, high)
+
+
+@kernel
+def _halve(curve: YarnCurve, ray: ViewRay, inside: float, outside: float) -> float:
+    """Return the place between two at which rays just reach a piece."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if _height_and_slope(curve, middle)[0] > ray.least:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@kernel
+def _rising_crest(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> float:
+    """Return the crest of a piece that rising rays clear; they meet the flank between it and `high`."""
+    if _seen_rising(curve, ray, high)[1] <= 0.0:
+        return high
+    crest = low
+    if _seen_rising(curve, ray, low)[1] < 0.0:
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (crest + high)
+            if _seen_rising(curve, ray, middle)[1] > 0.0:
+                high = middle
+            else:
+                crest = middle
+    return crest
+
+
+@kernel
+def _rising_interval(
+    curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_from: float, q_to: float
+) -> tuple[float, float]:
+    """Return from where to where a flank is seen by rising rays from `q_from` to `q_to`."""
+    start, stop = crest, high
+    if q_to <= q_from or _seen_rising(curve, ray, crest)[0] <= q_from or _seen_rising(curve, ray, high)[0] >= q_to:
+        return high, high
+    if _seen_rising(curve, ray, high)[0] < q_from:
+        stop = _place_of(curve, ray, crest, high, q_from, True)
+    if _seen_rising(curve, ray, crest)[0] > q_to:
+        start = _place_of(curve, ray, crest, high, q_to, True)
+    return start, stop
+
+
+@kernel
+def _place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: float, rising: bool) -> float:
+    """Return the place between two that rays through `target` meet."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        q = _seen_rising(curve, ray, middle)[0] if rising else _seen(curve, ray, middle)[0]
+        if (q > target) == rising:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 @inlined_kernel
@@ -227,37 +319,40 @@ def _at_place(
 
 
 @kernel
-def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float) -> float:
+def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float, spacing: float) -> float:
     """Return a bound of the nodes that a footprint places on lines, given its least deviation of any direction."""
     widest = math.sqrt(max(deviation_x**2 + deviation_y**2 - narrowest**2, narrowest**2))
-    # Parts between borders of yarns have a node more than their length takes.
-    density = 2.0 * _FOOTPRINT_ENDS * (1.0 / _BETWEEN + 1.0)
-    return 2.0 * (3.0 + density * narrowest) * (3.0 + density * widest)
+    # Parts between borders of yarns, and rims, have a node more than their length takes.
+    lines = 3.0 + 2.0 * _FOOTPRINT_ENDS * (1.0 / (_COARSEST * spacing) + narrowest * (1.0 / (_BETWEEN * spacing) + 1.0))
+    nodes = 3.0 + 2.0 * _FOOTPRINT_ENDS * (1.0 / (_DEVIATIONS * spacing) + widest * (1.0 / (_LENGTH * spacing) + 2.0))
+    return lines * nodes
 
 
 @kernel
 def _lines_across(
-    ray: ViewRay, x: float, y: float, sigma: float, warp_radius: float, weft_radius: float, reach: float, lines: Float64
+    ray: ViewRay, x: float, y: float, sigma: float, radii: tuple[float, float], reach: float, spacing: float,
+    lines: Float64,
 ) -> int:  # fmt: skip
     """Write places of lines across the azimuth and the widths that they stand for, (2, most); return their number.
 
     Lines that run along yarns have places by Gauss's rule between the borders of yarns.
     """
     along_x = abs(ray.dy) < abs(ray.dx)
+    distance = spacing * min(_BETWEEN, _COARSEST * sigma)
     if reach * min(abs(ray.dx), abs(ray.dy)) >= _SMEARED:
-        count = math.ceil(_FOOTPRINT_ENDS * sigma / min(_BETWEEN, _COARSEST * sigma))
+        count = math.ceil(_FOOTPRINT_ENDS * sigma / distance)
         apart = _FOOTPRINT_ENDS * sigma / count
         for j in range(2 * count + 1):
             lines[0, j], lines[1, j] = (j - count) * apart, apart
         return 2 * count + 1
     # At w across the azimuth the line has x = x - w dy, or y = y + w dx.
-    centre, factor, radius = (y, ray.dx, weft_radius) if along_x else (x, -ray.dy, warp_radius)
+    centre, factor, radius = (y, ray.dx, radii[WEFT]) if along_x else (x, -ray.dy, radii[WARP])
     place, stop, n = centre - _FOOTPRINT_ENDS * sigma, centre + _FOOTPRINT_ENDS * sigma, 0
     while place < stop - _NEAREST and n < lines.shape[1] - MOST_ACROSS:
         after = min(next_cut(place, True, radius), stop)
         half, middle = 0.5 * (after - place), 0.5 * (after + place)
         # Widths of yarns are round numbers, and so may be the quotient: it must not fall below.
-        count = min(1 + int(max((2.0 * half + _NEAREST) / _BETWEEN, 2.0 * half / (_COARSEST * sigma))), MOST_ACROSS)
+        count = min(1 + int((2.0 * half + _NEAREST) / distance), MOST_ACROSS)
         for i in range(count):
             lines[0, n] = (middle + half * GAUSS_PLACES[count, i] - centre) / factor
             lines[1, n] = half * GAUSS_WEIGHTS[count, i]
@@ -304,18 +399,19 @@ def _curve_of(table: SoftNodeTable, p: int, ray: ViewRay, x: float, y: float) ->
 @inlined_kernel
 def _interval(
     curve: YarnCurve, ray: ViewRay, low: float, high: float, sigma: float, covered: float
-) -> tuple[float, float, float, float]:
+) -> tuple[float, float, float, float, float]:
     """Return from where to where a piece between two places is seen, how long that seems, and what is covered then.
 
     Rays from `covered` on meet something nearer to the viewer. The interval is empty if its end is not behind its
-    start, and cut where the footprint ends.
+    start, and cut where the footprint ends. Returned last is the displaced place of the piece's near end: rays from
+    there to `covered` meet the wall below it. It is `covered` if this end faces away from the viewer.
     """
     crest, left, right = low, -_FOOTPRINT_ENDS * sigma, _FOOTPRINT_ENDS * sigma
     q_crest, at_low = _seen(curve, ray, low)
     q_high, at_high = _seen(curve, ray, high)
     if at_low < 0.0:
         if at_high <= 0.0:
-            return low, low, 0.0, min(covered, q_high)
+            return low, low, 0.0, min(covered, q_high), covered
         crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, q_high)
     q_from, q_to = max(q_crest, left), min(q_high, right, covered)
     start, stop = crest, high
@@ -327,7 +423,7 @@ def _interval(
             stop = _at_place(curve, ray, crest, high, q_crest, q_high, q_to, near)
     else:
         stop = start
-    return start, stop, q_to - q_from, min(covered, q_crest)
+    return start, stop, q_to - q_from, min(covered, q_crest), q_high
 
 
 @inlined_kernel
@@ -335,7 +431,10 @@ def _write_draft(
     draft: Float32, k: int, start: float, stop: float, count: int, curve: YarnCurve, of_line: ViewLine, bounds: Float32,
     family: int, size: int, line: Float32,
 ) -> None:  # fmt: skip
-    """Write the nodes of an interval from `k` on: even along the line, or in the angle across the yarn."""
+    """Write the nodes of an interval from `k` on: even along the line, or in the angle across the yarn.
+
+    An interval of no length is a rim, whose density is its whole weight.
+    """
     turned = abs(curve.by_across) * (stop - start) > _STEEP * curve.radius
     first, last = np.float32(start), np.float32(stop)
     if turned:
@@ -364,13 +463,53 @@ def _write_draft(
     fill_eight(draft[ROWS_PER], k, rows if family == WARP else -rows)
 
 
+class Piece(NamedTuple):
+    """A piece along a line: its curve, row of `SoftNodeTable.bounds`, family, first cell of its grid and its size."""
+
+    curve: YarnCurve
+    bounds: Float32
+    family: int
+    first: int
+    size: int
+
+
+@kernel
+def _write_meetings(
+    scratch: Scratch, kind: int, k: int, ray: ViewRay, of_line: ViewLine, piece: Piece, start: float, stop: float,
+    rising: bool,
+) -> int:  # fmt: skip
+    """Write the nodes of an interval from `k` on, even in the place where they are seen; return where they end.
+
+    Where rays turn they see an endless length of a small piece: places along the line would be far apart there.
+    """
+    ends = _seen_rising(piece.curve, ray, start)[0], _seen_rising(piece.curve, ray, stop)[0]
+    if not rising:
+        ends = _seen(piece.curve, ray, start)[0], _seen(piece.curve, ray, stop)[0]
+    half, middle, sigma = 0.5 * abs(ends[1] - ends[0]), 0.5 * (ends[0] + ends[1]), of_line.sigma
+    count = min(1 + int(2.0 * half / (_DEVIATIONS * sigma)), MOST_ACROSS)
+    if stop <= start or half <= _NEAREST or k + count > scratch.drafts.shape[2] - 2 * BLOCK_NODES:
+        return k
+    draft = scratch.drafts[kind]
+    for i in range(count):
+        q = middle + half * GAUSS_PLACES[count, i]
+        share = of_line.density * half * GAUSS_WEIGHTS[count, i] * math.exp(-0.5 * (q / sigma) ** 2)
+        s = _place_of(piece.curve, ray, start, stop, q, rising)
+        of_node = ViewLine(of_line.x, of_line.y, share, sigma, of_line.apart)
+        _write_draft(
+            draft, k + i, s, s, 1, piece.curve, of_node, piece.bounds, piece.family, piece.size, scratch.line
+        )  # fmt: skip
+        for j in range(8):
+            scratch.firsts[kind, k + i + j] = piece.first
+    return k + count
+
+
 @inlined_kernel
 def _fill_block(draft: Float32, firsts: npt.NDArray[np.uint32], stop: int) -> int:
     """Fill the last block of nodes with such that weigh nothing; return the number of nodes."""
     for k in (stop, stop + 8):
         for row in range(DRAFT_ROWS):
             fill_eight(draft[row], k, draft[row, stop - 1])
-        fill_eight(draft[LENGTH], k, _ALMOST_NOTHING * draft[LENGTH, stop - 1])  # its sign counts
+        fill_eight(draft[DENSITY], k, _0)
         for i in range(8):
             firsts[k + i] = firsts[stop - 1]
     return -(-stop // BLOCK_NODES) * BLOCK_NODES
@@ -385,6 +524,12 @@ def _gap_seen(scratch: Scratch, look: SoftQuery, at: int, per_azimuth: int) -> n
 
 
 @inlined_kernel
+def _under_bell(low: float, high: float) -> float:
+    """Return the integral of exp(-x^2 / 2)."""
+    return math.sqrt(0.5 * math.pi) * (math.erf(high * math.sqrt(0.5)) - math.erf(low * math.sqrt(0.5)))
+
+
+@inlined_kernel
 def _place_line(
     table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay, view_line: ViewLine
 ) -> float:  # fmt: skip
@@ -395,9 +540,15 @@ def _place_line(
     warp_radius, weft_radius = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
     x0, y0, ex, ey, sigma = view_line.x, view_line.y, ray.dx, ray.dy, view_line.sigma
     of_gap, gaps, covered, limit = sunk(ray, 0.0)[0], 0.0, _NEVER, scratch.drafts.shape[2] - 2 * BLOCK_NODES
+    stopped, slit_from, slit_to = 0.0, 0.0, 0.0
     left, right = -_FOOTPRINT_ENDS * sigma, _FOOTPRINT_ENDS * sigma
     low = right + sunk(ray, table.highest)[0]
-    last = max(left + sunk(ray, table.lowest)[0], low - _FARTHEST)
+    rising, lowest = ray.least > table.lowest, sunk(ray, max(ray.least, table.lowest))[0]
+    if rising:
+        lowest = sunk(ray, table.highest)[0] - 2.0 * math.sqrt(
+            max(1.0 + 2.0 * ray.bend * ray.run * ray.run * (table.highest - ray.plane), 0.0)
+        ) / (ray.bend * ray.run)  # fmt: skip
+    last = max(left + lowest, low - _FARTHEST)
     while low > last and covered > left:
         # The next cut on the way from the viewer.
         high, low = low, last
@@ -422,17 +573,53 @@ def _place_line(
                 share = view_line.density * (q_high - q_low) * math.exp(-0.5 * (q / sigma) ** 2)
                 at_x, at_y = np.float32(x0 + (q + of_gap) * ex - column), np.float32(y0 + (q + of_gap) * ey - row)
                 at = first + in_grid(bounds, family, _HALF, at_x, at_y, size)
-                gaps += share * float(_gap_seen(scratch, look, at, size * size))
+                through = float(_gap_seen(scratch, look, at, size * size))
+                gaps += share * through
+                stopped += share * (1.0 - through)
             continue
         if low - sunk(ray, table.crowns[p])[0] >= covered:
             continue
         curve = _curve_of(table, p, ray, x0 - column, y0 - row)
-        start, stop, seen, covered = _interval(curve, ray, low, high, sigma, covered)
+        wall_to, reached_to, before = min(covered, right), high, covered
+        reached_from = low
+        if rising:
+            reached_from, reached_to = _reached(curve, ray, low, high)
+            if reached_to <= reached_from:
+                continue
+            wall_to = min(wall_to, _seen_rising(curve, ray, high)[0]) if reached_to == high else -_NEVER
+        start, stop, seen, covered, wall_from = _interval(curve, ray, reached_from, reached_to, sigma, covered)
         kind = column % of_warp if family == WARP else of_warp + row % of_weft
-        k = stops[kind]
+        k, wall_from = stops[kind], max(wall_from, left)
+        if table.rims and wall_to - wall_from > _NEAREST and k < limit:
+            rim = stopped + view_line.density * _under_bell(wall_from / sigma, wall_to / sigma) * sigma
+            of_rim, stopped = ViewLine(x0, y0, rim, sigma, view_line.apart), 0.0
+            _write_draft(
+                scratch.drafts[kind], k, high, high, 1, curve, of_rim, bounds, family, size, scratch.line
+            )  # fmt: skip
+            for i in range(8):
+                scratch.firsts[kind, k + i] = first
+            k += 1
+            stops[kind] = k
+        if rising:
+            of_piece = Piece(curve, bounds, family, first, size)
+            k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, False)
+            crest = _rising_crest(curve, ray, reached_from, reached_to)
+            start, stop = _rising_interval(curve, ray, crest, reached_to, left, min(before, right))
+            k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, True)
+            # Of rays that cleared the last piece, this one stops some, or it opens a new slit above it.
+            cleared = max(_seen_rising(curve, ray, crest)[0], _seen(curve, ray, reached_to)[0])
+            if cleared < before:
+                slit_from, slit_to = cleared, before
+            elif slit_to > slit_from:
+                start, stop = _rising_interval(curve, ray, crest, reached_to, max(slit_from, left), min(slit_to, right))
+                k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, True)
+                slit_from = max(slit_from, cleared)
+            stops[kind] = k
+            continue
         if stop <= start or k >= limit:
             continue
-        count = min(1 + int(max((stop - start + _NEAREST) / _LENGTH, seen / (_DEVIATIONS * sigma))), MOST_ACROSS)
+        count = 1 + int(max((stop - start + _NEAREST) / _LENGTH, seen / (_DEVIATIONS * sigma)) / table.spacing)
+        count = min(count, MOST_ACROSS)
         _write_draft(
             scratch.drafts[kind], k, start, stop, count, curve, view_line, bounds, family, size, scratch.line
         )  # fmt: skip
@@ -459,7 +646,8 @@ def place_on_view_lines(
     drift = (ex * ey * (yy - xx) + xy * (ex * ex - ey * ey)) / (across * across)
     sigma = math.sqrt(float(max(xx * yy - xy * xy, np.float32(0.0)))) / across
     radii = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
-    for j in range(_lines_across(ray, look.x, look.y, across, *radii, 2.0 * _FOOTPRINT_ENDS * sigma, lines)):
+    reach = 2.0 * _FOOTPRINT_ENDS * sigma
+    for j in range(_lines_across(ray, look.x, look.y, across, radii, reach, table.spacing, lines)):
         w, apart = lines[0, j], lines[1, j]
         density = apart / (2.0 * math.pi * across * sigma) * math.exp(-0.5 * (w / across) ** 2)
         x, y = look.x - w * ey + drift * w * ex, look.y + w * ex + drift * w * ey

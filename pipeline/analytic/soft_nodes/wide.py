@@ -18,12 +18,15 @@ from pipeline.analytic.soft_nodes.footprint_nodes import REACH
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, GROUP_FAMILY, LINES, RULE_X, RULE_Y, START, SoftNodeTable
 from pipeline.analytic.soft_nodes.scratch import Scratch, SoftQuery
+from pipeline.analytic.soft_nodes.seen_areas import angle_of, write_areas
 from pipeline.analytic.soft_nodes.shade import (
     NodeHorizons,
     directions,
     shade_fixed,
     shade_fixed_behind,
     shade_gaps,
+    shares_of,
+    write_freed,
     write_sums,
 )
 from pipeline.analytic.soft_nodes.waves import HIGHEST, TOGETHER, faintest
@@ -310,23 +313,46 @@ def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, widest: f
         mean, low_i, high_i, low_o, high_o = scratch.curved, 0, 0, 1, 1
     near_i = look.high_i if look.turn_i > _HALF else look.low_i
     near_o = look.high_o if look.turn_o > _HALF else look.low_o
+    if table.parallax:
+        step, part = angle_of(look.oz)
+        write_areas(table.areas, look.low_o, look.high_o, look.turn_o, step, part, scratch.areas)
+        if look.bend_o > _0:
+            bent = NodeHorizons(mean[low_o], mean[high_o], table.sharpness[near_o], look.turn_o)
+            flat = NodeHorizons(table.mean[look.low_o], table.mean[look.high_o], table.sharpness[near_o], look.turn_o)
+            write_freed(bent, flat, look.oz, scratch.freed)
+        else:
+            scratch.freed[:] = _0
     for kind in range(kinds):
         family = 0 if kind < of_warp else 1
         a, b = table.starts[kind], table.starts[kind + 1]
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
         alpha, blend = table.yarn[family, ALPHA], table.yarn[family, BLEND]
         nodes, own, thickness = table.nodes[a:b], shares[a:b], np.float32(table.thickness)
+        areas, freed = scratch.areas[a:b], scratch.freed[a:b]
         viewer = NodeHorizons(mean[low_o, a:b], mean[high_o, a:b], table.sharpness[near_o, a:b], look.turn_o)
         if look.iz < _0:
             behind, sharpness = table.behind_mean, table.behind_sharpness[near_i, a:b]
             light = NodeHorizons(behind[look.low_i, a:b], behind[look.high_i, a:b], sharpness, look.turn_i)
-            write_sums(shade_fixed_behind(nodes, own, light, viewer, d, alpha, thickness, blend), result[kind])
+            if table.parallax:
+                sums = shade_fixed_behind(nodes, own, light, viewer, areas, freed, d, alpha, thickness, blend)
+            else:
+                sums = shade_fixed_behind(nodes, own, light, viewer, None, freed, d, alpha, thickness, blend)
+            write_sums(sums, result[kind])
         else:
             light = NodeHorizons(mean[low_i, a:b], mean[high_i, a:b], table.sharpness[near_i, a:b], look.turn_i)
-            write_sums(shade_fixed(nodes, own, light, viewer, d, alpha, thickness, blend), result[kind])
+            if table.parallax:
+                write_sums(
+                    shade_fixed(nodes, own, light, viewer, areas, freed, d, alpha, thickness, blend), result[kind]
+                )
+            else:
+                write_sums(
+                    shade_fixed(nodes, own, light, viewer, None, freed, d, alpha, thickness, blend), result[kind]
+                )
     a, b = table.starts[kinds], table.starts[kinds + 1]
     if b == a:
         return _0
+    if table.parallax:
+        return shares_of(shares[a:b], scratch.areas[a:b])
     return shade_gaps(
         shares[a:b], mean[low_o, a:b], mean[high_o, a:b], table.sharpness[near_o, a:b],
         look.turn_o, look.oz,

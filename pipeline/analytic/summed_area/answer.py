@@ -3,7 +3,8 @@
 A footprint has the nearest level, read bilinearly; one smaller than those of the first level, a sixteenth of a yarn or
 more (tables), is answered as that. A long one is the mean of up to `MOST_TAPS` round ones along its longer axis.
 Components are sums over clusters, divided by the seen area, as those of points are; patches of which hardly anything is
-seen fade to 0, as in the truth.
+seen fade to 0, as in the truth. With parallax, these sums are over layers of height as well, each read at its own place
+(layers).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from pipeline.analytic.gauss_rules import taps
 from pipeline.analytic.soft_horizons import around, ramp
 from pipeline.analytic.soft_nodes.shade import directions
+from pipeline.analytic.summed_area.layers import HeightLayer, layers_of, sum_layer
 from pipeline.analytic.summed_area.shade import CORNERS, Azimuth, Slots, corner, over_horizon, sum_clusters
 from pipeline.analytic.summed_area.tables import OCTAVE_STEPS, TEXEL_AZIMUTHS, ClusterTables
 from pipeline.compiled.arrays import Float32, Float64, Index
@@ -77,7 +79,14 @@ def rounds(queries: Queries) -> Rounds:
 
 def answer(tables: ClusterTables, queries: Queries) -> Float32:
     """Return the components of N queries about flat cloth, light and viewer in front, (N, 4)."""
-    return _answer(tables, rounds(queries), _PLACES)
+    if not len(tables.extent):
+        return _answer(tables, rounds(queries), _PLACES)
+    deep = rounds(queries)
+    layers = layers_of(tables, deep.sigma, queries.wo)
+    result, flat = np.empty((len(layers), 4), np.float32), layers == 1
+    result[flat] = _answer(tables, Rounds(*(column[flat] for column in deep)), _PLACES)
+    result[~flat] = _answer_rays(tables, Rounds(*(column[~flat] for column in deep)), _PLACES, layers[~flat])
+    return result
 
 
 @inlined_kernel
@@ -207,6 +216,87 @@ def _answer_rows(
             area += open_seen
             bare += open_area
         divide(result[n], area, bare)
+
+
+@allocating_kernel
+def _answer_rays(tables: ClusterTables, queries: Rounds, places: Float64, layers: Index) -> Float32:
+    """Return the components of all queries, whose rays cross more than one layer."""
+    result = np.zeros((len(queries.u), 4), np.float32)
+    window = np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32)
+    slots = np.zeros((tables.slots.shape[1] + 1, CORNERS), np.uint32)
+    _answer_rays_rows(tables, queries, places, layers, window, slots, result)
+    return result
+
+
+@kernel
+def _answer_rays_rows(
+    tables: ClusterTables, queries: Rounds, places: Float64, layers: Index, window: tuple[Index, Float32], slots: Slots,
+    result: Float32,
+) -> None:  # fmt: skip
+    """Write the components of all queries; `window` and `slots` are scratch memory."""
+    for n in range(len(queries.u)):
+        i, o = azimuth(queries.wi[n, 0], queries.wi[n, 1]), azimuth(queries.wo[n, 0], queries.wo[n, 1])
+        level = level_of(tables, queries.sigma[n])
+        area, bare = _0, _0
+        for tap in range(queries.readings[n]):
+            along = queries.spread[n] * places[queries.readings[n], tap]
+            x, y = queries.u[n] + along * queries.cosine[n], queries.v[n] + along * queries.sine[n]
+            seen, whole = _add_layers(tables, level, x, y, queries, n, layers[n], i, o, window, slots, result[n])
+            area += seen
+            bare += whole
+        divide(result[n], area, bare)
+
+
+@inlined_kernel
+def _touched_layer(
+    tables: ClusterTables, texels: Index, first: int, last: int, layer: HeightLayer, slots: Slots
+) -> int:
+    """List the blocks as `touched` does, those that a layer touches in any texel."""
+    # A thin cluster has shares of the layers below and above.
+    count, low, high = 0, layer.middle - layer.half - layer.half, layer.middle + layer.half + layer.half
+    for block in range(first, last):
+        near = False
+        for c in range(CORNERS):
+            slot = tables.slots[texels[c], block]
+            slots[count, c] = slot
+            near |= slot != np.uint32(0) and tables.extent[slot, 0] < high and tables.extent[slot, 1] > low
+        if near:
+            count += 1
+    return count
+
+
+@inlined_kernel
+def _add_layers(
+    tables: ClusterTables, level: int, x: float, y: float, queries: Rounds, n: int, layers: int, i: Azimuth, o: Azimuth,
+    window: tuple[Index, Float32], slots: Slots, sums: Float32,
+) -> tuple[np.float32, np.float32]:  # fmt: skip
+    """Add the components under a round footprint of rays, times its seen area; return that and the bare area."""
+    texels, weights = window
+    ix, iy, iz = queries.wi[n, 0], queries.wi[n, 1], queries.wi[n, 2]
+    ox, oy, oz = queries.wo[n, 0], queries.wo[n, 1], queries.wo[n, 2]
+    run_x, run_y = ox / oz, oy / oz
+    lowest, highest = tables.extent[0, 0], tables.extent[0, 1]
+    apart = (highest - lowest) / np.float32(layers - 1)
+    area, bare = _0, _0
+    by_family = directions(ix, iy, iz, ox, oy, oz, 0), directions(ix, iy, iz, ox, oy, oz, 1)
+    for number in range(layers):
+        layer = HeightLayer(lowest + apart * np.float32(number), _HALF * apart)
+        find(tables, level, x + layer.middle * run_x, y + layer.middle * run_y, texels, weights)
+        four = weights[0], weights[1], weights[2], weights[3]
+        for family in range(2):
+            blocks = _touched_layer(tables, texels, tables.starts[family], tables.starts[family + 1], layer, slots)
+            if blocks == 0:
+                continue
+            seen, diffuse, specular, whole = sum_layer(
+                tables, slots, blocks, four, layer, i, o, by_family[family], tables.yarn[family]
+            )
+            area += seen
+            bare += whole
+            sums[family] += specular
+            sums[2 + family] += diffuse
+    find(tables, level, x - tables.plane * run_x, y - tables.plane * run_y, texels, weights)
+    open_area, open_seen = gap_area(tables, texels, weights, o, oz)
+    return area + open_seen, bare + open_area
 
 
 @kernel

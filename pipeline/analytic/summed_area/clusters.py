@@ -42,6 +42,8 @@ class Patch(NamedTuple):
         Angles across and along the yarn.
     horizon : float64 (azimuths, G, G)
         Sine of the horizon's elevation, at every other azimuth of soft nodes.
+    height : float64 (G, G)
+        Height over the fabric plane.
     """
 
     piece: CellPiece
@@ -49,6 +51,7 @@ class Patch(NamedTuple):
     v: Float64
     u: Float64
     horizon: Float64
+    height: Float64
 
 
 class PlacedPatch(NamedTuple):
@@ -84,7 +87,7 @@ def _patch(field: HeightField, table: HorizonMap, piece: CellPiece, block: int) 
     horizon = soft_horizons.from_even(evenly)[::2].reshape(-1, grid, grid)
     if piece.family == GAP:
         none = np.zeros((grid, grid))
-        return Patch(piece, none + 1.0, none, none, np.broadcast_to(horizon[:, :1, :1], horizon.shape))
+        return Patch(piece, none + 1.0, none, none, np.broadcast_to(horizon[:, :1, :1], horizon.shape), none)
     yarn = field.yarn[piece.family]
     edges = math.pi * (np.linspace(0.0, 1.0, grid + 1) - 0.5)
     v = 0.5 * (edges[1:] + edges[:-1])[None, :]
@@ -98,7 +101,20 @@ def _patch(field: HeightField, table: HorizonMap, piece: CellPiece, block: int) 
     length = np.sqrt((beta * np.sin(v)) ** 2 + (beta * sine * np.cos(v)) ** 2 + (cosine * np.cos(v)) ** 2)
     # 1 / n_z = length / (cosine cos v), whose cos v is that of dx = r cos v dv.
     surface = length / cosine * np.diff(edges) / np.diff(np.sin(edges))
-    return Patch(piece, surface, np.broadcast_to(v, sine.shape), np.arcsin(sine), horizon)
+    height = beta * _height(piece, along[:, None], yarn[RADIUS] * np.cos(v), sine, cosine)
+    return Patch(piece, surface, np.broadcast_to(v, sine.shape), np.arcsin(sine), horizon, height)
+
+
+def _height(piece: CellPiece, along: Float64, rise: Float64, sine: Float64, cosine: Float64) -> Float64:
+    """Return the height over the fabric plane before relief, by the inclination; `rise` is r cos v (heightfield)."""
+    if not piece.curve:
+        return rise + 0.0 * along
+    bend = 1.0 / piece.curve
+    drop = math.sqrt(bend**2 - piece.half**2)
+    if piece.sign > 0.0:
+        return (bend + rise) * cosine - drop
+    inner = bend - rise
+    return drop - inner * cosine + (np.abs(along) - inner * np.abs(sine)) * piece.half / drop
 
 
 def blocks_of(

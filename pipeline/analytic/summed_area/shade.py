@@ -93,7 +93,7 @@ def over_horizon(z: np.float32, low: np.float32, width: np.float32, inverse: np.
 
 
 @inlined_fast_kernel
-def _evaluate(sums: Nine, d: YarnDirections, own: Optics) -> Eight:
+def evaluate(sums: Nine, d: YarnDirections, own: Optics) -> Eight:
     """Return a cluster's sums as `shade_node` does, from its sums over the texels."""
     area, v, u, spread_v, spread_u, low_i, width_i, low_o, width_o = sums
     inverse = _1 / max(area, _TINY)
@@ -138,7 +138,7 @@ def _cluster(
         p[4] + q[4] + r[4] + s[4], p[5] + q[5] + r[5] + s[5], p[6] + q[6] + r[6] + s[6], p[7] + q[7] + r[7] + s[7],
         p[8] + q[8] + r[8] + s[8],
     )  # fmt: skip
-    return _evaluate(sums, d, own)
+    return evaluate(sums, d, own)
 
 
 @inlined_fast_kernel

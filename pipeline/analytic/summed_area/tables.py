@@ -209,6 +209,13 @@ class ClusterTables(NamedTuple):
         `HeightField.yarn`.
     thickness : float32
         Optical thickness.
+    plane : float
+        Height of the reference plane.
+    height : float32 (S, 2, LANES)
+        Mean height of each cluster over the reference plane, and half the range of an even distribution of heights
+        with its standard deviation; no row without parallax.
+    extent : float32 (S, 2)
+        Lowest and highest height of all clusters of a slot; in row 0 of the cloth; no row without parallax.
     """
 
     repeat: Index
@@ -221,9 +228,12 @@ class ClusterTables(NamedTuple):
     horizon: npt.NDArray[np.uint8]
     yarn: Float32
     thickness: np.float32
+    plane: float
+    height: Float32
+    extent: Float32
 
 
-def tabulate(fabric: Fabric, clusters: int) -> ClusterTables:
+def tabulate(fabric: Fabric, clusters: int, parallax: bool = False) -> ClusterTables:
     """Build the tables of a fabric's front, of `clusters` clusters in all."""
     model = cloth_side(fabric, TruthOptions())
     field = model.front
@@ -262,6 +272,12 @@ def tabulate(fabric: Fabric, clusters: int) -> ClusterTables:
         mean, spread = moments({key: patch.horizon[azimuth] for key, patch in patches.items()})
         horizon[1:, azimuth, MEAN] = np.rint(np.clip(MEAN_SCALE * mean, 0.0, 255.0))
         horizon[1:, azimuth, SPREAD] = np.rint(np.clip(SPREAD_SCALE * spread, 0.0, 255.0))
+    height, extent = np.zeros((0, 2, LANES), np.float32), np.zeros((0, 2), np.float32)
+    if parallax:
+        mean, spread = moments({key: patch.height - model.plane for key, patch in patches.items()})
+        height = np.zeros((1 + len(own), 2, LANES), np.float32)
+        height[1:, MEAN], height[1:, SPREAD] = mean, math.sqrt(3.0) * spread
+        extent = _extents(height, own)
     number = np.zeros(picks * ends, np.int64)
     for index, orbit in enumerate(cells):
         number[[pick * ends + end for pick, end in orbit]] = index
@@ -276,7 +292,18 @@ def tabulate(fabric: Fabric, clusters: int) -> ClusterTables:
         horizon=horizon,
         yarn=field.yarn.astype(np.float32),
         thickness=np.float32(field.thickness),
+        plane=model.plane,
+        height=height,
+        extent=extent,
     )
+
+
+def _extents(height: Float32, area: Float32) -> Float32:
+    """Return the lowest and the highest height of each slot, (S, 2), and in the first, which has no area, of all."""
+    middle, half = height[1:, MEAN], height[1:, SPREAD]
+    low = np.where(area > _ABSENT, middle - half, math.inf).min(axis=1)
+    high = np.where(area > _ABSENT, middle + half, -math.inf).max(axis=1)
+    return np.concatenate([[[low.min(), high.max()]], np.stack([low, high], axis=1)]).astype(np.float32)
 
 
 def _finest(cells: int) -> int:

@@ -21,6 +21,9 @@ class AnalyticOptions(Options):
     learns: ClassVar[bool] = False
 
     footprint: Gaussian = "gaussian"
+    parallax: bool = False
+    """True if footprints are patches of view rays, or points view rays; must be that of the truth. A method that knows
+    the fabric plane alone declares `Literal[False]`."""
 
     def methods(self) -> Sequence[Method]:
         """Return one method for each setting."""

@@ -58,13 +58,14 @@ class MapMaterialOptions(AnalyticOptions):
                 None,
                 tables,
                 lambda tables, queries, _: answer(tables, queries),
-                lambda tables: len(tables.maps.texels) * TEXEL_CHANNELS,
+                lambda tables: len(tables.maps.texels) * (TEXEL_CHANNELS + self.parallax),
             )
         ]
 
 
 def _tables(fabric: Fabric, options: MapMaterialOptions) -> MaterialMaps:
     """Return the maps of a fabric in unit colours."""
+    from pipeline.analytic.parallax_mapping import height_maps
     from pipeline.materials.lobes import reflectance
     from pipeline.materials.lookup import tabulate
     from pipeline.materials.planes import layout, planes
@@ -78,7 +79,9 @@ def _tables(fabric: Fabric, options: MapMaterialOptions) -> MaterialMaps:
         sheen = constants(white, share).sheen[0] * grazing / grazing.sum()
     painted = _painted(fabric, options.specular, warp=(1.0, 0.0, 0.0), weft=(0.0, 1.0, 0.0))
     chosen = layout(painted, options.size)
-    return tabulate(planes(painted, chosen, share), constants(painted, share), chosen, sheen, options.specular)
+    finest = planes(painted, chosen, share)
+    heights = height_maps(fabric, finest.height.astype(np.float64), (chosen.ends, chosen.picks), options.parallax)
+    return tabulate(finest, constants(painted, share), chosen, sheen, options.specular, heights)
 
 
 def _painted(fabric: Fabric, specular: float, **colours: tuple[float, float, float]) -> Fabric:

@@ -20,7 +20,7 @@ from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
 from pipeline.models.method import Method
 from pipeline.per_fabric import PerFabric
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import TruthOptions, Walls
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -50,8 +50,8 @@ class PointSampledOptions(AnalyticOptions):
     """A march through the cloth in double precision, or a look-up of tabulated horizons in single precision, as steps
     or as ramps."""
 
-    parallax: bool = False
-    """True if points are view rays, which end where they first meet the cloth; must be that of the truth."""
+    walls: Walls = "left_out"
+    """Meaning of a view ray that meets a wall; must be that of the truth."""
 
     horizon_nodes: ClassVar[int] = 32
     """Nodes of the horizon map on each piece of yarn in a cell, across and along; the nearest is taken."""
@@ -101,7 +101,7 @@ class ExactPoints(Analytic["ClothSide"]):
         from pipeline.analytic.exact_points import sample_points
         from pipeline.truth.cloth import cloth_side
 
-        truth = TruthOptions(footprint=options.footprint, parallax=options.parallax)
+        truth = TruthOptions(footprint=options.footprint, parallax=options.parallax, walls=options.walls)
         self._count, self._r2 = count, options.sequence == "r2"
         super().__init__(
             options,

@@ -34,13 +34,13 @@ class PrefilteredOptions(AnalyticOptions):
         from pipeline.analytic.prefiltered import WIDENINGS, answer, tabulate
 
         widening = WIDENINGS[self.widening]
-        tables = PerFabric(lambda fabric: tabulate(fabric, self.texels_per_yarn))
+        tables = PerFabric(lambda fabric: tabulate(fabric, self.texels_per_yarn, self.parallax))
         return [
             Analytic(
                 self,
                 None,
                 tables,
                 lambda tables, queries, _: answer(tables, queries, widening),
-                lambda tables: tables.maps.texels.nbytes,
+                lambda tables: tables.maps.texels.nbytes + self.parallax * tables.heights.maps.texels.nbytes,
             )
         ]

@@ -18,6 +18,7 @@ from pipeline.compiled.arrays import Float32
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
 from pipeline.models.method import in_chunks, row_by_row
 from pipeline.per_fabric import PerFabric
+from pipeline.truth.options import Walls
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -27,17 +28,17 @@ if TYPE_CHECKING:
 Level = Literal[1, 2, 4, 8]
 """A level of detail."""
 
-_SHARED: Final[WeakValueDictionary[tuple[int, bool, bool, bool], PerFabric[SoftNodeTable]]] = WeakValueDictionary()
+_SHARED: Final[WeakValueDictionary[tuple[object, ...], PerFabric[SoftNodeTable]]] = WeakValueDictionary()
 
 
 def soft_tables(
-    level: int, behind: bool = False, curved: bool = False, parallax: bool = False
+    level: int, behind: bool = False, curved: bool = False, parallax: bool = False, rims: bool = False
 ) -> PerFabric[SoftNodeTable]:
     """Return the tables of fabrics at a level of detail, which all methods at hand share."""
     from pipeline.analytic.soft_nodes.nodes import tabulate
 
-    tables = PerFabric(lambda fabric: tabulate(fabric, behind=behind, level=level, curved=curved, parallax=parallax))
-    return _SHARED.setdefault((level, behind, curved, parallax), tables)
+    tables = PerFabric(lambda fabric: tabulate(fabric, False, behind, level, curved, parallax, rims))
+    return _SHARED.setdefault((level, behind, curved, parallax, rims), tables)
 
 
 class SoftNodesOptions(AnalyticOptions):
@@ -51,8 +52,8 @@ class SoftNodesOptions(AnalyticOptions):
     model: Literal["soft_nodes"] = "soft_nodes"
     levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
     """Levels of detail k, from few nodes to many; each is a row of the tables."""
-    parallax: bool = False
-    """True if footprints are patches of view rays; must be that of the truth."""
+    walls: Walls = "left_out"
+    """Meaning of a view ray that meets a wall; must be that of the truth."""
 
     @property
     def kinds(self) -> frozenset[str]:
@@ -61,7 +62,7 @@ class SoftNodesOptions(AnalyticOptions):
 
     def methods(self) -> list[SoftNodes]:
         """Return one method for each level."""
-        return [SoftNodes(level, self.name, self.parallax) for level in self.levels]
+        return [SoftNodes(level, self.name, self.parallax, self.walls) for level in self.levels]
 
 
 class SoftNodes(Analytic["SoftNodeTable"]):
@@ -75,19 +76,24 @@ class SoftNodes(Analytic["SoftNodeTable"]):
         Name of the method.
     parallax : bool
         Whether footprints are patches of view rays.
+    walls : {"left_out", "rim"}
+        What view rays see that meet a wall.
     """
 
     turns: ClassVar[bool] = SoftNodesOptions.turns
 
-    def __init__(self, level: int = 2, name: str = "soft_nodes", parallax: bool = False) -> None:
+    def __init__(
+        self, level: int = 2, name: str = "soft_nodes", parallax: bool = False, walls: Walls = "left_out"
+    ) -> None:
         from pipeline.analytic.soft_nodes.features import read_queries
 
         def read(table: SoftNodeTable, queries: Queries, seed: int) -> Float32:
             return in_chunks(queries, lambda part: read_queries(table, part).components)
 
-        super().__init__(SoftNodesOptions(name=name), level, soft_tables(level, parallax=parallax), read)
-        self._both_sides = soft_tables(level, behind=True, parallax=parallax)
-        self._curved = soft_tables(level, behind=True, curved=True, parallax=parallax)
+        rays = parallax, walls == "rim"
+        super().__init__(SoftNodesOptions(name=name), level, soft_tables(level, False, False, *rays), read)
+        self._both_sides = soft_tables(level, True, False, *rays)
+        self._curved = soft_tables(level, True, True, *rays)
 
     def behind(self, fabric: Fabric, queries: Queries) -> Float32:
         """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""

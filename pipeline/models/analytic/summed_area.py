@@ -47,9 +47,5 @@ class SummedAreaOptions(AnalyticOptions):
         from pipeline.analytic.summed_area.answer import answer
         from pipeline.analytic.summed_area.tables import tabulate
 
-        return [
-            Analytic(
-                self, k, PerFabric(partial(tabulate, clusters=k)), lambda tables, queries, _: answer(tables, queries)
-            )
-            for k in self.clusters
-        ]
+        tables = {k: PerFabric(partial(tabulate, clusters=k, parallax=self.parallax)) for k in self.clusters}
+        return [Analytic(self, k, tables[k], lambda table, queries, _: answer(table, queries)) for k in self.clusters]

@@ -15,6 +15,7 @@ class CurvedOptions(TextureOptions):
     """Opacity, offset and reflectance of one fabric on curved surfaces [Kuznetsov2022Curved]."""
 
     fixed: ClassVar[tuple[str, ...]] = (*TextureOptions.fixed, "silhouette_anywhere", "silhouette_weight")
+    any_physics: ClassVar[bool] = True
     seconds: ClassVar[tuple[float, float]] = (2.5e-5, 2e-6)
 
     model: Literal["curved"] = "curved"

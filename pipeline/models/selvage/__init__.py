@@ -8,6 +8,7 @@ from pydantic import Field
 
 from pipeline.models.analytic.soft_nodes import Level
 from pipeline.models.options import Gaussian, Options
+from pipeline.truth.options import Walls
 
 
 class SelvageOptions(Options):
@@ -22,6 +23,7 @@ class SelvageOptions(Options):
         "diffuse_colour",
         "colour_weight",
     )
+    newer: ClassVar[tuple[str, ...]] = ("parallax", "walls")
     seconds: ClassVar[tuple[float, float]] = (2e-5, 2.5e-6)
     prepare_seconds: ClassVar[float] = 1.2
     without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
@@ -43,6 +45,10 @@ class SelvageOptions(Options):
     bound: bool = True
     """Bound each component by the answer of the soft nodes without shadows: no diffuse light is then gained."""
     footprint: Gaussian = "gaussian"
+    parallax: bool = False
+    """True if the footprints of its soft nodes are patches of view rays; must be that of the truth."""
+    walls: Walls = "left_out"
+    """Meaning of a view ray that meets a wall; must be that of the truth."""
 
     layers: ClassVar[int] = 2
     """Hidden layers."""
@@ -58,6 +64,11 @@ class SelvageOptions(Options):
     """Colour of the diffuse components in the loss."""
     colour_weight: ClassVar[float] = 1.0
     """Weight of the squared error of the whole colour beside those of the components."""
+
+    @property
+    def rays(self) -> tuple[bool, bool]:
+        """Two truths: footprints are patches of view rays, and those that meet a wall see a rim."""
+        return self.parallax, self.walls == "rim"
 
     @property
     def kinds(self) -> frozenset[str]:

@@ -11,7 +11,7 @@ Within a wished error (`Adaptive`) each query gets the cheapest of three answers
 
     1  soft nodes corrected by the network        estimated by the network
     2  the finest soft nodes                      estimated by the network
-    3  the fallback, sums over a node table       not estimated: the answer of what is left
+    3  the fallback, sums over a node table       not estimated: the answer of what is left, without parallax
 
 Errors are root mean squares over many queries, relative to a grey cloth's colour: single errors may be larger. Light
 from behind has no estimate; the finest soft nodes answer it, and all that the network is not trained for.
@@ -108,8 +108,10 @@ class SelvageNetwork(Trainable):
         self.register_buffer("mean", torch.zeros(FEATURES))
         self.register_buffer("scale", torch.ones(FEATURES))
         self.errors = ErrorNetwork(options, FEATURES)
-        self._tables = [tabulate(fabric, level=options.level) for fabric in fabrics]
-        self._finest = [tabulate(fabric, level=options.finest) for fabric in fabrics]
+        levels = (options.level, options.finest)
+        self._tables, self._finest = (
+            [tabulate(fabric, False, False, level, False, *options.rays) for fabric in fabrics] for level in levels
+        )
         if fabrics:
             self._measure(fabrics)
 
@@ -247,8 +249,8 @@ class Selvage(_OverNodes):
         self.bound = network.options.bound
         self._network = network.eval()
         self._cloths = PerFabric(self._tabulate)
-        self.nodes = SoftNodes(network.options.level, self.name)
-        self._tables = soft_tables(network.options.level)
+        self.nodes = SoftNodes(network.options.level, self.name, network.options.parallax, network.options.walls)
+        self._tables = soft_tables(network.options.level, False, False, *network.options.rays)
         self._correction = _Folded([*network.hidden, network.last], network)
         self._estimate = _Folded([network.errors.hidden, network.errors.last], network)
         self._answering = Answering(self._network, self._components)
@@ -373,7 +375,8 @@ class Adaptive(_OverNodes, Around):
             raise BadInput(selvage.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
         super().__init__(selvage, f"error {100 * error:g} %")
         self.domain, self.error = selvage.domain, error
-        self._selvage, self.nodes = selvage, SoftNodes(selvage.options.finest, selvage.name)
+        self._selvage = selvage
+        self.nodes = SoftNodes(selvage.options.finest, selvage.name, selvage.options.parallax, selvage.options.walls)
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric for both levels of soft nodes and for the fallback, once."""
@@ -398,7 +401,8 @@ class Adaptive(_OverNodes, Around):
         """Answer queries with the light in front."""
         result, errors = self._selvage.with_errors(fabric, queries)
         too_far = errors[:, OWN] > self.error
-        finer = too_far & (errors[:, FINEST] <= self.error)
+        # The fallback knows no view rays: what is left to it stays with the finest nodes.
+        finer = too_far & ((errors[:, FINEST] <= self.error) | self._selvage.options.parallax)
         left = too_far & ~finer
         if finer.any():
             result[finer] = self.nodes.predict(fabric, queries.take(finer))

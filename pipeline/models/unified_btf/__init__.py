@@ -16,6 +16,7 @@ class BtfOptions(ComponentLossOptions):
     """Options of both encodings of bidirectional textures."""
 
     fixed: ClassVar[tuple[str, ...]] = ("directions", "log_samples")
+    any_physics: ClassVar[bool] = True
 
     texels_per_yarn: int = Field(default=8, ge=1, le=64)
     """Texels along one yarn spacing."""

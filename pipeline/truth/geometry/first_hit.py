@@ -37,6 +37,7 @@ _HALVINGS = 48
 _CLOSE = 1e-13  # in yarn spacings: a step that ends the search
 _LEVEL = 1e-9  # height above the ray that counts as on it: neighbouring cells round their common border differently
 _INSIDE = 1e-12  # distance of a point from the border of its cell
+_BEHIND = 1e-9  # distance of a point of a wall from the border that the ray crosses
 
 
 class Hit(NamedTuple):
@@ -210,6 +211,8 @@ def _end_of(field: HeightField, x: float, y: float, z: float, side: int, towards
                 what, s = _ends_in(field, UNDER, x, y, z, towards, exit_, leave, cell)
             if what != MISSED:
                 column, row = float(cell.column - cell.end), float(cell.row - cell.pick)
+                # A wall belongs to the piece behind the border, whose rim is above.
+                s += _BEHIND if what == ON_WALL else 0.0
                 hit_x = min(max(x + s * towards.dx - column, cell.end + _INSIDE), cell.end + 1.0 - _INSIDE)
                 hit_y = min(max(y + s * towards.dy - row, cell.pick + _INSIDE), cell.pick + 1.0 - _INSIDE)
                 return Hit(what, hit_x, hit_y, cell.end, cell.pick, s)

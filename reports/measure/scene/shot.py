@@ -3,7 +3,8 @@
 The file, NumPy's npz, holds every query of all frames with the truth's answer, and the pictures without the light
 that the cloth scatters: the backdrop, and what of it comes straight through the cloth. A method's picture is that plus
 the sum over queries of irradiance times coverage and f_P. So methods differ in the patch BSDF alone; what passes
-straight through cloth is the truth's for all of them, and so is the coverage at silhouettes.
+straight through cloth is the truth's for all of them, and so is the coverage at silhouettes. Light between yarns is
+that of the cloth's one table.
 """
 
 from __future__ import annotations
@@ -22,11 +23,12 @@ from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.fingerprint import fingerprint
 from pipeline.models.fallback import Fallback, fallback_answers
 from pipeline.models.method import Method
+from pipeline.scenes.bounces import light_between, seen_light
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.loading import load
-from pipeline.scenes.shade import coloured, colours_of, compose, shade
+from pipeline.scenes.shade import coloured, colours_of, compose
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.opacity import coverage
 from pipeline.truth.query import Queries
@@ -60,6 +62,8 @@ class ClothQueries:
         elsewhere.
     colours : float32 (M, 4, 3)
         The truth's colours of the components. Methods have those of the footprint's threads (pipeline.scenes.shade).
+    between : float32 (M, 4, 3) or (1, 4, 1)
+        Light of all bounces after the first (`pipeline.scenes.bounces.light_between`); 0 if there is one bounce.
     rims : Queries
         Places at silhouettes, in all frames, of which some view rays leave the cloth again.
     coverage : float32 (R,)
@@ -75,14 +79,17 @@ class ClothQueries:
     standard_error: Float32
     fallback_values: Float32
     colours: npt.NDArray[np.floating]
+    between: Float32
     rims: Queries
     coverage: Float32
 
     def light(self, components: npt.ArrayLike | None = None) -> Float64:
         """Return the light of each query, (M, 3), from a method's components (M, 4); the truth's if left out."""
-        if components is None:
-            return np.asarray(self.weight * coloured(self.mean, self.colours))
-        return np.asarray(self.weight * shade(self.fabric, components, self.queries))
+        values: npt.ArrayLike = self.mean
+        colours = self.colours
+        if components is not None:
+            values, colours = components, colours_of(self.fabric, self.queries)
+        return np.asarray(self.weight * (coloured(values, colours) + seen_light(self.between, colours).sum(axis=1)))
 
     def noise(self) -> Float64:
         """Return the standard error of the truth's light, (M, 3), components taken to be uncorrelated."""
@@ -183,6 +190,8 @@ def shoot(name: str, options: ShotOptions, path: Path) -> None:
             columns |= {"weight": (gbuffer.irradiance * covered[gbuffer.place, None]).astype(np.float32)}
             columns |= {"mean": answers.mean, "standard_error": answers.standard_error}
             columns |= {"fallback_values": fallback_values(fabric, queries, seed)}
+            if loaded.options.bounces == "all":
+                columns |= {"between": light_between(fabric, queries).astype(np.float32)}
             if fabric.colours is not None:
                 columns |= {"colours": component_colours(fabric, queries, truth, seed).mean.astype(np.float32)}
             sampled = (doubt > 0.0) & (of_rims < 1.0)  # the rest is certain, or covered
@@ -215,7 +224,10 @@ def read_shot(path: Path) -> Shot:
             colours = colours_of(cloth, queries) if cloth.colours is None else file[f"{key}.colours"]
             rims = Queries(*(file[f"{key}.{_RIM}{column}"] for column in Queries._fields))
             covered = file[f"{key}.{_RIM}coverage"]
-            cloths.append(ClothQueries(cloth, queries, **columns, colours=colours, rims=rims, coverage=covered))
+            between = file[f"{key}.between"] if f"{key}.between" in file else np.zeros((1, 4, 1), np.float32)
+            cloths.append(
+                ClothQueries(cloth, queries, **columns, colours=colours, between=between, rims=rims, coverage=covered)
+            )
         return Shot(about["name"], file["base"], cloths)
 
 

@@ -1,5 +1,3 @@
-"""Measurements: every kind is planned, read back from its own dump, and says what it depends on."""
-
 from dataclasses import replace
 from importlib import import_module
 from typing import Annotated, Union, get_args

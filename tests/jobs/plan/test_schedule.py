@@ -1,5 +1,3 @@
-"""Schedules against closed forms; the time left, learnt by kind and counted along the schedule."""
-
 import time
 from typing import ClassVar
 
@@ -32,15 +30,11 @@ def shards_and_net(count, length):
     return tasks, of(tasks, [1.0] * count + [length])
 
 
-def test_a_long_task_at_the_end_is_the_tail():
+def test_a_long_task_at_the_end_is_the_tail_and_tasks_that_measure_time_run_one_by_one():
     tasks, seconds = shards_and_net(8, 10.0)
     found = Schedule.of(tasks, seconds, 4)
-    assert (found.makespan, found.tail) == (12.0, 10.0)
-    assert max(chains(tasks, seconds).values()) == 11.0
+    assert (found.makespan, found.tail) == (12.0, 10.0) and max(chains(tasks, seconds).values()) == 11.0
     assert Schedule.of(tasks[-1:], seconds, 4).makespan == 10.0  # what it needs is done
-
-
-def test_tasks_that_measure_time_run_one_by_one():
     tasks = [Step(name=0), Step(name=1), Alone(name=2), Alone(name=3)]
     assert Schedule.of(tasks, of(tasks, [1.0, 1.0, 5.0, 5.0]), 8).makespan == 11.0
 

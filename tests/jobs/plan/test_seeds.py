@@ -1,5 +1,3 @@
-"""Several trainings of a model: seeds, tasks, and which measurements are made of each."""
-
 import pytest
 
 from jobs.plan.measurements.fabrics import ErrorsBySize, OnFabric
@@ -39,8 +37,7 @@ def of(tasks, kind, name="woven"):
 
 def test_more_seeds_add_trainings_and_change_none(one, three, files):
     before, after = of(one, Training), of(three, Training)
-    assert list(before) == [0] and list(after) == [0, 1, 2]
-    assert len({task.id for (task,) in after.values()}) == 3
+    assert list(before) == [0] and list(after) == [0, 1, 2] and len({task.id for (task,) in after.values()}) == 3
     assert {task.training.model_copy(update={"seed": 0}) for (task,) in after.values()} == {before[0][0].training}
     assert after[2][0].title == "woven on 5 fabrics, seed 2"
     assert_changed(one, three, "^report")
@@ -50,9 +47,8 @@ def test_more_seeds_add_trainings_and_change_none(one, three, files):
 def test_each_training_of_one_material_has_every_seed(one, files):
     tasks = files.exchange('model = "neumip"', 'model = "neumip"\nseeds = 2').plan()
     found = of(tasks, Training, "neumip")
-    assert {seed: [task.fabrics for task in same] for seed, same in found.items()} == {
-        seed: [("denim",), ("own",), ("twill_4_4",)] for seed in (0, 1)
-    }
+    groups = [("denim",), ("own",), ("twill_4_4",)]
+    assert {seed: [task.fabrics for task in same] for seed, same in found.items()} == {0: groups, 1: groups}
     (by_size,) = of(tasks, ErrorsBySize, "neumip")[1]
     assert [made.task for made in by_size.model.networks] == [task.id for task in found[1]]
 
@@ -81,16 +77,14 @@ def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, thre
 
 def test_the_bound_is_measured_of_every_training(three, files):
     tasks = files.exchange("frames = 4", "frames = 4\nbounds = true").plan()
-    assert {seed: {task.ways.bounds for task in same} for seed, same in of(tasks, OnFabric).items()} == {
-        seed: {True} for seed in (0, 1, 2)
-    }
+    bounds = {seed: {task.ways.bounds for task in same} for seed, same in of(tasks, OnFabric).items()}
+    assert bounds == {0: {True}, 1: {True}, 2: {True}}
 
 
 def test_the_note_on_a_model_and_its_records_name_the_seeds(one, three):
     (note,) = [note for note in three[-1].models if note.name == "woven"]
     assert "3 trainings with the seeds 0 to 2" in note.about
     trained = {seed: task.id for seed, (task,) in of(three, Training).items()}
-    assert note.fingerprint == trained[0]
-    assert not any("trainings with" in note.about for note in one[-1].models)
+    assert note.fingerprint == trained[0] and not any("trainings with" in note.about for note in one[-1].models)
     for seed, same in of(three, OnFabric).items():
         assert (same[0].provenance.seed, same[0].provenance.model) == (seed, trained[seed])

@@ -1,5 +1,3 @@
-"""What is made anew when a version is raised."""
-
 import pytest
 
 from jobs.plan.plan import plan

@@ -1,5 +1,3 @@
-"""What a model will leave to quadrature is known from its recipe: as a benchmark of the trained one would find it."""
-
 import numpy as np
 import pytest
 

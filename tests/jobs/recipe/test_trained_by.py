@@ -1,5 +1,3 @@
-"""Models that another recipe trains: whose rows, whose trainings, what is refused."""
-
 import dataclasses
 
 import pytest
@@ -11,6 +9,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from pipeline.shards.manifest import Manifest
 from tests.jobs.identities import assert_changed, ids
+from tests.refusals import refusal
 from weaves.errors import BadInput
 
 TRAINER = """
@@ -106,13 +105,8 @@ def test_it_is_measured_where_it_was_taught_and_the_page_says_where_not(asks, fi
     files.recipe += '\n[bench.scenes]\nnames = ["curtain", "dinner_table"]\n'
     tasks = plan(asks())
     titles = {task.title: task for task in tasks if task.stage == "bench"}
-    about = {
-        "errors of curved, denim",
-        "errors of curved, own",
-        "scene errors of curved, curtain",
-        "extremes of curved",
-    }
-    assert {title for title in titles if "curved" in title} == about
+    about = {"errors of curved, denim", "errors of curved, own", "scene errors of curved, curtain"}
+    assert {title for title in titles if "curved" in title} == about | {"extremes of curved"}
     trained = {title.rpartition(" ")[2]: id for title, id in ids(tasks, "^train curved").items()}
     assert titles["errors of curved, denim"].model.needs == (trained["denim"],)
     assert [fabric.name for fabric, _ in titles["extremes of curved"].fabrics] == ["denim"]
@@ -196,9 +190,8 @@ def test_ways_to_run_are_this_recipes_to_say(asks, files):
     ],
 )
 def test_bad_input_is_one_sentence(asks, entry, words):
-    with pytest.raises(BadInput) as caught:
-        asks(entry=f"\n[[models]]\n{entry}\n")
-    assert "\n" not in str(caught.value) and all(word in str(caught.value) for word in words)
+    sentence = refusal(asks, entry=f"\n[[models]]\n{entry}\n")
+    assert all(word in sentence for word in words)
 
 
 SHADOWLESS = "shadows = false }\n[bench]\ntruth = { shadows = false }\nframe_truth = { shadows = false }\n"
@@ -209,23 +202,17 @@ SHADOWLESS = "shadows = false }\n[bench]\ntruth = { shadows = false }\nframe_tru
     [
         (TRAINER + '\n[[models]]\nmodel = "woven"\nrecipe = "tiny.toml"\n', "for one another: tiny → bent → tiny"),
         (TRAINER.replace('"own.toml"', '"other/own.toml"'), "another cloth is called own there"),
-        (
-            GENERAL.replace("relative_error = 0.1 }\n", SHADOWLESS),
-            "shadows = True: must be that of the recipe sheer, False",
-        ),
+        (GENERAL.replace("relative_error = 0.1 }\n", SHADOWLESS),
+         "shadows = True: must be that of the recipe sheer, False"),
         (GENERAL.replace('"own.toml", ', ""), "trained there on own, which is seen here"),
-        (
-            GENERAL.replace('"organza"]', '"twill_4_4"]'),
-            "trained there on twill_4_4, of the draft of twill_4_4, unseen here",
-        ),
+        (GENERAL.replace('"organza"]', '"twill_4_4"]'), "on twill_4_4, of the draft of twill_4_4, unseen here"),
     ],
-)
+)  # fmt: skip
 def test_a_recipe_that_does_not_fit_is_refused(asks, files, trainer, words):
     """A circle, another cloth of the same name, other physics, and for a general model other fabrics."""
     (files.folder / "other").mkdir()
     (files.folder / "other" / "own.toml").write_text(files.fabric.replace("roughness = 0.3", "roughness = 0.31"))
-    with pytest.raises(BadInput, match=words):
-        asks(trainer, *(() if trainer.startswith(TRAINER[:15]) else (SHEER, "sheer")))
+    assert words in refusal(asks, trainer, *(() if trainer.startswith(TRAINER[:15]) else (SHEER, "sheer")))
 
 
 def test_a_general_model_from_elsewhere_is_measured_on_every_fabric(asks):

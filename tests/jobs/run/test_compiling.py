@@ -21,13 +21,10 @@ def test_a_task_asks_for_what_it_uses_alone(tasks):
     assert names(t for t in tasks if t.title == "extremes of prefiltered") == {"quadrature", "prefiltered"}
 
 
-def test_each_group_is_compiled_once_whatever_the_value_of_a_knob(tasks):
+def test_each_group_is_compiled_once_whatever_the_options_and_not_again_in_its_process(tasks):
     groups = kernel_groups(tasks)
     assert len(groups) == len({group.name for group in groups})
-
-
-def test_what_a_process_has_is_not_compiled_again(tasks):
-    group = next(group for group in kernel_groups(tasks) if group.name == "prefiltered")
+    group = next(group for group in groups if group.name == "prefiltered")
     group.compile(lambda kernel: None)
     heard = []
     group.compile(heard.append)

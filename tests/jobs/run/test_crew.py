@@ -22,12 +22,8 @@ def test_a_worker_of_equal_software_is_accepted():
 
 
 def test_each_difference_is_named_with_both_versions():
-    missing = rf"(missing.*){{{len(software())}}}"
-    words = {
-        name: rf"tcp://a gets no task: it has {name} 0\.1 \(here {version}\); install"
-        for name, version in software().items()
-    }
-    different = [(software() | {name: "0.1"}, sentence) for name, sentence in words.items()]
+    missing, words = rf"(missing.*){{{len(software())}}}", r"tcp://a gets no task: it has {} 0\.1 \(here {}\); install"
+    different = [(software() | {name: "0.1"}, words.format(name, version)) for name, version in software().items()]
     gone = (ModuleNotFoundError("jobs"), r"it has no twillight of this version \(ModuleNotFoundError\)")
     for there, sentence in (*different, ({}, missing), gone):
         with pytest.raises(WorkFailed, match=sentence):

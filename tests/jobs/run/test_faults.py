@@ -11,29 +11,14 @@ from pipeline.training.checkpoint import CHECKPOINT
 from pipeline.training.loop import ROWS
 from tests.jobs import made_up
 
-RECIPE = """
-name = "{name}"
-[dataset]
-seen = ["denim"]
-shard_rows = 64
-[dataset.rows]
-train = {train}
-validation = 32
-test = 64
-[[models]]
-model = "neumip"
-{more}
-"""
-
 
 @pytest.fixture
 def trade(tmp_path):
     """Return a finished recipe one of whose models another recipe trains, on a data set that shares shards."""
-    (tmp_path / "other.toml").write_text(RECIPE.format(name="other", train=128, more=""))
-    more = 'recipe = "other.toml"\n[[models]]\nmodel = "woven"'
-    (tmp_path / "trade.toml").write_text(RECIPE.format(name="trade", train=256, more=more))
-    tasks = made_up.finished(tmp_path / "trade.toml", tmp_path / "out")
-    return load_recipe(tmp_path / "trade.toml"), tasks, Ledger(tmp_path / "out")
+    made_up.write_recipe(tmp_path, "other", "neumip")
+    models, rows = [{"model": "neumip", "recipe": "other.toml"}, "woven"], {"train": 256, "validation": 32, "test": 64}
+    trade = made_up.write_recipe(tmp_path, "trade", *models, rows=rows)
+    return load_recipe(trade), made_up.finished(trade, tmp_path / "out"), Ledger(tmp_path / "out")
 
 
 def kinds(found):
@@ -43,8 +28,7 @@ def kinds(found):
 def test_two_data_sets_of_one_recipe_are_sound(trade):
     recipe, tasks, ledger = trade
     shares = []
-    assert faults(*trade, shares.append) == []
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert faults(*trade, shares.append) == [] and shares == sorted(shares) and shares[-1] == 1.0
     left = {path for path in made_up.contents(ledger.out) if not path.startswith("ledger/")}
     assert left <= set(own_files(recipe, tasks, ledger.out))
 
@@ -59,8 +43,7 @@ def test_each_copy_of_a_shared_shard_is_read(trade):
     assert kinds(faults(recipe, tasks, ledger)) == [("damaged", shared.products[1])]
     assert ledger.discard(shared) == [shared.products[1]]
     # The sound copy gives the bytes again.
-    assert ledger.adopt(shared) and second.read_bytes() == content
-    assert faults(recipe, tasks, ledger) == []
+    assert ledger.adopt(shared) and second.read_bytes() == content and faults(recipe, tasks, ledger) == []
 
 
 def test_a_manifest_of_either_data_set_is_compared(trade):
@@ -96,11 +79,11 @@ def test_a_folder_or_a_larger_file_in_a_products_place_is_damaged(trade):
 
 
 def test_products_of_an_earlier_version_are_outdated(tmp_path, monkeypatch):
-    (tmp_path / "other.toml").write_text(RECIPE.format(name="other", train=128, more=""))
-    recipe = load_recipe(tmp_path / "other.toml")
+    path = made_up.write_recipe(tmp_path, "other", "neumip")
     with monkeypatch.context() as patch:
         patch.setattr(versions, "TRAINING", versions.TRAINING - 1)
-        made_up.finished(tmp_path / "other.toml", tmp_path / "out")
+        made_up.finished(path, tmp_path / "out")
+    recipe = load_recipe(path)
     tasks, ledger = plan(recipe), Ledger(tmp_path / "out")
     found = {(fault.task.stage, fault.task.title): fault for fault in faults(recipe, tasks, ledger) if fault.task}
     training = found["train", "neumip on denim"]

@@ -65,8 +65,7 @@ def test_an_odd_receipt_counts_as_missing(done, change):
 
 def test_a_receipt_of_before_checksums_is_read(done):
     rewrite(done, {"title": "rows 0–9", "identity": {"error": 1e-05}})
-    assert b"\\u2013" in (done.out / NOTE).read_bytes()
-    assert done.state(TASK) == "done"
+    assert b"\\u2013" in (done.out / NOTE).read_bytes() and done.state(TASK) == "done"
 
 
 @pytest.mark.parametrize("content", [b"[" * 100_000, b"{" * 5, b"\xff\xfe", b"null", b"7", b" " * (2 << 20)])

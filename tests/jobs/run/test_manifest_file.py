@@ -1,5 +1,3 @@
-"""The manifest is written now and then while shards are made, and is whole when it is read."""
-
 from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.run import manifest_file

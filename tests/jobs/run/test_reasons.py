@@ -16,11 +16,7 @@ def ledger(tmp_path):
     [
         ([], {}, NEVER),
         ([{}], {}, None),
-        (
-            [{"seconds": 0.01}],
-            {"seconds": 0.02, "forgets": True},
-            "changed: forgets False → True, seconds 0.01 → 0.02",
-        ),
+        ([{"seconds": 0.01}], {"seconds": 0.02, "breaks": True}, "changed: breaks False → True, seconds 0.01 → 0.02"),
         # The most similar one counts.
         ([{"seconds": 0.01}, {"seconds": 0.02, "breaks": True}], {"breaks": True}, "changed: seconds 0.02 → 0.0"),
         # A version comes first; long values and ids are not shown.
@@ -41,7 +37,5 @@ def test_failures_and_damage_are_told_apart(ledger):
     ledger.fail(failed, "the disk was full")
     fake.done(ledger.out, damaged)
     (ledger.out / damaged.products[0]).unlink()
-    assert reasons([failed, damaged], ledger) == {
-        failed.id: "failed: the disk was full",
-        damaged.id: "a product is missing or damaged",
-    }
+    why = {failed.id: "failed: the disk was full", damaged.id: "a product is missing or damaged"}
+    assert reasons([failed, damaged], ledger) == why

@@ -1,5 +1,3 @@
-"""Check and repair of a recipe, on made-up products: what is not as it was is found, named and made again."""
-
 import random
 import shutil
 from functools import partial
@@ -12,28 +10,14 @@ from jobs.plan.training import Training
 from jobs.run.ledger import Ledger
 from pipeline.shards.store import read_table, write_columns
 from tests.jobs import made_up
-
-RECIPE = """
-name = "tiny"
-[dataset]
-seen = ["denim"]
-shard_rows = 64
-rows = { train = 128, validation = 32, test = 64 }
-[[models]]
-model = "woven"
-[[models]]
-model = "neumip"
-[bench]
-views = ["plane"]
-"""
+from tests.jobs.made_up import flip
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """Return a folder in which a recipe is finished, the recipe beside it."""
     folder = tmp_path_factory.mktemp("whole")
-    (folder / "tiny.toml").write_text(RECIPE)
-    made_up.finished(folder / "tiny.toml", folder / "out")
+    made_up.finished(made_up.write_recipe(folder, "tiny", "woven", "neumip"), folder / "out")
     return folder
 
 
@@ -50,12 +34,6 @@ def run(whole, tmp_path, monkeypatch, call):
     return run
 
 
-def flip(path, chance=random.Random(0)):  # noqa: B008, any byte will do
-    content = bytearray(path.read_bytes())
-    content[chance.randrange(len(content))] ^= chance.randrange(1, 256)
-    path.write_bytes(content)
-
-
 def same(found, expected, but=()):
     """Assert that files are the same but for the dates beside Records, and for some others."""
     assert found.keys() == expected.keys()
@@ -65,8 +43,7 @@ def same(found, expected, but=()):
 
 def test_a_finished_recipe_is_sound_and_what_is_left_to_do_is_missing(run):
     code, said, told = run()
-    assert code == 0 and told == ""
-    assert "4 shards with 224 rows, 2 models" in said and "are sound" in said
+    assert code == 0 and told == "" and "4 shards with 224 rows, 2 models" in said and "are sound" in said
     shutil.rmtree(run.out)
     code, said, told = run()
     assert code == 1 and "sound" not in said
@@ -84,14 +61,12 @@ def test_a_shard_that_is_gone_and_files_cut_short_are_named_and_made_again(run):
     expected, shard, training = made_up.contents(run.out), run.of(Shard), run.of(Training)
     (run.out / shard.products[0]).unlink()
     code, _, told = run()
-    assert code == 1 and f"{run.out / shard.products[0]}: missing" in told
-    assert run("--repair")[0] == 0
+    assert code == 1 and f"{run.out / shard.products[0]}: missing" in told and run("--repair")[0] == 0
     same(made_up.contents(run.out), expected, but=[f"ledger/{shard.id}.json"])
     for path in (shard.products[0], training.products[0]):
         (run.out / path).write_bytes(expected[path][:-1])
     code, _, told = run()
-    assert code == 2 and told.count(": cut: it has") == 2
-    assert run("--repair")[0] == 0
+    assert code == 2 and told.count(": cut: it has") == 2 and run("--repair")[0] == 0
     same(made_up.contents(run.out), expected)
 
 
@@ -110,8 +85,7 @@ def test_a_page_of_other_measurements_is_outdated(run):
     page = run.of(Page)
     (run.out / "ledger" / f"{page.id}.json").unlink()
     code, _, told = run()
-    assert code == 1 and f"{run.out / page.products[0]}: outdated" in told
-    assert run("--repair")[0] == 0
+    assert code == 1 and f"{run.out / page.products[0]}: outdated" in told and run("--repair")[0] == 0
 
 
 def test_values_that_were_never_right_are_odd(run):

@@ -1,10 +1,9 @@
-"""`twillight evaluate` by the truth and by a trained model: answers, refusals, and what a kill leaves."""
-
 import json
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pyarrow as pa
@@ -75,10 +74,7 @@ def test_bad_rows_are_listed_when_skipped(evaluate, tmp_path):
 
 
 def test_ctrl_c_says_that_nothing_was_written(evaluate, tmp_path, monkeypatch):
-    def stop(*arguments, **options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(pipeline.shards.evaluate, "estimate", stop)
+    monkeypatch.setattr(pipeline.shards.evaluate, "estimate", Mock(side_effect=KeyboardInterrupt))
     assert evaluate() == (130, "", "stopped; result.parquet was not written", None)
     assert [path.name for path in tmp_path.iterdir()] == ["queries.parquet"]
 
@@ -147,8 +143,7 @@ def test_rows_it_was_not_taught_are_named_before_anything_is_computed_and_can_be
     assert code == 2 and "row 3000" in complaint and table is None
     assert "the model woven was trained for light from the viewer's side only" in complaint
     code, _, _, table = evaluate("--model", folder, "--skip-bad", queries=queries)
-    assert code == 0 and table["diffuse_warp"].null_count == 1
-    assert "3000" in (tmp_path / "result.bad.csv").read_text()
+    assert code == 0 and table["diffuse_warp"].null_count == 1 and "3000" in (tmp_path / "result.bad.csv").read_text()
 
 
 def test_a_model_of_another_version_with_other_weights_or_a_damaged_file_is_named(evaluate, folder):

@@ -1,23 +1,9 @@
-"""What no named recipe needs, and what is never removed."""
-
 from functools import partial
 
 import pytest
 
 from jobs.recipe.load import load_recipe
 from tests.jobs import made_up
-
-RECIPE = """
-name = "{name}"
-[dataset]
-seen = ["denim"]
-shard_rows = 64
-rows = {{ train = {train}, validation = 32, test = 64 }}
-[[models]]
-model = "{model}"
-[bench]
-views = ["plane"]
-"""
 
 FOREIGN = ("crash-0.txt", "recipes/require-x.toml", "records/by-hand.json", "datasets/wide/notes.txt", "models/a/x.bin")
 
@@ -26,8 +12,8 @@ FOREIGN = ("crash-0.txt", "recipes/require-x.toml", "records/by-hand.json", "dat
 def two(tmp_path, call):
     """Return the command line on a folder with two finished recipes that share shards, and with foreign files."""
     for name, train, model in (("narrow", 128, "woven"), ("wide", 256, "neumip")):
-        (tmp_path / f"{name}.toml").write_text(RECIPE.format(name=name, train=train, model=model))
-        made_up.finished(tmp_path / f"{name}.toml", tmp_path / "out")
+        rows = {"train": train, "validation": 32, "test": 64}
+        made_up.finished(made_up.write_recipe(tmp_path, name, model, rows=rows), tmp_path / "out")
     for path in FOREIGN:
         (tmp_path / "out" / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "out" / path).write_text("x")
@@ -60,8 +46,7 @@ def test_what_a_stopped_training_goes_on_from_is_kept(two, tmp_path):
         for name in ("checkpoint.safetensors", ".tmp-card.json"):
             (out / training.folder / name).write_text("x")
     two("narrow.toml", "--delete")
-    assert len(list(out.glob("models/*/checkpoint.safetensors"))) == 1
-    assert not list(out.glob("models/*/.tmp-*"))
+    assert len(list(out.glob("models/*/checkpoint.safetensors"))) == 1 and not list(out.glob("models/*/.tmp-*"))
 
 
 def test_bytes_of_shards_that_another_data_set_keeps_are_not_counted(two, tmp_path):

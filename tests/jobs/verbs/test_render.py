@@ -1,8 +1,7 @@
-"""Pictures from the command line: those of the benchmark, their layers, sizes, frames and fabrics, and bad input."""
-
 import re
 import sys
 from functools import partial
+from unittest.mock import Mock
 
 import matplotlib.image
 import numpy as np
@@ -11,7 +10,9 @@ import pytest
 import jobs.verbs.render
 import jobs.verbs.show
 from jobs.cli import main
+from pipeline.analytic.bounces.table import bounce_table
 from pipeline.models.named import named_method
+from pipeline.scenes import bounces
 from pipeline.scenes.options import SceneOptions
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.options import TruthOptions
@@ -19,6 +20,7 @@ from reports.images.exr import read_exr
 from reports.images.tiles import displayed
 from reports.measure.scene.shot import read_shot, shoot
 from reports.options import ShotOptions
+from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 from weaves.families import Satin
 
@@ -110,8 +112,22 @@ def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
     assert after.attributes["fabrics"] == "1 denim, 2 voile, 3 silk_charmeuse, 4 denim"
     changed = np.abs(after.stack(*"RGB") - before.stack(*"RGB")).max(axis=-1) > 0
     number = before.channels["fabric.id"]
-    assert changed[(number == 1) | (number == 2)].mean() > 0.9
-    assert not changed[(number == 0) | (number > 2)].any()
+    assert changed[(number == 1) | (number == 2)].mean() > 0.9 and not changed[(number == 0) | (number > 2)].any()
+
+
+def test_all_bounces_make_white_cloth_brighter(render, tmp_path, monkeypatch):
+    """Silk of albedo .85 lacks a sixth of its light with one bounce; the file says which it has."""
+    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
+    (tmp_path / "white.toml").write_text(woven("silk_charmeuse", specular=(0.0,) * 3, diffuse=(0.85,) * 3).to_toml())
+    light = {}
+    for number in ("1", "all"):
+        assert render("sphere", "--fabric", "white.toml", "--bounces", number, "--out", "a.exr", *FAST)[0] == 0
+        exr = read_exr(tmp_path / "a.exr")
+        light[number] = exr.stack(*"RGB")[exr.channels["A"] == 1].mean()
+        assert str(exr.attributes["bounces"]) == number
+    assert 1.1 < light["all"] / light["1"] < 1.5
+    code, _, complaint = render("sphere", "--bounces", "2", "--out", "a.exr", *FAST)
+    assert code == 2 and "--bounces" in complaint and '1, "all"' in complaint
 
 
 def test_a_folder_holds_the_frames_and_the_tone_changes_them(render, tmp_path):
@@ -124,29 +140,22 @@ def test_a_folder_holds_the_frames_and_the_tone_changes_them(render, tmp_path):
     assert codes_of(tmp_path / "dark.png").mean() < codes_of(tmp_path / "one.png").mean()
 
 
-def test_a_film_has_the_frames_that_are_asked_for_and_needs_its_library(render, tmp_path, monkeypatch):
+def test_a_film_has_the_frames_that_are_asked_for_and_needs_its_library(render, refused, tmp_path, monkeypatch):
     av = pytest.importorskip("av")
     assert render("plane", "--out", "a.mp4", "--frames", "3", *FAST)[0] == 0
     with av.open(str(tmp_path / "a.mp4")) as film:
         assert len(list(film.decode(video=0))) == 3
-    code, _, complaint = render("plane", "--out", "a.mp4", "--size", "15x12")
-    assert code == 2 and "even" in complaint
+    assert "even" in refused("render", "plane", "--out", "a.mp4", "--size", "15x12")
     monkeypatch.setitem(sys.modules, "av", None)
-    code, _, complaint = render("plane", "--out", "a.mp4", *FAST)
-    assert code == 2 and "pip install 'twillight[video]'" in complaint
+    assert "pip install 'twillight[video]'" in refused("render", "plane", "--out", "a.mp4", *FAST)
 
 
 def test_a_stopped_picture_leaves_what_was_there(render, tmp_path, monkeypatch):
     (tmp_path / "a.png").write_bytes(b"before")
-
-    def stopped(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(jobs.verbs.render, "displayed", stopped)
+    monkeypatch.setattr(jobs.verbs.render, "displayed", Mock(side_effect=KeyboardInterrupt))
     code, _, complaint = render("plane", "--out", "a.png", "--method", "soft_nodes", *SMALL)
     assert code == 130 and complaint == "stopped; a.png is as it was before\n"
-    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
-    assert (tmp_path / "a.png").read_bytes() == b"before"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"] and (tmp_path / "a.png").read_bytes() == b"before"
 
 
 OWN = """
@@ -159,10 +168,9 @@ OWN = """
 """
 
 
-def test_a_mitsuba_file_has_its_own_size_and_wears_the_fabric_that_is_named(render, tmp_path):
+def test_a_mitsuba_file_has_its_own_size_and_wears_the_fabric_that_is_named(render, refused, tmp_path):
     (tmp_path / "own.xml").write_text(OWN)
-    code, _, complaint = render("own.xml", "--out", "a.exr", "--method", "soft_nodes")
-    assert code == 2 and "fabric_mine" in complaint
+    assert "fabric_mine" in refused("render", "own.xml", "--out", "a.exr", "--method", "soft_nodes")
     fabric = load_fabric("denim").model_copy(update={"name": "mine"})
     (tmp_path / "mine.toml").write_text(fabric.to_toml())
     assert render("own.xml", "--out", "a.exr", "--method", "soft_nodes", "--fabric", "mine.toml")[0] == 0

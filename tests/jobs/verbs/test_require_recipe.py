@@ -1,5 +1,3 @@
-"""A scene's own recipe: what it keeps of the general one, what it leaves out, and that its paths hold anywhere."""
-
 import dataclasses
 import os
 
@@ -11,6 +9,8 @@ from pipeline.models.curved import CurvedOptions
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.options import TruthOptions
+from tests.jobs.recipe.test_added import METHOD
+from tests.refusals import refusal
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -37,8 +37,7 @@ def test_truth_and_measurements_are_those_of_the_general_recipe(tmp_path):
     assert own.bench.scenes.model_copy(update={"names": ()}) == QUICK.bench.scenes.model_copy(update={"names": ()})
     assert own.bench.scenes.names == ("sphere",) and not own.bench.bounds
     assert [model.options.name for model in own.models] == ["woven", "point_sampled"]
-    assert own.models[1].options.counts == [2]
-    assert [fabric.name for fabric in own.fabrics] == ["denim"]
+    assert own.models[1].options.counts == [2] and [fabric.name for fabric in own.fabrics] == ["denim"]
 
 
 def _with_macro(options, **more):
@@ -66,8 +65,7 @@ def test_a_table_that_cannot_answer_makes_way_for_sampling_at_a_stated_error(tmp
     general = dataclasses.replace(curved, dataset=curved.dataset.model_copy(update={"training_truth": table}))
     bent = require(QueryOptions(sigma=sigma, curvature=(0.01, 0.1)))
     own = narrowed(tmp_path / "r.toml", general, "curved", requirement=bent)
-    assert own.dataset.queries.curvature[1] > 0
-    assert own.dataset.training_truth == SAMPLED
+    assert own.dataset.queries.curvature[1] > 0 and own.dataset.training_truth == SAMPLED
 
 
 def test_the_training_is_cut_by_the_effort_and_its_average_with_it(tmp_path):
@@ -137,21 +135,12 @@ def test_scenes_and_fabrics_by_path_are_found_from_anywhere(tmp_path, monkeypatc
     assert str(tmp_path) not in path.read_text()
 
 
-THEIRS = """
-class Theirs:
-    name, setting, version = "theirs", "", 3
-    covers = prepare = predict = bytes_stored = lambda self, *rest: None
-    def __init__(self, rows=8): pass
-"""
-
-
 def test_a_method_from_outside_keeps_its_name_and_its_options(tmp_path):
     code = tmp_path / "theirs.py"
-    code.write_text(THEIRS, encoding="utf-8")
+    code.write_text(METHOD, encoding="utf-8")
     add = [f"{code}:Theirs"]
     general = load_recipe("quick", add)
     first = narrowed(tmp_path / "r.toml", general, "theirs", options={"rows": 5}, add=add).models[0].options
-    with pytest.raises(BadInput, match="code of your own is given with --add"):
-        load_recipe(tmp_path / "r.toml")
+    assert "code of your own is given with --add" in refusal(load_recipe, tmp_path / "r.toml")
     assert (first.model, first.name, first.own, first.source) == ("added", "theirs", {"rows": 5}, f"{code}:Theirs")
     assert code.name not in (tmp_path / "r.toml").read_text(encoding="utf-8")

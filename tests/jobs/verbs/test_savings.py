@@ -1,8 +1,7 @@
-"""What a scene's own recipe saved: sums over receipts, numbers of two pages, and what is missing in one sentence."""
-
 import csv
 import json
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,36 +20,31 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from reports.measure.pictures import write_picture
 from reports.page.files import write_files
 from reports.record import OF_A_PAGE, Provenance, Record, read_records, this_machine, write_records
-from weaves.errors import BadInput
+from tests.jobs import made_up
+from tests.refusals import refusal
 from weaves.fabric import load_fabric
 
-GENERAL = """
-name = "wide"
-[dataset]
-seen = ["silk_charmeuse", "denim", "basket"]
-shard_rows = 4096
-rows = { train = 8192, validation = 512, test = 1024 }
-[[models]]
-model = "neumip"
-training = { steps = 400, batch = 64 }
-[[models]]
-model = "woven"
-training = { steps = 100, batch = 32 }
-[[models]]
-model = "point_sampled"
-counts = [2, 4]
-[bench.scenes]
-names = ["sphere"]
-"""
+OPTIONS = {
+    "seen": ["silk_charmeuse", "denim", "basket"],
+    "shard_rows": 4096,
+    "rows": {"train": 8192, "validation": 512, "test": 1024},
+    "bench": {"scenes": {"names": ["sphere"]}},
+}
+
+
+def write_general(folder, **of_woven):
+    """Write the general recipe, with more options of `woven`."""
+    neumip = {"model": "neumip", "training": {"steps": 400, "batch": 64}}
+    woven = {"model": "woven", "training": {"steps": 100, "batch": 32}} | of_woven
+    return made_up.write_recipe(folder, "wide", neumip, woven, {"model": "point_sampled", "counts": [2, 4]}, **OPTIONS)
 
 
 class Runs:
     """A folder of products in which both recipes have run, or seem to have."""
 
     def __init__(self, folder):
-        self.out, self.general = folder / "out", folder / "wide.toml"
+        self.out, self.general = folder / "out", write_general(folder)
         self.own = self.out / "recipes" / "require-sphere.toml"
-        self.general.write_text(GENERAL)
 
     def require(self, method="neumip", setting="", effort=0.25):
         asked = {"silk_charmeuse": draw_queries(QueryOptions(sigma=(0.3, 3.0)), (5, 5), 1, 0, 500)}
@@ -126,7 +120,7 @@ def test_networks_of_one_fabric_each_are_charged_for_all_fabrics_and_weigh_what_
 
 def test_a_model_of_many_fabrics_is_charged_for_one_of_its_trainings(runs):
     """The errors are means over all of them."""
-    runs.general.write_text(GENERAL.replace('model = "woven"\n', 'model = "woven"\nseeds = 3\n'))
+    write_general(runs.general.parent, seeds=3)
     both(runs, "woven", effort=0.5)
     page = runs.out / "report" / "wide" / OF_A_PAGE
     trained = [
@@ -198,8 +192,7 @@ def write_frames(path, fabric):
 
 def test_the_command_prints_and_writes_all_of_it(runs, call):
     code, text, _ = call("savings", both(runs).general, "sphere", "--out", runs.out)
-    assert code == 0
-    assert "queries generated 29,184 3.58e+03 8.14" in text
+    assert code == 0 and "queries generated 29,184 3.58e+03 8.14" in text
     assert "sphere, neumip: 8.1 times fewer queries to generate, 12.0 times fewer to learn from" in text
     with (runs.out / "report" / "savings.csv").open(newline="") as file:
         rows = {row["quantity"]: row for row in csv.DictReader(file)}
@@ -208,12 +201,7 @@ def test_the_command_prints_and_writes_all_of_it(runs, call):
 
 
 def test_what_is_missing_is_one_sentence_that_says_what_to_run(runs):
-    def refused():
-        with pytest.raises(BadInput) as caught:
-            by_quantity(runs)
-        assert "\n" not in str(caught.value)
-        return str(caught.value)
-
+    refused = partial(refusal, by_quantity, runs)
     assert "twillight require sphere" in refused()
     runs.require()
     assert "15 of 15 tasks" in refused() and "twillight run wide" in refused()

@@ -1,5 +1,3 @@
-"""Cloths and lights of which the answer is known: every method against a formula, and its error against its size."""
-
 import itertools
 import math
 
@@ -13,25 +11,14 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.analytic.methods import (
-    ALL,
-    averaged_normals,
-    horizon_points,
-    points,
-    soft_nodes,
-    soft_nodes_behind,
-    soft_table,
-    summed_area,
-)
+from tests.pipeline.analytic import methods
 from tests.pipeline.truth.cloths import along_cylinders, cylinder_answers, cylinders, woven
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", methods.ALL)
 def test_a_lamp_at_the_eye_lights_all_that_is_seen(method):
-    """Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction.
-
-    Of a patch hidden almost wholly the soft methods answer less.
-    """
+    """Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction. Of
+    a patch hidden almost wholly the soft methods answer less."""
     fabric = woven("cotton_twill", blend=0.0)
     queries = draw_queries(
         QueryOptions(sigma=(0.3, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 60
@@ -54,7 +41,8 @@ def shadow_errors(method, blend, viewer=0.0, **options):
 
 
 @pytest.mark.parametrize(
-    ("method", "bound"), [(soft_nodes, 0.04), (summed_area, 0.04), (horizon_points, 0.02), (points, 0.006)]
+    ("method", "bound"),
+    [(methods.soft_nodes, 0.04), (methods.summed_area, 0.04), (methods.horizon_points, 0.02), (methods.points, 0.006)],
 )
 def test_shadows_of_cylinders_on_each_other(method, bound):
     """Without the neighbour's shadow diffuse light would be 17 % off, without shadow and terminator 37 %."""
@@ -63,7 +51,6 @@ def test_shadows_of_cylinders_on_each_other(method, bound):
 
 
 def slope(counts, errors):
-    """Return the order of convergence, fitted to logarithms."""
     return -np.polyfit(np.log(counts), np.log(errors), 1)[0]
 
 
@@ -71,8 +58,8 @@ def slope(counts, errors):
 def test_shadows_converge_with_points_and_with_the_grid_of_horizons(blend):
     """A line across the yarns is cut at a few places: R2 points err by 1 / n, a grid of horizons by half a node."""
     counts, grids = [64, 256, 1024, 4096], [8, 16, 32, 64]
-    by_points = np.array([shadow_errors(points, blend, count=n) for n in counts])
-    by_nodes = np.array([shadow_errors(horizon_points, blend, count=2048, grid=n) for n in grids])
+    by_points = np.array([shadow_errors(methods.points, blend, count=n) for n in counts])
+    by_nodes = np.array([shadow_errors(methods.horizon_points, blend, count=2048, grid=n) for n in grids])
     for component in range(2):
         assert 0.8 < slope(counts, by_points[:, component]) < 1.7, by_points
         assert 0.7 < slope(grids, by_nodes[:, component]) < 1.3, by_nodes
@@ -80,7 +67,7 @@ def test_shadows_converge_with_points_and_with_the_grid_of_horizons(blend):
 
 def test_soft_shadows_converge_with_the_nodes_across():
     """From k = 2 to 4 a yarn has twice as many, and narrower ramps: order 1/2 at least. Others change nothing."""
-    errors = np.array([shadow_errors(soft_nodes, 0.5, 1.2, level=level) for level in (1, 2, 4, 8)])
+    errors = np.array([shadow_errors(methods.soft_nodes, 0.5, 1.2, level=level) for level in (1, 2, 4, 8)])
     np.testing.assert_allclose(errors[[0, 2]], errors[[1, 3]], atol=5e-4)
     assert (errors[2] < errors[1] / math.sqrt(2.0)).all(), errors
 
@@ -91,18 +78,16 @@ def test_unscattered_light_through_cylinders(depth):
     fabric = cloth().model_copy(update={"optical_thickness": depth})
     queries = along_cylinders(viewer=1.2)
     exact = cylinder_answers(fabric, queries)[:, 2]
-    np.testing.assert_allclose(soft_nodes_behind(fabric, queries)[:, 4], exact, atol=0.02 * exact.max())
+    np.testing.assert_allclose(methods.soft_nodes_behind(fabric, queries)[:, 4], exact, atol=0.02 * exact.max())
     looks = queries._replace(wi=-queries.wo)
     through = sample_transparency(cloth_side(fabric, TruthOptions()), looks, 1024, 3, True)
     np.testing.assert_allclose(through, exact, atol=0.01 * exact.max())
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", methods.ALL)
 def test_white_cloth_returns_no_more_light_than_it_gets(method):
-    """Diffuse parts under an even sky, k_d = 1: cosine-distributed lights, whose density is cos / pi.
-
-    Three standard errors of the mean over 2,000 lights are added. A method without shadows may return all of it.
-    """
+    """Diffuse parts under an even sky, k_d = 1: cosine-distributed lights, whose density is cos / pi. Three standard
+    errors of the mean over 2,000 lights are added. A method without shadows may return all of it."""
     fabric, rows = woven("cotton_twill", blend=1.0), 2000
     u, v, x, y = np.random.default_rng(1).random((4, rows))
     sine, azimuth = np.sqrt(u), 2.0 * math.pi * v
@@ -111,19 +96,19 @@ def test_white_cloth_returns_no_more_light_than_it_gets(method):
         wo = np.tile([math.sin(theta), 0.0, math.cos(theta)], (rows, 1))
         found = method(fabric, Queries.round(4.0 * x, 4.0 * y, np.full(rows, sigma), wi, wo))[:, 2:].sum(axis=1)
         returned = math.pi * found.astype(np.float64) / wi[:, 2]
-        assert returned.mean() + 3.0 * returned.std() / math.sqrt(rows) < 1.0 + 0.02 * (method is averaged_normals)
+        assert returned.mean() + 3.0 * returned.std() / math.sqrt(rows) < 1.0 + 0.02 * (
+            method is methods.averaged_normals
+        )
         assert returned.mean() > 0.5
 
 
 def test_the_seen_area_of_a_closed_surface_is_the_projected_one():
-    """Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle.
-
-    From k = 2 to 4 a yarn has twice the nodes across, and a ramp half as wide: the error falls by order 1 at least.
-    """
+    """Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle. From k = 2
+    to 4 a yarn has twice the nodes across, and a ramp half as wide: the error falls by order 1 at least."""
     fabric, errors = cloth(), []
     queries = draw_queries(QueryOptions(sigma=(6.0, 8.0), max_angle=80.0), fabric.weave.repeat, 3, 0, 60)
     for level in (2, 4):
-        sums, gaps = query_sums(soft_table(fabric, level), queries)
+        sums, gaps = query_sums(methods.soft_table(fabric, level), queries)
         assert not gaps.any()
         errors.append(np.abs(sums[:, :, AREA].sum(axis=1) / queries.wo[:, 2] - 1.0).mean())
     assert errors[0] < 0.03 and slope([8, 16], errors) > 1.0, errors
@@ -133,10 +118,8 @@ def test_the_seen_area_of_a_closed_surface_is_the_projected_one():
     ("sigma", "stretch"), [(0.08, 1.0), (0.2, 1.0), (0.2, 3.0), (0.45, 1.0), (0.45, 2.0), (0.8, 1.0)]
 )
 def test_footprints_on_a_lattice_cover_the_cloth_evenly(sigma, stretch):
-    """The mean over centres of the bare sums is that of a footprint far wider than the repeat, in every regime.
-
-    Weights are shares of the footprint up to the tail that is cut off, alike for all sums, and to the error of rules.
-    """
+    """The mean over centres of the bare sums is that of a footprint far wider than the repeat, in every regime. Weights
+    are shares of the footprint up to the tail that is cut off, alike for all sums, and to the error of rules."""
     fabric = woven("polyester_lining", twist=20.0, width=0.9)
     ends, picks = fabric.weave.repeat
     u, v = (axis.ravel() for axis in np.mgrid[0:ends:0.125, 0:picks:0.125] + 0.0625)
@@ -146,7 +129,7 @@ def test_footprints_on_a_lattice_cover_the_cloth_evenly(sigma, stretch):
     wide = Queries.round([0.0], [0.0], [1e3], wi[:1], wo[:1])
     means = []
     for asked in (queries, wide):
-        sums, _ = query_sums(soft_table(fabric), asked)
+        sums, _ = query_sums(methods.soft_table(fabric), asked)
         means.append(sums[:, :, [BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR]].mean(axis=0).astype(np.float64))
     ratio = means[0] / means[1]
     assert 0.96 < ratio.mean() < 1.01

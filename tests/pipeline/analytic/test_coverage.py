@@ -1,5 +1,3 @@
-"""Coverage by a few rays and by the table, against the truth's many rays and against closed forms."""
-
 import math
 
 import numpy as np
@@ -45,10 +43,8 @@ def test_few_rays_and_the_table_are_near_the_truth(name):
 
 
 def test_closed_form_along_half_cylinders():
-    """Along the warps: the share of a period whose height exceeds 1/2 - depth, by rays and by the table.
-
-    The share is an interval, whose two ends lie in two of 32 strata.
-    """
+    """Along the warps: the share of a period whose height exceeds 1/2 - depth, by rays and by the table. The share is
+    an interval, whose two ends lie in two of 32 strata."""
     depth = np.array([0.02, 0.1, 0.3, 0.49])
     share = 2 * np.sqrt(0.25 - (0.5 - depth) ** 2)
     for size, allowed in ((0.29, 2 / 32), (4.0, 0.02)):

@@ -1,5 +1,3 @@
-"""Mean colours of the threads in a footprint, against the exact ones and against integrals on a lattice."""
-
 import math
 
 import numpy as np
@@ -16,6 +14,8 @@ from tests.pipeline.truth.cloths import LOPSIDED, OVER, coloured, exchanged_axes
 from tests.presets import slow
 from weaves.surface import surface_at
 
+STRIPES = {"ends": [["red", 3], ["blue", 2]], "picks": [["blue", 1], ["red", 4]]}
+
 
 def queries(rows, rng, minor=None, behind=False):
     wi, wo = np.tile([0.6, 0.0, -0.8 if behind else 0.8], (rows, 1)), np.tile([0.0, 0.0, 1.0], (rows, 1))
@@ -25,7 +25,7 @@ def queries(rows, rng, minor=None, behind=False):
 
 @pytest.mark.parametrize("minor", [slow(None), 0.4])
 def test_from_behind_colours_are_means_over_what_is_seen_from_above(minor):
-    fabric = coloured("gauze", ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
+    fabric = coloured("gauze", **STRIPES)
     asked = queries(3, np.random.default_rng(1), minor, behind=True)
     found = footprint_colours(fabric, asked)
     count = 1200 if minor is None else 600
@@ -52,20 +52,15 @@ def test_from_behind_colours_are_means_over_what_is_seen_from_above(minor):
 )
 def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, bound):
     """RMSE of the colour over its mean square, against the exact shares, which err by less than a quarter of the bound.
-
-    Components are those of the truth in both.
-    """
-    fabric = coloured(name, ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
+    Components are those of the truth in both."""
+    fabric = coloured(name, **STRIPES)
     asked = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=75.0), fabric.repeat, 3, 0, 64)
     components = estimate(fabric, asked, TruthOptions(estimator="owen", max_count=1024), 1).mean
     exact = component_colours(fabric, asked, TruthOptions(relative_error=0.006, max_count=1 << 13), 2)
-    truth, found = (coloured_by(components, c) for c in (exact.mean, footprint_colours(fabric, asked)))
+    colours = exact.mean, footprint_colours(fabric, asked)
+    truth, found = (np.einsum("nc,ncx->nx", components, own) for own in colours)
     assert math.sqrt(np.mean(exact.standard_error**2) / np.mean(truth**2)) < 0.25 * bound
     assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < bound
-
-
-def coloured_by(components, colours):
-    return np.einsum("nc,ncx->nx", components, colours)
 
 
 def test_the_mean_over_the_cloth_does_not_depend_on_the_footprint():
@@ -92,15 +87,14 @@ def test_stripes_have_the_mass_of_a_gaussian(sigma):
     colours = fabric.thread_colours()[0].specular
     np.testing.assert_allclose(found, red * colours[0] + (1.0 - red) * colours[3], atol=1e-4)
     # The picks have one colour.
-    np.testing.assert_allclose(
-        footprint_colours(fabric, asked)[:, 1], np.tile(fabric.weft.specular_rgb, (21, 1)), atol=1e-6
-    )
+    picks = footprint_colours(fabric, asked)[:, 1]
+    np.testing.assert_allclose(picks, np.tile(fabric.weft.specular_rgb, (21, 1)), atol=1e-6)
 
 
 @pytest.mark.parametrize("behind", [False, True])
 def test_a_cloth_turned_by_half_a_turn_has_its_threads_in_reverse(behind):
     """The plain weave is its own half turn; ends and picks of two colours are not."""
-    fabric = coloured("voile", ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
+    fabric = coloured("voile", **STRIPES)
     other = coloured("voile", ends=[["blue", 2], ["red", 3]], picks=[["red", 4], ["blue", 1]])
     asked = queries(60, np.random.default_rng(2), 0.4, behind)
     extent, signs = np.float32(fabric.repeat), np.float32([-1.0, -1.0, 1.0])
@@ -113,18 +107,17 @@ def test_a_cloth_turned_by_half_a_turn_has_its_threads_in_reverse(behind):
 @pytest.mark.parametrize("behind", [False, True])
 def test_ends_and_picks_change_places(behind):
     """A mirror in the diagonal of a cloth without symmetries: the transposed draft, yarns and orders exchanged."""
-    ends, picks = [["red", 3], ["blue", 2]], [["blue", 1], ["red", 4]]
     own, other = LOPSIDED, redrawn(~OVER.T, swap=True, mirrored=True)
     asked = queries(60, np.random.default_rng(2), 0.4, behind)
-    one = footprint_colours(coloured(own, ends=ends, picks=picks), asked)
-    there = footprint_colours(coloured(other, ends=picks, picks=ends), exchanged_axes(asked))
+    one = footprint_colours(coloured(own, **STRIPES), asked)
+    there = footprint_colours(coloured(other, ends=STRIPES["picks"], picks=STRIPES["ends"]), exchanged_axes(asked))
     assert np.ptp(one, axis=0)[2 - 2 * behind :].max() > 0.1
     assert np.abs(one - there[:, [1, 0, 3, 2]]).max() < 0.05 and np.abs(one - there[:, [1, 0, 3, 2]]).mean() < 1e-3
 
 
 def test_a_move_by_repeats_of_weave_and_colours_changes_nothing():
     """15 ends and 15 picks of a weave of 3: a move by the weave's repeat alone meets other threads."""
-    fabric = coloured(LOPSIDED, ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 4]])
+    fabric = coloured(LOPSIDED, **STRIPES)
     asked = queries(40, np.random.default_rng(4))
     asked = asked._replace(u=np.round(asked.u * 64) / 64, v=np.round(asked.v * 64) / 64)
     assert fabric.repeat == (15, 15)

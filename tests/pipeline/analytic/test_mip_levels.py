@@ -31,10 +31,8 @@ def noise():
 @pytest.mark.parametrize("octave", [0.0, 0.3, 0.5, 1.0, 1.6, 2.0])
 def test_the_kernel_has_the_mass_mean_and_variance_of_the_gaussian(octave):
     """Texels of width h, read bilinearly, average with variance h^2 / 4: sigma^2 = 4^l h^2 / 4 at a whole level l.
-
-    Between two levels variances are mixed on a line, (1 + 3 s) in place of 4^s. A bright column is at all places
-    that it may have within a coarse texel; sums over an eighth of a texel are integrals to 1 % of the variance.
-    """
+    Between two levels variances are mixed on a line, (1 + 3 s) in place of 4^s. A bright column is at all places that
+    it may have within a coarse texel; sums over an eighth of a texel are integrals to 1 % of the variance."""
     width, step = 8.0 / TEXELS, math.floor(octave)
     sigma, expected = 0.5 * width * 2.0**octave, (0.5 * width * 2.0**step) ** 2 * (1.0 + 3.0 * (octave - step))
     centres, mass, mean, variance = (np.arange(8 * TEXELS) + 0.5) * width / 8.0, 0.0, 0.0, 0.0

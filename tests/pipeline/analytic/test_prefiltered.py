@@ -1,5 +1,3 @@
-"""One texel in single precision against the point model in double precision at its centre."""
-
 import numpy as np
 import pytest
 
@@ -47,12 +45,6 @@ def maps():
     return tabulate(load_fabric("denim"), PER_YARN)
 
 
-def asked(u, v, sigma, wi=(0.3, -0.4), wo=(0.1, 0.6)):
-    rows = len(u)
-    directions = (np.tile(unit(*w), (rows, 1)) for w in (wi, wo))
-    return Queries.round(u, v, np.full(rows, sigma, np.float32), *directions)
-
-
 def test_each_level_is_the_mean_of_the_one_before(maps):
     texels, levels = maps.maps.texels.astype(np.float64), maps.maps.levels
     whole = texels[: levels[0, 1] * levels[0, 2]].mean(axis=0)
@@ -62,19 +54,9 @@ def test_each_level_is_the_mean_of_the_one_before(maps):
     assert shares.sum() == pytest.approx(1.0, abs=1e-6) and shares.min() > 0.1  # denim has no gaps
 
 
-@pytest.mark.parametrize("widening", [NONE, TOKSVIG, LEAN])
-def test_a_wide_footprint_has_no_place_and_the_repeat_repeats(maps, widening):
-    places = np.linspace(0.0, 3.0, 7, dtype=np.float32)
-    wide = answer(maps, asked(places, places, 50.0), widening)
-    np.testing.assert_allclose(wide, wide[:1].repeat(7, axis=0), rtol=1e-5)
-    ends, picks = maps.maps.extent.astype(np.float32)
-    near, far = (answer(maps, asked(places + k * ends, places - k * picks, 0.2), widening) for k in (0, 64))
-    np.testing.assert_allclose(far, near, rtol=1e-3, atol=1e-5 * near.max())
-
-
 def test_widening_lowers_highlights_and_leaves_the_diffuse_light(maps):
     """A texel of many tangents has a broader lobe: lower in its middle; diffuse light knows no roughness."""
-    middle = asked(np.zeros(1), np.zeros(1), 50.0, (0.0, 0.3), (0.0, -0.3))
+    middle = Queries.round([0.0], [0.0], [50.0], [unit(0.0, 0.3)], [unit(0.0, -0.3)])
     none, toksvig, lean = (answer(maps, middle, widening)[0] for widening in (NONE, TOKSVIG, LEAN))
     np.testing.assert_allclose(toksvig[2:], none[2:], rtol=1e-6)
     np.testing.assert_allclose(lean[2:], none[2:], rtol=1e-6)

@@ -1,31 +1,15 @@
-"""Horizons over boxes against the cells they hold, and shares of a box against points of it."""
-
 import numpy as np
 import pytest
 
+from pipeline.analytic import soft_horizons as soft
 from pipeline.analytic.gauss_rules import overlap
-from pipeline.analytic.soft_horizons import (
-    AZIMUTHS,
-    CURVATURES,
-    FALL,
-    above,
-    around,
-    azimuths_apart,
-    bend_cells,
-    bend_of,
-    bend_rows,
-    from_even,
-    over_boxes,
-    ramp,
-    seen_and_lit,
-)
 
 
 def test_boxes_of_whole_cells_have_the_moments_of_these():
     grid = np.random.default_rng(1).random((3, 6, 8))
     rows = overlap(np.array([0.0, 0.5, 1.0]), np.linspace(0, 1, 7))
     columns = overlap(np.array([0.0, 0.25, 1.0]), np.linspace(0, 1, 9))
-    mean, variance = over_boxes(grid, grid**2, rows, columns)
+    mean, variance = soft.over_boxes(grid, grid**2, rows, columns)
     boxes = [part.reshape(3, -1) for half in (grid[:, :3], grid[:, 3:]) for part in (half[..., :2], half[..., 2:])]
     np.testing.assert_allclose(mean, np.stack([box.mean(axis=1) for box in boxes], axis=1), rtol=1e-12)
     np.testing.assert_allclose(variance, np.stack([box.var(axis=1) for box in boxes], axis=1), rtol=1e-9)
@@ -35,13 +19,13 @@ def test_boxes_of_whole_cells_have_the_moments_of_these():
 def test_what_hides_one_hides_or_shows_the_other(turn, expected):
     """A box of 10,000 points; light and viewer are free of the same ones, of independent ones, or of opposite ones."""
     azimuth = np.radians(turn)
-    ways = azimuths_apart(*np.array([0.6, 0.0, 0.3 * np.cos(azimuth), 0.3 * np.sin(azimuth)], np.float32))
+    ways = soft.azimuths_apart(*np.array([0.6, 0.0, 0.3 * np.cos(azimuth), 0.3 * np.sin(azimuth)], np.float32))
     assert sum(ways) == pytest.approx(1.0)
     first, second = np.float32(0.7), np.float32(0.4)
     points = (np.arange(10_000) + 0.5) / 10_000
     free = points < first
     chosen = {"less": points < second, "product": points * 100 % 1 < second, "both leave": points > 1 - second}
-    assert seen_and_lit(first, second, *ways) == pytest.approx((free & chosen[expected]).mean(), abs=1e-3)
+    assert soft.seen_and_lit(first, second, *ways) == pytest.approx((free & chosen[expected]).mean(), abs=1e-3)
 
 
 def test_a_ramp_is_the_share_of_a_spread_horizon():
@@ -49,38 +33,39 @@ def test_a_ramp_is_the_share_of_a_spread_horizon():
     horizons = 0.3 + 0.2 * (np.arange(1000) + 0.5) / 1000
     sharpness = np.float32(1.0 / (np.sqrt(12.0) * horizons.std()))
     for rise in np.float32([0.2, 0.32, 0.4, 0.49, 0.6]):
-        found = ramp(above(rise, np.float32(0.3), np.float32(0.5), np.float32(0.5), sharpness))
+        found = soft.ramp(soft.above(rise, np.float32(0.3), np.float32(0.5), np.float32(0.5), sharpness))
         assert found == pytest.approx((horizons < rise).mean(), abs=2e-3)
 
 
 def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction():
     """Linear interpolation of a second derivative of 1 errs by at most h^2 / 8, twice, with h up to 0.25."""
-    even = np.sin(2.0 * np.pi * np.arange(2 * AZIMUTHS) / (2 * AZIMUTHS) + 0.3)[:, None]
-    table = from_even(even)[:, 0]
+    even = np.sin(2.0 * np.pi * np.arange(2 * soft.AZIMUTHS) / (2 * soft.AZIMUTHS) + 0.3)[:, None]
+    table = soft.from_even(even)[:, 0]
     for angle in np.linspace(0.0, 2.0 * np.pi, 97):
-        low, high, turn = around(np.float32(0.7 * np.cos(angle)), np.float32(0.7 * np.sin(angle)))
-        assert 0 <= low < AZIMUTHS and high == (low + 1) % AZIMUTHS and 0.0 <= turn <= 1.0
+        low, high, turn = soft.around(np.float32(0.7 * np.cos(angle)), np.float32(0.7 * np.sin(angle)))
+        assert 0 <= low < soft.AZIMUTHS and high == (low + 1) % soft.AZIMUTHS and 0.0 <= turn <= 1.0
         assert abs((1.0 - turn) * table[low] + turn * table[high] - np.sin(angle + 0.3)) < 0.015
 
 
-def test_a_quarter_turn_is_a_quarter_of_the_azimuths():
+def test_a_quarter_turn_is_a_quarter_of_the_azimuths_and_no_azimuth_is_one_too():
     """The diamond angle runs clockwise."""
     for x, y in np.random.default_rng(1).normal(size=(50, 2)).astype(np.float32):
-        low, high, turn = around(x, y)
-        low_turned, high_turned, turn_turned = around(y, -x)
-        assert ((low_turned - low) % AZIMUTHS, (high_turned - high) % AZIMUTHS) == (AZIMUTHS // 4, AZIMUTHS // 4)
-        assert turn_turned == pytest.approx(turn, abs=1e-5)
+        own, turned = soft.around(x, y), soft.around(y, -x)
+        quarters = [(after - before) % soft.AZIMUTHS * 4 for before, after in zip(own[:2], turned[:2], strict=True)]
+        assert quarters == [soft.AZIMUTHS] * 2 and turned[2] == pytest.approx(own[2], abs=1e-5)
+    low, _, turn = soft.around(np.float32(0.0), np.float32(0.0))
+    assert 0 <= low < soft.AZIMUTHS and 0.0 <= turn <= 1.0
 
 
 def test_azimuths_even_in_the_angle_are_read_to_second_order():
     """Linear interpolation: the error falls by four with twice the azimuths."""
-    t = np.arange(AZIMUTHS) * 4.0 / AZIMUTHS
+    t = np.arange(soft.AZIMUTHS) * 4.0 / soft.AZIMUTHS
     y = np.where(t <= 2.0, 1.0 - t, t - 3.0)
     angle = np.arctan2(y, np.where(t <= 2.0, 1.0, -1.0) * (1.0 - np.abs(y)))
     counts, errors = [16, 32, 64, 128, 256], []
     for count in counts:
         even = np.sin(2.0 * np.pi * np.arange(count) / count + 0.3)[:, None]
-        errors.append(np.abs(from_even(even)[:, 0] - np.sin(angle + 0.3)).max())
+        errors.append(np.abs(soft.from_even(even)[:, 0] - np.sin(angle + 0.3)).max())
     assert -2.2 < np.polyfit(np.log(counts), np.log(errors), 1)[0] < -1.7, errors
 
 
@@ -88,44 +73,41 @@ def test_what_two_directions_see_together_is_between_the_least_and_the_most_that
     """Frechet's bounds; it is symmetric, and all of what one sees if the other sees everything."""
     random = np.random.default_rng(7)
     for first, second, *xy in random.random((200, 6)).astype(np.float32):
-        ways = azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in xy))
-        both = seen_and_lit(first, second, *ways)
+        ways = soft.azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in xy))
+        both = soft.seen_and_lit(first, second, *ways)
         assert max(first + second - 1.0, 0.0) - 1e-6 <= both <= min(first, second) + 1e-6
-        assert both == pytest.approx(seen_and_lit(second, first, *ways), abs=1e-6)
-        assert seen_and_lit(first, np.float32(1.0), *ways) == pytest.approx(first, abs=1e-6)
-        assert azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in (*xy[2:], *xy[:2]))) == pytest.approx(ways, abs=1e-6)
-
-
-def test_no_azimuth_is_an_azimuth_too():
-    low, _, turn = around(np.float32(0.0), np.float32(0.0))
-    assert 0 <= low < AZIMUTHS and 0.0 <= turn <= 1.0
+        assert both == pytest.approx(soft.seen_and_lit(second, first, *ways), abs=1e-6)
+        assert soft.seen_and_lit(first, np.float32(1.0), *ways) == pytest.approx(first, abs=1e-6)
+        assert soft.azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in (*xy[2:], *xy[:2]))) == pytest.approx(
+            ways, abs=1e-6
+        )
 
 
 def test_a_fall_of_the_largest_share_is_a_line_in_the_curvature():
     """With shares of 1 the sine falls by FALL times the curvature, between tabulated curvatures too."""
     for curvature in (0.0, 0.01, 0.05, 0.1, 0.25, 0.7, 1.0):
-        bend = bend_of(np.float32(curvature))
-        assert 0 <= bend.low <= bend.high < len(CURVATURES)
-        assert bend.of_low + bend.of_high == pytest.approx(FALL * curvature, rel=1e-6)
-        if curvature in CURVATURES:
-            assert max(bend.of_low, bend.of_high) == pytest.approx(FALL * curvature, rel=1e-6)
+        bend = soft.bend_of(np.float32(curvature))
+        assert 0 <= bend.low <= bend.high < len(soft.CURVATURES)
+        assert bend.of_low + bend.of_high == pytest.approx(soft.FALL * curvature, rel=1e-6)
+        if curvature in soft.CURVATURES:
+            assert max(bend.of_low, bend.of_high) == pytest.approx(soft.FALL * curvature, rel=1e-6)
             own = bend.high if bend.of_high > 0 else bend.low
-            assert CURVATURES[own] == curvature
+            assert soft.CURVATURES[own] == curvature
 
 
 def test_fixed_and_placed_nodes_have_the_same_horizon_over_curved_cloth():
     """Rows of blocks and cells of a grid in levels; without curvature both are the line between two azimuths."""
     random = np.random.default_rng(2)
     level = random.integers(0, 256, (2, 16), np.uint8)
-    falls = random.integers(0, 256, (len(CURVATURES), 2, 16), np.uint8)
+    falls = random.integers(0, 256, (len(soft.CURVATURES), 2, 16), np.uint8)
     cells, turn = np.arange(16, dtype=np.uint32), np.float32(0.3)
     for curvature in (0.0, 0.03, 0.4):
-        bend = bend_of(np.float32(curvature))
+        bend = soft.bend_of(np.float32(curvature))
         rows, placed = np.zeros((1, 16), np.float32), np.zeros(16, np.float32)
         of_blocks = (a.astype(np.float32)[..., None, :] / np.float32(255.0) for a in (level, falls))
-        bend_rows(*of_blocks, 0, 1, turn, bend, rows)
-        flat = falls.reshape(len(CURVATURES), -1)
-        bend_cells(level.ravel(), flat, cells, np.uint32(0), np.uint32(16), turn, bend, placed)
+        soft.bend_rows(*of_blocks, 0, 1, turn, bend, rows)
+        flat = falls.reshape(len(soft.CURVATURES), -1)
+        soft.bend_cells(level.ravel(), flat, cells, np.uint32(0), np.uint32(16), turn, bend, placed)
         np.testing.assert_allclose(placed / 255.0, rows[0], atol=2e-6)
         straight = (1.0 - turn) * level[0] + turn * level[1]
         assert (placed <= straight + 1e-3).all()

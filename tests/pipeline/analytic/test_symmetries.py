@@ -1,19 +1,9 @@
-"""What holds for every method: the same cloth, drawn in another way, has the same answers."""
-
 import numpy as np
 import pytest
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from tests.pipeline.analytic.methods import (
-    ALL,
-    PLACED,
-    averaged_normals,
-    horizon_points,
-    soft_nodes,
-    soft_nodes_behind,
-    summed_area,
-)
-from tests.pipeline.truth.cloths import LOPSIDED, OVER, exchanged_axes, redrawn, reversed_axes, woven
+from tests.pipeline.analytic import methods
+from tests.pipeline.truth.cloths import IMAGES, LOPSIDED, OVER, moved_far, on_lattice, redrawn, reversed_axes, woven
 
 MEAN, WORST = 2e-4, 0.05
 """Of the largest answer: a node on the border of two cells of a grid may read either, which moves few answers."""
@@ -32,58 +22,41 @@ def assert_equal(one, other, worst=WORST):
 QUERIES = asked(stretch=4.0)
 
 
-@pytest.mark.parametrize("method", PLACED)
-def test_a_cloth_turned_by_half_a_turn_and_a_mirrored_one(method):
-    """A mirror reverses the sense of the twists, half a turn does not."""
-    own = method(LOPSIDED, QUERIES)
-    assert_equal(own, method(redrawn(OVER[::-1, ::-1]), reversed_axes(QUERIES, -1, -1)))
-    mirrored = reversed_axes(QUERIES, -1, 1)
-    assert_equal(own, method(redrawn(OVER[:, ::-1], mirrored=True), mirrored))
-    # The twist is seen: without reversal the mirrored cloth answers otherwise.
-    assert np.abs(own - method(redrawn(OVER[:, ::-1]), mirrored)).max() > 0.01 * own.max()
-
-
-@pytest.mark.parametrize("method", PLACED)
-def test_warp_and_weft_change_places(method):
-    """The transposed draft, yarns exchanged: a mirror in the diagonal."""
-    there = method(redrawn(~OVER.T, swap=True, mirrored=True), exchanged_axes(QUERIES))
-    order = [1, 0, 3, 2, *range(4, there.shape[1])]
-    assert_equal(method(LOPSIDED, QUERIES), there[:, order])
-
-
-@pytest.mark.parametrize("method", [soft_nodes, soft_nodes_behind, summed_area])
-def test_a_repeat_may_begin_anywhere_and_be_drawn_twice(method):
-    """Places move along; centres are on a lattice of 1/64, so that single precision moves them exactly."""
-    queries = QUERIES._replace(u=np.round(QUERIES.u * 64) / 64, v=np.round(QUERIES.v * 64) / 64)
+@pytest.mark.parametrize("method", methods.PLACED)
+def test_a_cloth_drawn_in_another_way_has_the_same_answers(method):
+    """A mirror reverses the sense of the twists: without that the mirrored cloth answers otherwise. Twice the repeat
+    has the same longest period: waves and means over all cells are not others. Maps of mean normals begin somewhere."""
+    queries = on_lattice(QUERIES)
     own = method(LOPSIDED, queries)
-    moved = queries._replace(u=queries.u - np.float32(1), v=queries.v - np.float32(2))
-    rolled = np.roll(OVER, (-2, -1), axis=(0, 1))
-    assert_equal(own, method(redrawn(rolled), moved))
-    # Twice the repeat: the longest period is the same, waves and means over all cells are not others.
-    assert_equal(own, method(redrawn(np.tile(OVER, (1, 2))), queries))
+    for image, draw in IMAGES.items():
+        if method is not methods.averaged_normals or image not in ("begun elsewhere", "drawn twice"):
+            there = method(*draw(queries))
+            order = [1, 0, 3, 2, *range(4, there.shape[1])] if image == "exchange" else slice(None)
+            assert_equal(own, there[:, order])
+    wrong = method(redrawn(OVER[:, ::-1]), reversed_axes(queries, -1, 1))
+    assert np.abs(own - wrong).max() > 0.01 * own.max()
 
 
-@pytest.mark.parametrize("method", [*ALL, soft_nodes_behind])
+@pytest.mark.parametrize("method", [*methods.ALL, methods.soft_nodes_behind])
 def test_translation_by_repeats_changes_nothing(method):
     """Places are reduced in double precision; what is random or sampled depends on the place in the repeat alone."""
-    queries = asked(stretch=4.0)
-    near = queries._replace(u=np.round(queries.u * 64) / 64, v=np.round(queries.v * 64) / 64)
-    ends, picks = np.float32(LOPSIDED.weave.repeat)
-    far = near._replace(u=near.u + np.float32(1024) * ends, v=near.v - np.float32(2048) * picks)
+    near, far = moved_far(QUERIES)
     own = method(LOPSIDED, near)
     np.testing.assert_allclose(method(LOPSIDED, far), own, rtol=1e-4, atol=1e-5 * own.max())
     assert np.abs(own - method(LOPSIDED, near._replace(u=near.u + np.float32(1)))).max() > 0.05 * own.max()
 
 
-@pytest.mark.parametrize("method", PLACED)
+@pytest.mark.parametrize("method", methods.PLACED)
 def test_a_footprint_far_larger_than_the_repeat_has_no_place(method):
     queries = asked().take(slice(0, 1)).take(np.zeros(5, np.int64))._replace(sigma=np.full(5, 50.0, np.float32))
     queries = queries._replace(sigma_minor=queries.sigma, u=np.linspace(0, 3, 5, dtype=np.float32))
     found = method(LOPSIDED, queries)
-    np.testing.assert_allclose(found, found[:1].repeat(5, axis=0), rtol=1e-5)
+    np.testing.assert_allclose(found, found[:1].repeat(5, axis=0), rtol=0.0 if method is methods.summed_area else 1e-5)
 
 
-@pytest.mark.parametrize("method", [soft_nodes, soft_nodes_behind, summed_area, horizon_points])
+@pytest.mark.parametrize(
+    "method", [methods.soft_nodes, methods.soft_nodes_behind, methods.summed_area, methods.horizon_points]
+)
 def test_an_ellipse_is_the_same_after_half_a_turn_and_with_its_axes_exchanged(method):
     own = method(LOPSIDED, QUERIES)
     right = np.float32(np.pi / 2)
@@ -96,13 +69,11 @@ def test_an_ellipse_is_the_same_after_half_a_turn_and_with_its_axes_exchanged(me
     assert np.abs(own - method(LOPSIDED, QUERIES._replace(angle=QUERIES.angle + right))).max() > 0.1 * own.max()
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", methods.ALL)
 def test_all_components_change_by_one_factor_if_light_and_viewer_do(method):
-    """f(wi, wo) A(wo) is reciprocal, of both families, diffuse parts with cosines to the ply: only A(wo) differs.
-
-    f and f' with light and viewer exchanged are parallel vectors of four components. Nothing is left out: points that
-    one of the two does not reach count for neither.
-    """
+    """f(wi, wo) A(wo) is reciprocal, of both families, diffuse parts with cosines to the ply: only A(wo) differs. f and
+    f' with light and viewer exchanged are parallel vectors of four components. Nothing is left out: points that one of
+    the two does not reach count for neither."""
     cloth = LOPSIDED.model_copy(update={
         "warp": LOPSIDED.warp.model_copy(update={"blend": 1.0}), "weft": LOPSIDED.weft.model_copy(update={"blend": 1.0})
     })  # fmt: skip
@@ -120,7 +91,7 @@ def test_all_components_change_by_one_factor_if_light_and_viewer_do(method):
     assert factor.max() > 1.5 and factor.min() < 0.7
 
 
-@pytest.mark.parametrize("method", [soft_nodes, soft_nodes_behind, averaged_normals])
+@pytest.mark.parametrize("method", [methods.soft_nodes, methods.soft_nodes_behind, methods.averaged_normals])
 def test_the_back_of_a_plain_weave_turned_over_is_its_front(method):
     """Turned about y, each float beneath lies on top; light from behind meets the same horizons on its way."""
     plain = woven("voile", twist=25.0)

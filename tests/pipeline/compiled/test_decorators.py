@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[3]
+IGNORED = shutil.ignore_patterns("__pycache__")
 
 # `smooth` sums 48 products and is too long to be built into each of its callers; `plain` allows no regrouping and calls
 # the same function as `fast`, with an operation that numba writes in Python (`x**2`).
@@ -126,16 +127,12 @@ def _caches_of_their_own(monkeypatch):
 def copies(tmp_path: Path) -> list[Path]:
     """Return three folders with the decorators and small kernels, nothing compiled."""
     folders = [tmp_path / name for name in "abc"]
-    for folder in folders:
-        compiled = folder / "pipeline" / "compiled"
-        compiled.mkdir(parents=True)
-        for path in (ROOT / "pipeline" / "compiled").glob("*.py"):
-            shutil.copy(path, compiled)
-        (folder / "pipeline" / "__init__.py").touch()
-        truth = folder / "pipeline" / "truth"
-        truth.mkdir()
-        (truth / "__init__.py").touch()
-        (truth / "small.py").write_text(KERNELS)
+    for pipeline in (folder / "pipeline" for folder in folders):
+        shutil.copytree(ROOT / "pipeline" / "compiled", pipeline / "compiled", ignore=IGNORED)
+        (pipeline / "truth").mkdir()
+        for package in (pipeline, pipeline / "truth"):
+            (package / "__init__.py").touch()
+        (pipeline / "truth" / "small.py").write_text(KERNELS)
     return folders
 
 
@@ -167,11 +164,9 @@ print(*sorted(f"{path.name}:{path.stat().st_mtime_ns}" for path in Path(sys.argv
 
 
 def test_copies_of_the_tree_and_forks_share_kernels_that_run_their_own_copies(copies, tmp_path, monkeypatch):
-    """Each kernel is announced when it is compiled; a child of a fork compiles too.
-
-    A weak function is one that the linker replaces by whatever of its name came into the process first. `smooth` has
-    machine code only after Python has called it.
-    """
+    """Each kernel is announced when it is compiled; a child of a fork compiles too. A weak function is one that the
+    linker replaces by whatever of its name came into the process first. `smooth` has machine code only after Python has
+    called it."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     first, second = (answers(start(copy, CACHED, str(tmp_path / "kernels"))) for copy in copies[:2])
     *lines, compiled = first.splitlines()
@@ -186,9 +181,8 @@ def test_a_process_in_which_a_file_changes_leaves_no_kernel_of_the_old_file(copi
     head = "from pipeline.compiled.decorators import kernel\n"
     body = "@kernel\ndef {}():\n    return {}\n"
     (truth / "called.py").write_text(head + body.format("called", 1))
-    (truth / "caller.py").write_text(
-        f"from pipeline.truth.called import called\n{head}{body.format('caller', 'called()')}"
-    )
+    caller = f"from pipeline.truth.called import called\n{head}{body.format('caller', 'called()')}"
+    (truth / "caller.py").write_text(caller)
     edit = """
 from pathlib import Path
 from pipeline.truth import called
@@ -273,11 +267,8 @@ def test_kernels_that_borrow_arrays_call_none_that_returns_them():
     assert "_horizons" in makers and "refine" not in makers
     for (path, name), (node, allocates) in decorated.items():
         if not allocates:
-            called = {
-                call.func.id
-                for call in ast.walk(node)
-                if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
-            }
+            calls = (call.func for call in ast.walk(node) if isinstance(call, ast.Call))
+            called = {function.id for function in calls if isinstance(function, ast.Name)}
             assert not called & makers, f"{path}: {name} calls {called & makers}"
 
 
@@ -290,8 +281,7 @@ def test_kernels_that_borrow_arrays_call_none_that_returns_them():
 def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies, asked, order):
     if asked is REAL:
         for copy, package in itertools.product(copies, ("weaves", "pipeline")):
-            ignored = shutil.ignore_patterns("__pycache__")
-            shutil.copytree(ROOT / package, copy / package, ignore=ignored, dirs_exist_ok=True)
+            shutil.copytree(ROOT / package, copy / package, ignore=IGNORED, dirs_exist_ok=True)
     script = f"import hashlib, sys\nimport numpy as np\n{asked}{ANSWERS}"
     cold = answers(start(copies[0], script, *order))
     assert len(cold.split()) == 2 * len(order)

@@ -1,10 +1,10 @@
-"""Reading and evaluation of maps, against the lobes in double precision and closed forms of filtered patterns."""
-
 import math
 
 import numpy as np
 import pytest
 
+from pipeline.analytic.mip_levels import mip_levels
+from pipeline.analytic.parallax_mapping import HeightMaps
 from pipeline.materials.lobes import charlie, even_sky, ggx, reflectance, white_f0
 from pipeline.materials.lookup import answer, tabulate
 from pipeline.materials.planes import Layout, Planes
@@ -15,6 +15,9 @@ from weaves.fabric import load_fabric
 SPECULAR = 0.5
 SHEEN = np.array([0.02, 0.01, 0.06, 0.03])
 MATERIAL = Constants(1.5, 0.2, np.zeros(3), 0.0, False)
+
+
+LEVEL_GROUND = HeightMaps(mip_levels([np.zeros((1, 1, 1))], (4, 4)), 0.0, 0.0)
 
 
 def maps_of(pattern, sheen=SHEEN):
@@ -28,17 +31,11 @@ def maps_of(pattern, sheen=SHEEN):
     def plane(values):
         return (pattern[..., None] * np.asarray(values)).astype(np.float32)
 
-    level = Planes(
-        coverage=pattern.astype(np.float32),
-        height=np.zeros_like(pattern, np.float32),
-        normal=plane(normal),
-        fibres=plane(entries),
-        base=plane((0.3, 0.2, 0.0)),
-        specular=plane((0.08, 0.04, 0.0)),
-        through=plane((0.1, 0.05, 0.0)),
-    )
-    found = Layout(4, 4, pattern.shape[1], pattern.shape[0])
-    return tabulate(level, MATERIAL, found, sheen, SPECULAR), normal, fibre
+    colours = {"base": (0.3, 0.2, 0.0), "specular": (0.08, 0.04, 0.0), "through": (0.1, 0.05, 0.0)}
+    planes = {name: plane(values) for name, values in {"normal": normal, "fibres": entries, **colours}.items()}
+    level = Planes(coverage=pattern.astype(np.float32), height=np.zeros_like(pattern, np.float32), **planes)
+    shown = Layout(4, 4, *pattern.shape[::-1])
+    return tabulate(level, MATERIAL, shown, sheen, SPECULAR, LEVEL_GROUND), normal, fibre
 
 
 def test_one_material_is_the_sum_of_its_lobes():

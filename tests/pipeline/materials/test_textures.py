@@ -1,5 +1,3 @@
-"""Maps against the truth's albedo and against sums over points of the surface."""
-
 import math
 
 import numpy as np
@@ -28,8 +26,7 @@ def maps_of(fabric, size, halvings=0):
 def diffuse_albedo(fabric, side):
     """Return the truth's diffuse reflectance under an even sky, from above, by a grid of directions."""
     square, turn = (np.stack(np.meshgrid(*[(np.arange(side) + 0.5) / side] * 2), -1).reshape(-1, 2)).T
-    z, turn = np.sqrt(square), 2.0 * math.pi * turn
-    sine = np.sqrt(1.0 - square)
+    z, sine, turn = np.sqrt(square), np.sqrt(1.0 - square), 2.0 * math.pi * turn
     wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1)
     none, size = np.zeros(len(wi)), np.full(len(wi), 2.0 * max(fabric.repeat))
     queries = Queries.round(none, none, size, wi, np.tile([0.0, 0.0, 1.0], (len(wi), 1)))

@@ -1,10 +1,14 @@
 """Variants of Mitsuba, of which the scalar one works everywhere and the other one needs LLVM; worn cloth."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+from pipeline.analytic.bounces.table import bounce_table
 from pipeline.mitsuba.register import register
 from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
+from pipeline.scenes import bounces
 from pipeline.scenes.variant import llvm_works, mitsuba
 
 NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
@@ -31,21 +35,20 @@ UV = (0.0062, 0.0057)
 
 def hits_of(viewer, count=1, uv=UV, **other):
     """Return places of a shape that face the viewer."""
-    columns = {
-        "uv": np.tile(uv, (count, 1)),
-        "viewer": np.tile(viewer, (count, 1)),
-        "outward": np.tile([0.0, 0.0, 1.0], (count, 1)),
-        "handed": np.ones(count),
-        "jacobian": np.zeros((count, 2, 2)),
-        "spread": np.zeros(count),
-        "stride": np.tile([1.0, 0.0], (count, 1)),
-        "bend": np.zeros(count),
-    }
-    return RayHits(**{**columns, **other})
+    one = {"uv": uv, "viewer": viewer, "outward": [0.0, 0.0, 1.0], "handed": 1.0, "stride": [1.0, 0.0]}
+    one |= {"jacobian": np.zeros((2, 2)), "spread": 0.0, "bend": 0.0}
+    return RayHits(**{name: np.repeat([value], count, axis=0) for name, value in one.items()} | other)
 
 
 def worn_of(fabric, sigma=0.3, **other):
     return Worn(ClothOptions(fabric=fabric, sigma=sigma, **other))
+
+
+@pytest.fixture
+def few_walks(monkeypatch):
+    """Make small tables of light between yarns."""
+    for name, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
+        monkeypatch.setattr(bounces, name, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
 
 
 @pytest.fixture
@@ -66,17 +69,14 @@ def use():
 
 @pytest.fixture(params=["scalar_rgb", pytest.param("llvm_ad_rgb", marks=[NEEDS_LLVM, pytest.mark.external])])
 def mi(request, use):
-    """Return Mitsuba with the plugins, in each variant."""
     return use(request.param)
 
 
 @pytest.fixture
 def llvm(use):
-    """Return Mitsuba in the vectorised variant; its tests have the mark NEEDS_LLVM."""
     return use("llvm_ad_rgb")
 
 
 @pytest.fixture
 def scalar(use):
-    """Return Mitsuba in the scalar variant."""
     return use("scalar_rgb")

@@ -1,12 +1,13 @@
-"""The BSDF `twillight` as Mitsuba sees it: values, lobes, and its own chi-square test."""
-
 import numpy as np
 import pytest
 
 from pipeline.mitsuba.bsdf import STRAIGHT_THROUGH
+from pipeline.scenes.shade import shade
+from pipeline.truth.query import Queries
 from tests.directions import unit
 from tests.pipeline.mitsuba.conftest import CONFIGURATIONS, NEEDS_LLVM, UV, hits_of, worn_of
 from tests.presets import slow
+from weaves.fabric import load_fabric
 
 LEVEL = 0.01
 
@@ -41,6 +42,24 @@ def test_values_and_densities_are_those_of_the_cloth(mi, name):
         np.testing.assert_allclose(number(pdf), worn.pdf(hits, np.array([light])), rtol=1e-5)
         np.testing.assert_array_equal(number(bsdf.eval(context, si, light)), number(value))
         np.testing.assert_array_equal(number(bsdf.pdf(context, si, light)), number(pdf))
+
+
+def test_all_bounces_are_added_to_the_values_and_leave_the_density(mi, few_walks):
+    """Light of the table, in front; the cosines of the mixture draw where it shines already."""
+    fabric, sigma, theta, phi = CONFIGURATIONS["front"]
+    properties = {"type": "twillight", "fabric": fabric, "sigma": sigma}
+    one, every = mi.load_dict(properties), mi.load_dict({**properties, "bounces": "all"})
+    viewer, light = unit(theta, phi), unit(40.0, 200.0)
+    si, context = interaction(mi, viewer.tolist()), mi.BSDFContext()
+    (before, pdf), (after, same) = (bsdf.eval_pdf(context, si, light.tolist()) for bsdf in (one, every))
+    query = Queries.round([0.62], [0.57], [sigma], [light], [viewer])
+    later = shade(load_fabric(fabric), np.zeros((1, 4)), query, "all")[0]
+    assert later.min() > 0.0 and later.max() > 1e-3
+    np.testing.assert_allclose(number(after) - number(before), later, rtol=1e-3, atol=1e-6)
+    np.testing.assert_array_equal(number(same), number(pdf))
+    sample, weight = every.sample(context, si, 0.7, [0.3, 0.6])
+    value, density = every.eval_pdf(context, si, number(sample.wo).tolist())
+    np.testing.assert_allclose(number(weight), number(value) / number(density), rtol=1e-3)
 
 
 @pytest.mark.slow
@@ -87,6 +106,7 @@ def test_a_context_chooses_lobes(mi):
         ("twillight", {}, "fabric"),
         ("twillight", {"fabric": "denim", "method": "soft_node"}, "did you mean 'soft_nodes'"),
         ("twillight", {"fabric": "denim", "yarns": -1.0}, "yarns"),
+        ("twillight", {"fabric": "denim", "bounces": 2}, "bounces = 2: "),
         ("twillight", {"fabric": "denim", "yarn": 1.0}, "did you mean 'yarns'"),
         ("twillight_path", {"max_dept": 3}, "did you mean 'max_depth'"),
     ],
@@ -103,19 +123,18 @@ def test_bad_properties_end_in_one_sentence(scalar, plugin, properties, words):
     ("names", "cells", "nodes", "samples"),
     [(("front", "gauze", "behind"), 11, 24, 20_000), slow(tuple(CONFIGURATIONS), 21, 32, 500_000)],
 )
-def test_mitsubas_chi_square_test(llvm, names, cells, nodes, samples):
-    """LEVEL for all configurations together, by Sidak; few cells make the quadrature of densities exact enough.
-
-    Light straight through is a delta lobe and left out. Mitsuba's adapter drops samples without weight. Here they
-    count: the density does not know which light is in shadow.
-    """
+def test_mitsubas_chi_square_test(llvm, few_walks, names, cells, nodes, samples):
+    """LEVEL for all configurations together, by Sidak; few cells make the quadrature of densities exact enough. Light
+    straight through is a delta lobe and left out. Mitsuba's adapter drops samples without weight. Here they count: the
+    density does not know which light is in shadow."""
     import drjit as dr
 
     context = llvm.BSDFContext()
     context.type_mask = int(llvm.BSDFFlags.All) & ~int(llvm.BSDFFlags.Null)
     for name in names:
         fabric, sigma, theta, phi = CONFIGURATIONS[name]
-        viewer, properties = unit(theta, phi).tolist(), {"type": "twillight", "fabric": fabric, "sigma": sigma}
+        viewer = unit(theta, phi).tolist()
+        properties = {"type": "twillight", "fabric": fabric, "sigma": sigma, "bounces": "all"}
         _, density = llvm.chi2.BSDFAdapter("twillight", properties, wi=viewer, uv=list(UV), ctx=context)
         bsdf = llvm.load_dict(properties)
 
@@ -125,8 +144,6 @@ def test_mitsubas_chi_square_test(llvm, names, cells, nodes, samples):
             scattered = sample.sampled_component != STRAIGHT_THROUGH
             return sample.wo, dr.select(scattered, llvm.Float(1.0), llvm.Float(0.0))
 
-        test = llvm.chi2.ChiSquareTest(
-            domain=llvm.chi2.SphericalDomain(), sample_func=draw, pdf_func=density, sample_dim=3,
-            sample_count=samples, res=cells, ires=nodes,
-        )  # fmt: skip
+        settings = {"sample_dim": 3, "sample_count": samples, "res": cells, "ires": nodes}
+        test = llvm.chi2.ChiSquareTest(llvm.chi2.SphericalDomain(), draw, density, **settings)
         assert test.run(significance_level=LEVEL, test_count=len(names), quiet=True), test.messages

@@ -1,5 +1,3 @@
-"""The integrator `twillight_path`: footprints, energy, and light transport against Mitsuba's own path tracer."""
-
 import math
 
 import numpy as np
@@ -19,6 +17,8 @@ from tests.pipeline.mitsuba.conftest import NEEDS_LLVM
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
+LAMP = {"type": "point", "position": [1.0, 1.0, 2.0], "intensity": 3.0}
+
 
 def floor(mi, side=1.0, height=0.0):
     """Return a square floor seen from above; u, v run from 0 to 1."""
@@ -27,13 +27,10 @@ def floor(mi, side=1.0, height=0.0):
 
 
 def sensor(mi, size=8, samples=4, rfilter="box"):
-    return {
-        "type": "perspective",
-        "fov": 30,
-        "to_world": mi.ScalarTransform4f().look_at([0, -1, 4], [0, 0, 0], [0, 1, 0]),
-        "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": rfilter}},
-        "sampler": {"type": "independent", "sample_count": samples},
-    }
+    look = mi.ScalarTransform4f().look_at([0, -1, 4], [0, 0, 0], [0, 1, 0])
+    film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": rfilter}}
+    sampler = {"type": "independent", "sample_count": samples}
+    return {"type": "perspective", "fov": 30, "to_world": look, "film": film, "sampler": sampler}
 
 
 def path(mi, kind="twillight_path", **properties):
@@ -57,8 +54,7 @@ def test_first_footprints_are_those_of_the_gbuffer(scalar):
     """Rays through the middles of pixels of the scene `drape`; both know places in single precision."""
     import drjit as dr
 
-    loaded = load(SHIPPED["drape"], SceneOptions(variant="scalar_rgb", curvature="none"))
-    size = (24, 18)
+    loaded, size = load(SHIPPED["drape"], SceneOptions(variant="scalar_rgb", curvature="none")), (24, 18)
     gbuffer = render(loaded, size=size).gbuffers["wool_gabardine"]
     camera = loaded.camera.sensor(scalar, size)
     for index in range(0, len(gbuffer.pixel), 17):
@@ -73,10 +69,8 @@ def test_first_footprints_are_those_of_the_gbuffer(scalar):
 
 
 def test_a_bounce_widens_the_footprint(scalar):
-    """A ray straight down four units to a floor and up again two units to a ceiling of side 2, u from 0 to 1.
-
-    Its cone is PIXEL * .01 wide for every unit of way; the bounce, of density 3, adds 2 / sqrt(4 pi 3).
-    """
+    """A ray straight down four units to a floor and up again two units to a ceiling of side 2, u from 0 to 1. Its cone
+    is PIXEL * .01 wide for every unit of way; the bounce, of density 3, adds 2 / sqrt(4 pi 3)."""
     import drjit as dr
 
     mi = scalar
@@ -112,16 +106,9 @@ def test_a_rare_direction_widens_no_more_than_an_even_one(scalar):
 
 def test_light_transport_is_that_of_mitsubas_path_tracer(mi):
     """Two diffuse floors, a point light and an even sky: means of 8 pictures each, a z-test at .1 %."""
-    scene = mi.load_dict(
-        {
-            "type": "scene",
-            "floor": floor(mi, 2.0),
-            "shelf": floor(mi, 0.5, 0.6),
-            "sky": {"type": "constant", "radiance": 0.3},
-            "lamp": {"type": "point", "position": [1.0, 1.0, 2.0], "intensity": 3.0},
-            "sensor": sensor(mi),
-        }
-    )
+    lights = {"sky": {"type": "constant", "radiance": 0.3}, "lamp": LAMP}
+    floors = {"floor": floor(mi, 2.0), "shelf": floor(mi, 0.5, 0.6)}
+    scene = mi.load_dict({"type": "scene", **floors, **lights, "sensor": sensor(mi)})
     means, errors = [], []
     # In evaluated loops `path` of Mitsuba 3.9.1 loses light.
     theirs = "path" if mi.variant().startswith("scalar") else "prb"
@@ -149,8 +136,7 @@ def test_hidden_lights_are_hidden(scalar):
 def test_mitsubas_own_integrators_show_cloth_where_they_are_evaluated(llvm, kind):
     """Direct light alone, with a footprint that all know, and the same random numbers: the same picture."""
     cloth = {**floor(llvm, 0.8), "bsdf": {"type": "twillight", "fabric": "denim", "yarns": 10.0, "sigma": 0.5}}
-    lamp = {"type": "point", "position": [1.0, 1.0, 2.0], "intensity": 3.0}
-    scene = llvm.load_dict({"type": "scene", "cloth": cloth, "lamp": lamp, "sensor": sensor(llvm)})
+    scene = llvm.load_dict({"type": "scene", "cloth": cloth, "lamp": LAMP, "sensor": sensor(llvm)})
     other = path(llvm, kind, **({"max_depth": 2} if kind == "prb" else {}))
     with pytest.raises(RuntimeError) as caught:
         llvm.render(scene, integrator=other, spp=1)
@@ -191,10 +177,8 @@ def test_a_mesh_without_uv_is_one_sentence(scalar):
 @pytest.mark.external
 @NEEDS_LLVM
 def test_rays_pass_a_silhouette_and_the_shape_behind_it(llvm, monkeypatch):
-    """A tube of black cloth, too thick to shine through, before a white sky: a row shows 1 less its coverage.
-
-    Coverage is that of the scene's renderer with 16 rays a pixel; a row has 24 pixels of 64 samples, 0 or 1 each.
-    """
+    """A tube of black cloth, too thick to shine through, before a white sky: a row shows 1 less its coverage. Coverage
+    is that of the scene's renderer with 16 rays a pixel; a row has 24 pixels of 64 samples, 0 or 1 each."""
     denim, radius, spacing, size = load_fabric("denim"), 0.5, 0.0625, 24
     black = {"specular": (0.0,) * 3, "diffuse": (0.0,) * 3, "diffuse_transmission": (0.0,) * 3}
     yarns = {side: getattr(denim, side).model_copy(update=black) for side in ("warp", "weft")}
@@ -203,24 +187,20 @@ def test_rays_pass_a_silhouette_and_the_shape_behind_it(llvm, monkeypatch):
 
     def scene(mi, bsdf):
         look = mi.ScalarTransform4f().look_at([0, -3, radius], [0, 0, radius], [0, 0, 1])
-        film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
+        to_world = look @ mi.ScalarTransform4f().scale([0.1, 0.1, 1])
+        camera = sensor(mi, size, 64) | {"type": "orthographic", "to_world": to_world}
+        del camera["fov"]
         return {
             "type": "scene",
             "sky": {"type": "constant", "radiance": 1.0},
             "roll": {"type": "cylinder", "p0": [-4, 0, 0], "p1": [4, 0, 0], "radius": radius, "bsdf": bsdf},
-            "camera": {
-                "type": "orthographic",
-                "to_world": look @ mi.ScalarTransform4f().scale([0.1, 0.1, 1]),
-                "film": film,
-                "sampler": {"type": "independent", "sample_count": 64},
-            },
+            "camera": camera,
         }
 
-    def source(mi):
-        return scene(mi, wears("denim"))
-
     options = SceneOptions(variant="llvm_ad_rgb", environment_directions=4)
-    loaded = sharpened(load(Scene(name="tube", source=source, cloths={"denim": cloth}), options), 4)
+    loaded = sharpened(
+        load(Scene(name="tube", source=lambda mi: scene(mi, wears("denim")), cloths={"denim": cloth}), options), 4
+    )
     gbuffer = render(loaded, size=(4 * size, 4 * size)).gbuffers["denim"]
     covered = np.zeros(gbuffer.mask.size)
     covered[gbuffer.pixel] = gbuffer.coverage(quick_coverage(denim, gbuffer.rims(denim.repeat)))

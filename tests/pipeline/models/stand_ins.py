@@ -119,8 +119,7 @@ def written(folder, network):
         assert old in text
         path.write_text(text.replace(old, new))
         source = locate(f"{path}:Theirs")
-        return AddedMethod(
-            name="theirs", source=source.text, sha256=source.sha256(), stated="1", has_network=True, **fields
-        )
+        facts = {"name": "theirs", "source": source.text, "sha256": source.sha256(), "stated": "1"}
+        return AddedMethod(**facts, has_network=True, **fields)
 
     return options

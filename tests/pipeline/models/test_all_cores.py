@@ -1,5 +1,3 @@
-"""A method on all cores gives the method's own answers, whatever the number of threads, and several at a time."""
-
 from threading import Barrier
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""What a model was not taught is refused, by name."""
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +8,7 @@ from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from tests.directions import unit
 from tests.pipeline.truth.cloths import woven
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -31,6 +30,8 @@ def test_what_was_taught_is_answered():
     wide = Domain.of({"queries": WIDE.model_dump()}, FABRICS)
     wide.refuse(draw_queries(WIDE, (4, 4), 1, 0, 32), "m")
     assert PLAIN.kinds == frozenset() and wide.kinds == {"behind", "stretch", "curvature"}
+    rays = Domain.of({"truth": {"parallax": True, "walls": "rim"}}, FABRICS).rays
+    assert rays == (True, True) and PLAIN.rays == (False, False)
     assert not PLAIN.out_of_domain(DENIM, one(light=89.99, viewer=89.99)).any()
     PLAIN.refuse_fabric(DENIM, "m")
     PLAIN.refuse_truth(TruthOptions(relative_error=0.1), "m")
@@ -45,7 +46,6 @@ def test_what_was_taught_is_answered():
     ],
 )
 def test_what_was_not_taught_is_refused_by_name(options, message):
-    """Kinds of queries; viewers behind the cloth; yarns outside the ranges; other physics."""
     with pytest.raises(BadInput, match=message):
         PLAIN.refuse(asked(**options), "m")
     behind = asked()
@@ -60,14 +60,10 @@ def test_what_was_not_taught_is_refused_by_name(options, message):
 
 def one(sigma=1.0, minor=None, light=10.0, viewer=10.0, curvature=0.0):
     """A single query: axes in yarn spacings, angles to the normal in degrees."""
-    queries = draw_queries(QueryOptions(), (4, 4), 1, 0, 1)
-
-    def towards(angle):
-        return np.array([[np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))]], np.float32)
-
     columns = {"sigma": sigma, "sigma_minor": minor or sigma, "curvature": curvature}
+    columns |= {"wi": unit(light, 0.0), "wo": unit(viewer, 0.0)}
     columns = {name: np.array([value], np.float32) for name, value in columns.items()}
-    return queries._replace(wi=towards(light), wo=towards(viewer), **columns)
+    return draw_queries(QueryOptions(), (4, 4), 1, 0, 1)._replace(**columns)
 
 
 @pytest.mark.parametrize(
@@ -137,9 +133,8 @@ def test_a_model_taught_what_a_scene_requires_answers_for_it(low, factor, angle,
     """But for the rarest: 5e-4 at either end of the sizes, and of the largest ratio, curvature and angles."""
     options = QueryOptions(sigma=(low, low * factor), max_angle=angle, stretch=stretch, curvature=curvature)
     asked = draw_queries(options, (4, 4), 2, 0, 4000)
-    taught = Requirement.of(
-        "made up", 1, {"denim": asked}, (0.0, 0.3, 1.0), ("small", "middle", "large"), margin
-    ).queries()
+    names = ("small", "middle", "large")
+    taught = Requirement.of("made up", 1, {"denim": asked}, (0.0, 0.3, 1.0), names, margin).queries()
     domain = Domain.of({"queries": taught.model_dump()}, [DENIM])
     assert not domain.faults(asked, "m")
     # Two ends and four quantities, of 4,000 queries: two each, and one more for the quantile between two of them.

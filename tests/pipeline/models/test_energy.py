@@ -25,6 +25,7 @@ from pipeline.truth.query import Queries
 from tests.directions import unit
 from tests.pipeline.analytic import methods
 from tests.pipeline.models.stand_ins import FakeMethod
+from tests.pipeline.truth.cloths import fixed
 from tests.presets import slow
 from weaves.draft import Draft
 from weaves.fabric import Fabric
@@ -32,7 +33,7 @@ from weaves.yarn import Yarn
 
 LEVEL = 1e-3
 COUNT = 256  # directions of light
-FEW = TruthOptions(estimator="owen", relative_error=1e-9, min_count=32, max_count=32)
+FEW = fixed(32)
 RNG = np.random.default_rng
 
 
@@ -67,9 +68,8 @@ def legal_cloth(index):
         return {**shape, **optics, "specular": specular, "diffuse": diffuse, "diffuse_transmission": through}
 
     draft = {"family": "matrix", "rows": matrices(random)}
-    return Fabric.model_validate(
-        {"name": "legal", "optical_thickness": thickness, "draft": draft, "warp": yarn(), "weft": yarn()}
-    )
+    content = {"name": "legal", "optical_thickness": thickness, "draft": draft, "warp": yarn(), "weft": yarn()}
+    return Fabric.model_validate(content)
 
 
 def look(index, fabric):
@@ -95,11 +95,8 @@ def points(fabric, queries):
 
 def soft_nodes(fabric, queries):
     table = methods.soft_table(fabric, behind=True)
-    components = _by_rows(
-        queries,
-        (queries.wi[:, 2] >= 0.0, lambda part: read_queries(table, part).components),
-        (queries.wi[:, 2] < 0.0, lambda part: read_behind(table, part)[:, :4]),
-    )
+    front = queries.wi[:, 2] >= 0.0, lambda part: read_queries(table, part).components
+    components = _by_rows(queries, front, (~front[0], lambda part: read_behind(table, part)[:, :4]))
     return components, float(read_behind(table, queries.take(slice(1))._replace(wi=-queries.wo[:1]))[0, 4])
 
 

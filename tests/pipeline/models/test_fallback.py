@@ -1,5 +1,3 @@
-"""A method for any query: nearest forms where there are any, quadrature where there are none."""
-
 import numpy as np
 import pytest
 
@@ -9,13 +7,12 @@ from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.curved.model import Curved, CurvedNetwork
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import FLAT_TURN, Fallback, fallback_answers
-from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.models.against_truth import colour_error
 from tests.pipeline.models.stand_ins import SMALL, FakeMethod
-from tests.pipeline.truth.cloths import woven
+from tests.pipeline.truth.cloths import fixed, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -65,9 +62,8 @@ def test_coverage_is_the_methods_own_up_to_its_curvature_and_that_of_a_few_rays_
     about = {"queries": QueryOptions(curvature=(0.01, 0.2)).model_dump(mode="json")}
     fallback = fallback_of(fabric, about, {"curvature"})
     np.testing.assert_array_equal(fallback.coverage(fabric, queries), quick_coverage(fabric, queries))
-    method = fallback.method
-    method.coverage = lambda fabric, looks: np.full(len(looks.u), 0.5, np.float32)
-    fallback = Fallback(method, {"curvature"})
+    fallback.method.coverage = lambda fabric, looks: np.full(len(looks.u), 0.5, np.float32)
+    fallback = Fallback(fallback.method, {"curvature"})
     own = queries.curvature <= np.float32(0.2)
     assert 5 < own.sum() < 35
     expected = np.where(own, np.float32(0.5), quick_coverage(fabric, queries))
@@ -82,19 +78,16 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
     np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
     found = fallback.predict(fabric, queries)
     assert (found[~strange] == 1.0).all()
-    truth = TruthOptions(estimator="owen", min_count=8192, max_count=8192, relative_error=1e-6)
-    reference = estimate(fabric, queries.take(strange), truth, 1)
+    reference = estimate(fabric, queries.take(strange), fixed(8192), 1).mean
     # Asked for 10 % of each answer's length, and an absolute error where it is dark.
-    wrong = np.linalg.norm(found[strange] - reference.mean, axis=1)
-    size = np.linalg.norm(reference.mean, axis=1)
-    assert np.median(wrong / size) < 0.1
-    assert wrong.sum() < 0.1 * size.sum()
+    wrong, size = (np.linalg.norm(part, axis=1) for part in (found[strange] - reference, reference))
+    assert np.median(wrong / size) < 0.1 and wrong.sum() < 0.1 * size.sum()
 
 
 @pytest.mark.parametrize("name", ["denim", slow("voile")])
-def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
+def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name, selvage):
     """Soft nodes and `selvage` turn the cloth; the truth of the back is the reference."""
-    fabric, (selvage,) = load_fabric(name), load_model(pretrained_folder("selvage"))
+    fabric = load_fabric(name)
     queries = draw_queries(QueryOptions(behind=0.4, sigma=(0.3, 2.0), max_angle=60.0), (4, 4), 5, 0, 200)
     turned = queries.turned()
     assert (turned.wo[:, 2] < 0).all()
@@ -120,9 +113,8 @@ def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
 
 
 @pytest.mark.slow
-def test_a_method_may_answer_outside_its_domain_itself():
+def test_a_method_may_answer_outside_its_domain_itself(selvage):
     """`selvage` does, by its soft nodes; the network answers within the domain, and nothing is left to the fallback."""
-    (selvage,) = load_model(pretrained_folder("selvage"))
     fallback = Fallback(selvage, selvage.without_training)
     queries = draw_queries(QueryOptions(sigma=(1e-3, 1.0), behind=0.3), DENIM.weave.repeat, 3, 0, 200)
     assert not fallback.out_of_domain(ROUGH, queries).any()
@@ -142,11 +134,9 @@ def test_what_stands_in_is_the_truth_of_ellipses_on_flat_and_on_curved_cloth(tur
     queries = draw_queries(kinds, fabric.weave.repeat, 6, 0, 64)
     size = np.sqrt(queries.sigma * queries.sigma_minor)
     queries = queries._replace(curvature=(turned / size).astype(np.float32))
-    truth = TruthOptions(estimator="owen", min_count=4096, max_count=4096, relative_error=1e-6)
-    reference = estimate(fabric, queries, truth, 1).mean
+    reference = estimate(fabric, queries, fixed(4096), 1).mean
     wrong = fallback_answers(fabric, queries, 0) - reference
-    mean = reference.sum(axis=1).mean()
-    assert np.sqrt(np.square(wrong).sum(axis=1).mean()) < bound * mean
+    assert np.sqrt(np.square(wrong).sum(axis=1).mean()) < bound * reference.sum(axis=1).mean()
 
 
 def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_method():
@@ -154,8 +144,7 @@ def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_met
     fallback = fallback_of(fabric, {"queries": {"sigma": [0.3, 1.0], "max_angle": 60.0}})
     queries = draw_queries(QueryOptions(sigma=(0.05, 32.0)), fabric.weave.repeat, 5, 0, 400)
     strange = fallback.out_of_domain(fabric, queries)
-    cosine = np.cos(np.radians(60.0))
-    steep = np.minimum(queries.wi[:, 2], queries.wo[:, 2]) < cosine
+    steep = np.minimum(queries.wi[:, 2], queries.wo[:, 2]) < np.cos(np.radians(60.0))
     small = queries.sigma < 0.3
     assert 0 < strange.sum() < 400 and strange[small & steep].all()
     # The repeat of a plain weave is 2: a footprint of 1 yarn sees its average, and larger ones are asked as that.

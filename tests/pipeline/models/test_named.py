@@ -1,5 +1,3 @@
-"""Names of methods on a command line: what they load, and the sentences for those that load nothing."""
-
 import numpy as np
 import pytest
 

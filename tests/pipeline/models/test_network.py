@@ -1,15 +1,13 @@
-"""What all networks have in common: answers of restored weights, chunks, domains, and the part run for every query."""
-
 import numpy as np
 import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.analytic.point_sampled import PointSampledOptions
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain
 from pipeline.models.network import NetworkMethod, Portable, evaluated, restored
 from pipeline.models.neumip.model import NeumipNetwork
-from pipeline.models.registry import load_methods, restore_methods
+from pipeline.models.registry import restore_methods
 from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
@@ -21,10 +19,8 @@ DENIM, BASKET = load_fabric("denim"), load_fabric("basket")
 
 @pytest.mark.parametrize("model", SMALL)
 def test_restored_weights_answer_alike_also_at_extremes(model):
-    """Finite and not negative; alike in every repeat, and wherever a footprint sees thousands of them.
-
-    A network of one material knows its fabric whatever its name is; any other answers for a fabric never seen.
-    """
+    """Finite and not negative; alike in every repeat, and wherever a footprint sees thousands of them. A network of one
+    material knows its fabric whatever its name is; any other answers for a fabric never seen."""
     options = SMALL[model]
     network = untrained(options, DENIM)
     if model == "selvage":  # its last layer begins at zero: it would be soft nodes
@@ -33,10 +29,8 @@ def test_restored_weights_answer_alike_also_at_extremes(model):
     fabric = DENIM if options.of_one_material else BASKET
     assert method.covers(fabric) and method.covers(fabric.model_copy(update={"name": "other"}))
     assert method.covers(BASKET) != options.of_one_material
-    angles = np.radians([0.0, 89.0, 89.9])
-    sigma, i, o, centre = np.meshgrid(
-        [1e-4, 0.25, 1e4], angles, angles, [0.25, 0.25 - 2**20, 0.0, -1e-30], indexing="ij"
-    )
+    angles, centres = np.radians([0.0, 89.0, 89.9]), [0.25, 0.25 - 2**20, 0.0, -1e-30]
+    sigma, i, o, centre = np.meshgrid([1e-4, 0.25, 1e4], angles, angles, centres, indexing="ij")
     wi, wo = (np.stack([x * np.sin(w), y * np.sin(w), np.cos(w)], -1) for w, x, y in ((i, 0.6, 0.8), (o, 1.0, 0.0)))
     columns = (centre, -3.0 * centre, sigma)
     queries = Queries.round(*(column.ravel() for column in columns), wi.reshape(-1, 3), wo.reshape(-1, 3))
@@ -52,7 +46,6 @@ def test_restored_weights_answer_alike_also_at_extremes(model):
 
 
 def test_each_fabric_is_answered_by_its_own_network_and_their_domains_are_joined():
-    """Whichever was read last: ranges hold those of every fabric and nothing more."""
     options, cloths = SMALL["neumip"], [load_fabric(name) for name in ("denim", "silk_charmeuse", "polyester_lining")]
     parts = [(card_of(cloth, Domain.of({}, [cloth])), untrained(options, cloth).state_dict()) for cloth in cloths]
     queries = draw_queries(QueryOptions(), (4, 4), 5, 0, 8)
@@ -73,18 +66,13 @@ def test_the_network_of_selvage_alone_answers_what_the_method_does(bound):
     network = SelvageNetwork(SMALL["selvage"], [DENIM])
     torch.nn.init.normal_(network.last.weight, std=0.3)  # they are 0 at first
     method = Selvage(network).with_bound(bound)
-    assert isinstance(method, Portable)
+    assert isinstance(method, Portable) and not isinstance(SoftNodes(), Portable)
     queries = draw_queries(QueryOptions(), DENIM.weave.repeat, 2, 0, 300)
     own = method.predict(DENIM, queries)
     assert np.abs(own).max() > 0
     # The same products in another order: a few roundings of the largest terms.
     answers = method.per_query(DENIM).answered(queries)
     np.testing.assert_allclose(answers, own, rtol=1e-4, atol=1e-5 * np.abs(own).max())
-
-
-def test_what_learns_nothing_has_no_such_part():
-    (method,) = load_methods(PointSampledOptions(counts=(2,)))
-    assert not isinstance(method, Portable)
 
 
 @pytest.mark.parametrize("chunk", [1, 10, 37, 100])

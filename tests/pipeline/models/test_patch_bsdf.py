@@ -1,7 +1,5 @@
-"""`sample`, `pdf` and `eval` agree: chi-square over the sphere, means of weights, the delta lobe; bad input."""
-
 import math
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -38,10 +36,10 @@ CONFIGURATIONS = {
 
 
 def looks_of(name, count, wi=None):
-    _, major, minor, angle, theta, phi = CONFIGURATIONS[name]
-    columns = (np.full(count, value, np.float32) for value in (0.62, 0.57, major, minor, angle, 0.0))
+    _, *numbers, theta, phi = CONFIGURATIONS[name]
+    columns = (np.full(count, value, np.float32) for value in (0.62, 0.57, *numbers, 0.0))
     u, v, sigma, sigma_minor, angle, curvature = columns
-    wo = np.tile(np.array(unit(theta, phi), np.float32), (count, 1))
+    wo = np.tile(np.float32(unit(theta, phi)), (count, 1))
     return Queries(u, v, sigma, wo if wi is None else wi.astype(np.float32), wo, sigma_minor, angle, curvature)
 
 
@@ -58,12 +56,10 @@ def expected_shares(bsdf, name):
     return pdf.reshape(ROWS, NODES, COLUMNS, NODES).sum(axis=(1, 3)) * cell
 
 
-@pytest.mark.parametrize("names", [("ellipse", "behind"), slow(*[tuple(CONFIGURATIONS)])])
+@pytest.mark.parametrize("names", [("ellipse", "voile", "behind"), slow(*[tuple(CONFIGURATIONS)])])
 def test_samples_follow_their_density(names):
-    """Chi-square over the cells of the sphere and the delta lobe, those of fewer than 20 expected samples pooled.
-
-    Sidak over the configurations at LEVEL.
-    """
+    """Chi-square over the cells of the sphere and the delta lobe, those of fewer than 20 expected samples pooled. Sidak
+    over the configurations at LEVEL."""
     values = {}
     for number, name in enumerate(names):
         bsdf, looks = bsdf_of(name), looks_of(name, COUNT)
@@ -106,6 +102,21 @@ def test_weights_have_the_integral_of_eval_as_their_mean():
         assert scattered + through <= 1.0, name
     limit = stats.norm.isf(0.5 * (1 - (1 - LEVEL) ** (1 / len(scores))))
     assert max(scores.values()) < limit, (limit, scores)
+
+
+@pytest.mark.parametrize("name", ["front", slow("voile"), slow("grazing"), slow("behind")])
+def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name, monkeypatch):
+    """A z-test at LEVEL of light that is no longer in the lobes' shares, against even directions."""
+    for table, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
+        monkeypatch.setattr(bounces, table, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
+    one, count, wi = bsdf_of(name), 20_000, sphere(80, 160)
+    every, queries, looks = PatchBSDF(one.fabric, bounces="all"), looks_of(name, len(wi), wi), looks_of(name, count)
+    first, even = (bsdf.eval(queries) @ LUMINANCE for bsdf in (one, every))
+    scattered = even.mean() * 4.0 * math.pi
+    assert scattered > 1.005 * first.mean() * 4.0 * math.pi
+    sample = every.sample(looks, np.random.default_rng(11).random((count, 3)))
+    values = np.where(sample.straight, 0.0, sample.weight @ LUMINANCE)
+    assert abs(values.mean() - scattered) < stats.norm.isf(0.5 * LEVEL) * values.std() / math.sqrt(count)
 
 
 @pytest.mark.parametrize("name", ["ellipse", "voile", "behind"])

@@ -11,9 +11,12 @@ from weaves.errors import BadInput
 WOVEN = WovenOptions().model_dump(mode="json", context=IDENTITY)
 
 
-def test_an_unknown_model_names_the_nearest():
+def test_unknown_models_and_other_options_than_the_trained_ones_are_bad_input(tmp_path):
     with pytest.raises(BadInput, match="did you mean 'neumip'"):
         module_of("neumipp")
+    write_model(tmp_path, b"", {"options": WOVEN, "version": {"model": 1}})
+    with pytest.raises(BadInput, match="other options"):
+        load_methods(WovenOptions(hidden=16), [tmp_path])
 
 
 @pytest.mark.parametrize(
@@ -29,9 +32,3 @@ def test_folders_that_hold_no_model_are_bad_input(tmp_path, options, version, we
     write_model(tmp_path, weights, {"options": options, "version": {"model": version}})
     with pytest.raises(BadInput, match=refused):
         load_model(tmp_path)
-
-
-def test_other_options_than_the_trained_ones_are_bad_input(tmp_path):
-    write_model(tmp_path, b"", {"options": WOVEN, "version": {"model": 1}})
-    with pytest.raises(BadInput, match="other options"):
-        load_methods(WovenOptions(hidden=16), [tmp_path])

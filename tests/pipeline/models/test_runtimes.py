@@ -1,5 +1,3 @@
-"""Ways to run a method: closed forms of their rounding, agreement in single precision, and what a machine lacks."""
-
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
@@ -76,8 +74,7 @@ def test_any_number_of_rows_in_their_order(runtime):
 def test_onnx_agrees_in_single_precision_and_fabrics_share_one_module(monkeypatch):
     loads = []
     plain = RUNTIMES["onnx"]
-    noted = plain._replace(load=lambda *given: loads.append(given) or plain.load(*given))
-    monkeypatch.setitem(RUNTIMES, "onnx", noted)
+    monkeypatch.setitem(RUNTIMES, "onnx", plain._replace(load=lambda *x: loads.append(x) or plain.load(*x)))
     woven = Woven(WovenNetwork(SMALL["woven"]))
     run = RunBy(woven, "onnx")
     assert (run.name, run.setting) == ("woven", "onnx")
@@ -120,17 +117,13 @@ def test_torch_compiles_a_module_and_any_thread_may_call_it():
         np.testing.assert_allclose(answers, method.predict(DENIM, queries), rtol=1e-5, atol=1e-5)
 
 
-def test_an_answer_of_its_own_is_refused(monkeypatch):
+def test_answers_of_its_own_and_what_was_not_taught_are_refused(monkeypatch):
     wrong = Runtime(lambda: "", lambda module, *_: runtimes._Program(lambda *given: 1.001 * module(*given)))
     monkeypatch.setitem(RUNTIMES, "onnx", wrong)
     with pytest.raises(WorkFailed, match=r"linear by onnx on denim: answers differ .* by 1\.0e-03, beyond 0\.0001"):
         RunBy(Linear(np.eye(4, 3)), "onnx").prepare(DENIM)
-
-
-def test_what_was_not_taught_is_refused_however_it_is_run():
-    run = RunBy(Linear(np.eye(4, 3)), "eager-bf16")
     with pytest.raises(BadInput, match="viewer's side only"):
-        run.predict(DENIM, asked(50, behind=1.0))
+        RunBy(Linear(np.eye(4, 3)), "eager-bf16").predict(DENIM, asked(50, behind=1.0))
 
 
 def test_what_the_machine_lacks_is_left_out_with_its_reason(monkeypatch):
@@ -139,8 +132,5 @@ def test_what_the_machine_lacks_is_left_out_with_its_reason(monkeypatch):
     assert [run.setting for run in runs(method, names)] == ["eager-bf16"]
     assert not_run(method, names) == {"compile": "no compiler"}
     assert not runs(SoftNodes(), names) and not not_run(SoftNodes(), names)
-
-
-def test_lacking_packages_are_named(monkeypatch):
     monkeypatch.setattr(runtimes.importlib.util, "find_spec", lambda name: None if name == "onnxscript" else object())
     assert RUNTIMES["onnx"].missing() == "not installed: onnxscript"

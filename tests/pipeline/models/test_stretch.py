@@ -1,5 +1,3 @@
-"""Every method that says it knows footprints of any shape, asked about ellipses at all angles, against the truth."""
-
 import pytest
 
 from pipeline.models.analytic.point_sampled import PointSampledOptions

@@ -1,4 +1,4 @@
-"""Light between yarns in the colours of a cloth."""
+from functools import partial
 
 import numpy as np
 import pytest
@@ -25,11 +25,12 @@ def few_walks(monkeypatch):
     """Make small tables, and count them."""
     made = []
 
-    def small(fabric):
+    def small(fabric, through=False):
         made.append(fabric)
-        return table.bounce_table(fabric, 1 << 10)
+        return table.bounce_table(fabric, 1 << 10, through)
 
     monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(small))
+    monkeypatch.setattr(bounces, "_TABLES_THROUGH", bounces.PerFabric(partial(small, through=True)))
     return made
 
 
@@ -60,14 +61,34 @@ def test_a_thread_sends_on_light_in_its_own_colour():
 def test_cloth_seen_from_behind_is_the_cloth_of_its_back():
     flip = np.float32([1.0, 1.0, -1.0])
     behind = shade(CLOTH, NONE, _queries(WI * flip, WO * flip), "all")
-    assert behind == pytest.approx(shade(CLOTH.back(), NONE, _queries(), "all"))
-    assert behind.max() > 0.0
+    assert behind == pytest.approx(shade(CLOTH.back(), NONE, _queries(), "all")) and behind.max() > 0.0
 
 
-def test_transmitted_light_has_one_bounce():
-    """All bounces of it are not known: nothing is added."""
+def test_no_light_comes_through_closed_cloth_that_transmits_none():
     queries = _queries(WI * np.float32([1.0, 1.0, -1.0]))
     assert shade(CLOTH, NONE, queries, "all").max() == 0.0
+
+
+def test_what_is_transmitted_has_colours_of_its_own():
+    """From behind, one channel each: without k_dt only gaps let light in; k_d makes more of what k_dt lets through."""
+    cloth = woven("gauze", diffuse=(0.6, 0.3, 0.6), diffuse_transmission=(0.3, 0.3, 0.0))
+    queries = _queries(WI * np.float32([1.0, 1.0, -1.0]))
+    light = shade(cloth, NONE, queries, "all")
+    assert (light > 0.0).all() and (light[:, 0] > 1.2 * light[:, 1]).all() and (light[:, 2] < 0.5 * light[:, 0]).all()
+    turned = _queries(WI, WO * np.float32([1.0, 1.0, -1.0]))
+    assert light == pytest.approx(shade(cloth.back(), NONE, turned, "all"), rel=1e-6)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_sum_over_both_ways_is_that_of_the_table(side):
+    """A cloth of one colour of threads: its own colours and the mean ones are the same."""
+    cloth = woven("voile", diffuse=(0.6, 0.3, 0.6), diffuse_transmission=(0.3, 0.2, 0.1))
+    queries = _queries(WI * np.float32([1.0, 1.0, side]))
+    yarns = cloth.warp, cloth.weft
+    colours = np.array([yarn.diffuse_rgb for yarn in yarns] + [yarn.diffuse_transmission_rgb for yarn in yarns])
+    light = table.bounced(bounces._TABLES_THROUGH.of(cloth), queries.wi, queries.wo, colours) * colours
+    found = bounces.later_bounces(cloth, queries, colours_of(cloth, queries))
+    assert found == pytest.approx(light[:, :2] + light[:, 2:], rel=1e-6)
 
 
 @pytest.mark.parametrize("number", [0, 2, "none"])

@@ -1,5 +1,3 @@
-"""Frames of Mitsuba scenes against closed forms: plane, cylinder, spheres, shadows, lights and backdrops."""
-
 import math
 
 import numpy as np
@@ -33,7 +31,6 @@ def framed(parts, eye=(0.0, -3.0, 2.0), camera=None, cloth=None, frame=0.0, opti
 
 
 def shot(parts, **choices):
-    """Return the G-buffer of a frame."""
     return framed(parts, **choices).gbuffers["denim"]
 
 
@@ -53,9 +50,30 @@ def rays(x, y, eye=(0.0, -3.0, 2.0)):
 
 
 def on_floor(x, y):
-    """Return where the rays meet z = 0."""
     eye, ray = np.array([0.0, -3.0, 2.0]), rays(x, y)
     return eye + ray * (-eye[2] / ray[..., 2])[..., None]
+
+
+def parallel(eye, size=1.0, up=(0, 0, 1)):
+
+    def camera(mi):
+        look = mi.ScalarTransform4f().look_at(list(eye), [0, 0, 0], list(up))
+        return {"type": "orthographic", "to_world": look @ mi.ScalarTransform4f().scale([size, size, 1])}
+
+    return camera
+
+
+RADIUS, SPACING = 0.7, 0.05
+
+
+def tube(mi):
+    """Return a tube of RADIUS along x, lit by the sun; its cloth has yarns SPACING apart."""
+    shape = {"type": "cylinder", "p0": [-2, 0, 0], "p1": [2, 0, 0], "radius": RADIUS}
+    return {"tube": {**shape, "b": WEARS}, "s": SUN}
+
+
+def on_tube(turn=0.0):
+    return Cloth(yarns=(2 * math.pi * RADIUS / SPACING, 4 / SPACING), turn=turn)
 
 
 def pixels(gbuffer):
@@ -64,11 +82,9 @@ def pixels(gbuffer):
 
 
 def test_a_plane_agrees_with_its_rays():
-    """Positions, directions and footprints of a floor, the ellipse by differences of the closed form.
-
-    Mitsuba reckons in single precision: 1e-5 of the floor's size for positions, 1e-3 for its differences over a pixel
-    to the right and one downwards; in this small picture the far edge's derivative differs from those by 7 %.
-    """
+    """Positions, directions and footprints of a floor, the ellipse by differences of the closed form. Mitsuba reckons
+    in single precision: 1e-5 of the floor's size for positions, 1e-3 for its differences over a pixel to the right and
+    one downwards; in this small picture the far edge's derivative differs from those by 7 %."""
     turn, yarns = 30.0, (80.0, 60.0)
     gbuffer = shot(floor, cloth=Cloth(yarns=yarns, turn=turn))
     x, y = pixels(gbuffer)
@@ -107,58 +123,39 @@ def test_a_plane_agrees_with_its_rays():
 @pytest.mark.parametrize(("turn", "askew"), [(0.0, 0.0), (0.0, 0.8), (35.0, 0.8), (0.0, 12.0)])
 def test_a_cylinders_curvature_is_eulers(turn, askew):
     """Spacing over radius straight across, 0 along the axis, Euler's in between; parallel rays from askew."""
-    radius, spacing = 0.7, 0.05
     towards = np.array([askew, -1.0, 0.6]) / np.linalg.norm([askew, -1.0, 0.6])
-
-    def camera(mi):
-        look = mi.ScalarTransform4f().look_at((3 * towards).tolist(), [0, 0, 0], [0, 0, 1])
-        return {"type": "orthographic", "to_world": look}
-
-    def parts(mi):
-        tube = {"type": "cylinder", "p0": [-2, 0, 0], "p1": [2, 0, 0], "radius": radius}
-        return {"tube": {**tube, "b": WEARS}, "s": SUN}
-
-    cloth = Cloth(yarns=(2 * math.pi * radius / spacing, 4 / spacing), turn=turn)
-    gbuffer = shot(parts, camera=camera, cloth=cloth)
+    gbuffer = shot(tube, camera=parallel((3 * towards).tolist()), cloth=on_tube(turn))
     # In the local frame the circumference runs along u, which the turn takes to (cos, -sin).
     along = np.arctan2(gbuffer.wo[:, 1], gbuffer.wo[:, 0]) + math.radians(turn)
     sure = (gbuffer.wo[:, 2] > 0.04) & (gbuffer.wo[:, 2] < 0.999)
-    expected = spacing / radius * np.cos(along) ** 2
+    expected = SPACING / RADIUS * np.cos(along) ** 2
     assert sure.sum() > 400
     if askew == 0.0:
-        assert expected[sure] == pytest.approx(spacing / radius, rel=1e-4)
+        assert expected[sure] == pytest.approx(SPACING / RADIUS, rel=1e-4)
     # Less than 1e-4 counts as flat.
     assert gbuffer.curvature[sure & (expected < 0.9e-4)] == pytest.approx(0.0)
     sure &= expected > 1.1e-4
-    np.testing.assert_allclose(gbuffer.curvature[sure], expected[sure], atol=2e-4 * spacing / radius)
+    np.testing.assert_allclose(gbuffer.curvature[sure], expected[sure], atol=2e-4 * SPACING / RADIUS)
 
 
 @pytest.mark.parametrize("wall", [False, True])
 def test_the_rim_of_a_tube_is_seen_against_what_is_no_cloth(wall):
     """Rays may leave again up to tan^2 = 8 kappa; where cloth is behind, none is asked."""
-    radius, spacing = 0.7, 0.05
-
-    def camera(mi):
-        return {"type": "orthographic", "to_world": mi.ScalarTransform4f().look_at([0, -3, 0], [0, 0, 0], [0, 0, 1])}
 
     def parts(mi):
-        tube = {"type": "cylinder", "p0": [-2, 0, 0], "p1": [2, 0, 0], "radius": radius}
         behind = mi.ScalarTransform4f().translate([0, 2, 1]).rotate([1, 0, 0], 90)
-        board = (
-            {"board": {"type": "rectangle", "to_world": behind, "b": {**WEARS, "id": "fabric_gauze"}}} if wall else {}
-        )
-        return {"tube": {**tube, "b": WEARS}, **board, "s": SUN}
+        board = {"type": "rectangle", "to_world": behind, "b": {**WEARS, "id": "fabric_gauze"}}
+        return tube(mi) | ({"board": board} if wall else {})
 
-    gbuffer = shot(parts, camera=camera, cloth=Cloth(yarns=(2 * math.pi * radius / spacing, 4 / spacing)))
+    gbuffer = shot(parts, camera=parallel((0, -3, 0)), cloth=on_tube())
     _, row = pixels(gbuffer)
     height = (SIZE[1] / 2 - row) * 2 / SIZE[0]  # the film is two wide
-    on_tube = np.abs(height) < radius - 1e-3
-    cosine = np.sqrt(np.clip(1 - (height / radius) ** 2, 0, 1))
-    slope = cosine / np.maximum(np.abs(height) / radius, 1e-12)
-    expected = on_tube & (slope**2 < 8 * spacing / radius)
+    cosine = np.sqrt(np.clip(1 - (height / RADIUS) ** 2, 0, 1))
+    slope = cosine / np.maximum(np.abs(height) / RADIUS, 1e-12)
+    expected = (np.abs(height) < RADIUS - 1e-3) & (slope**2 < 8 * SPACING / RADIUS)
     if wall:  # it reaches down to the axis
         expected &= height < 0
-    sure = np.abs(slope**2 - 8 * spacing / radius) > 0.01
+    sure = np.abs(slope**2 - 8 * SPACING / RADIUS) > 0.01
     asked = np.zeros(len(row), bool)
     asked[gbuffer.rim] = True
     assert (asked[sure] == expected[sure]).all() and asked.sum() > 100
@@ -168,14 +165,8 @@ def test_the_rim_of_a_tube_is_seen_against_what_is_no_cloth(wall):
 @pytest.mark.parametrize(("curvature", "rims"), [("at_point", True), ("minimum", False)])
 def test_the_end_of_a_bend_is_no_silhouette(curvature, rims):
     """A quarter of a tube that goes over into a plane: by its curvature alone rays would leave the last of the tube.
-
-    The camera looks slightly down on the plane, so every ray sinks into it; it is too short to be met by those rays.
-    """
-    radius, spacing = 0.4, 0.05
-
-    def camera(mi):
-        look = mi.ScalarTransform4f().look_at([0, -3, 0.03], [0, 0, 0], [0, 0, 1])
-        return {"type": "orthographic", "to_world": look @ mi.ScalarTransform4f().scale([0.1, 0.1, 1])}
+    The camera looks slightly down on the plane, so every ray sinks into it; it is too short to be met by those rays."""
+    radius, camera = 0.4, parallel((0, -3, 0.03), 0.1)
 
     def parts(mi):
         turn = np.linspace(-math.pi / 2, 0, 201)
@@ -189,20 +180,15 @@ def test_the_end_of_a_bend_is_no_silhouette(curvature, rims):
         return {"bend": sheet(mi, "denim", points, np.broadcast_to(normal, points.shape), uv), "s": SUN}
 
     options = SCALAR.model_copy(update={"curvature": curvature})
-    gbuffer = shot(parts, camera=camera, cloth=Cloth(yarns=(1 / spacing, 1 / spacing)), options=options)
-    assert gbuffer.curvature.max() == pytest.approx(spacing / radius, rel=0.02)
+    gbuffer = shot(parts, camera=camera, cloth=Cloth(yarns=(1 / SPACING, 1 / SPACING)), options=options)
+    assert gbuffer.curvature.max() == pytest.approx(SPACING / radius, rel=0.02)
     low = gbuffer.rim_wo[:, 2] < 0.2
     assert low.sum() > 60 if rims else not low.any()
 
 
 def test_a_hollow_is_flat_and_so_is_the_back():
-    def parts(mi):
-        return {
-            "dome": {"type": "cylinder", "p0": [-1, 0, 0], "p1": [1, 0, 0], "flip_normals": True, "b": WEARS},
-            "s": SUN,
-        }
-
-    gbuffer = shot(parts, eye=(-4, -1.5, 1.5), cloth=Cloth(yarns=(300, 300)))
+    dome = {"type": "cylinder", "p0": [-1, 0, 0], "p1": [1, 0, 0], "flip_normals": True, "b": WEARS}
+    gbuffer = shot(lambda mi: {"dome": dome, "s": SUN}, eye=(-4, -1.5, 1.5), cloth=Cloth(yarns=(300, 300)))
     # Through the open end the inside is seen, which is the front; from outside, the back.
     assert (gbuffer.wo[:, 2] > 0).sum() > 100 and (gbuffer.wo[:, 2] < 0).sum() > 100
     assert (gbuffer.curvature == 0).all()
@@ -210,11 +196,8 @@ def test_a_hollow_is_flat_and_so_is_the_back():
 
 def test_left_handed_coordinates_show_the_front_and_no_mirror_image():
     """Mitsuba's sphere counts v from the pole downwards, so v is counted backwards: u to the right, v upwards."""
-
-    def parts(mi):
-        return {"ball": {"type": "sphere", "b": WEARS}, "s": SUN}
-
-    gbuffer = shot(parts, eye=(0, -4, 0), cloth=Cloth(yarns=(200, 100)))
+    ball = {"type": "sphere", "b": WEARS}
+    gbuffer = shot(lambda mi: {"ball": ball, "s": SUN}, eye=(0, -4, 0), cloth=Cloth(yarns=(200, 100)))
     assert (gbuffer.wo[:, 2] > 0).all()
     plane = np.full((2, SIZE[1], SIZE[0]), np.nan)
     plane[:, gbuffer.mask] = gbuffer.u, gbuffer.v
@@ -246,10 +229,6 @@ def test_a_blocker_throws_its_shadow():
 def test_a_backdrop_is_matte_and_the_shadow_of_the_cloth_is_not_seen_behind_it():
     """albedo / pi times 2 cos 45; the cloth lies 1/2 above the floor, its shadow 1/2 to the left."""
 
-    def camera(mi):
-        look = mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0])
-        return {"type": "orthographic", "to_world": look @ mi.ScalarTransform4f().scale([2, 2, 1])}
-
     def parts(mi):
         move = mi.ScalarTransform4f
         matte = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.2, 0.4, 0.6]}}
@@ -260,7 +239,7 @@ def test_a_backdrop_is_matte_and_the_shadow_of_the_cloth_is_not_seen_behind_it()
             "sky": {"type": "constant", "radiance": 0.0},
         }
 
-    frame = framed(parts, camera=camera)
+    frame = framed(parts, camera=parallel((0, 0, 5), 2.0, (0, 1, 0)))
     x, y = np.meshgrid((np.arange(SIZE[0]) + 0.5) / 16 - 2, 1.5 - (np.arange(SIZE[1]) + 0.5) / 16)
     cloth, floor = (np.maximum(np.abs(x), np.abs(y)) < side for side in (0.5, 1.25))
     assert (frame.gbuffers["denim"].mask == cloth).all()
@@ -271,11 +250,8 @@ def test_a_backdrop_is_matte_and_the_shadow_of_the_cloth_is_not_seen_behind_it()
 
 
 def test_point_lights_fall_off_with_the_square():
-    def parts(mi):
-        lamp = {"type": "point", "position": [0.5, 0, 2], "intensity": {"type": "rgb", "value": [1, 2, 3]}}
-        return {**floor(mi), "s": lamp}
-
-    gbuffer = shot(parts)
+    lamp = {"type": "point", "position": [0.5, 0, 2], "intensity": {"type": "rgb", "value": [1, 2, 3]}}
+    gbuffer = shot(lambda mi: {**floor(mi), "s": lamp})
     x, y = pixels(gbuffer)
     towards = np.array([0.5, 0, 2]) - on_floor(x, y)[gbuffer.place]
     square = np.square(towards).sum(axis=1)

@@ -1,5 +1,3 @@
-"""Quadrature of environments against integrals over the sphere."""
-
 import math
 
 import numpy as np
@@ -20,10 +18,8 @@ def test_the_lattice_integrates_low_harmonics(count):
 
 
 def test_an_environment_map_keeps_its_light():
-    """L = 2 + cos(angle to its up axis y): irradiances sum to 8 pi, their vectors to 4 pi / 3 along y.
-
-    1 % for a map of 32 by 64 texels; 4 % for the vectors, which 64 directions round to their cells' centres.
-    """
+    """L = 2 + cos(angle to its up axis y): irradiances sum to 8 pi, their vectors to 4 pi / 3 along y. 1 % for a map of
+    32 by 64 texels; 4 % for the vectors, which 64 directions round to their cells' centres."""
     mi = mitsuba("scalar_rgb")
     cosine = np.cos((np.arange(32) + 0.5) / 32 * math.pi)
     texels = np.repeat(np.repeat((2 + cosine)[:, None, None], 64, axis=1), 3, axis=2).astype(np.float32)

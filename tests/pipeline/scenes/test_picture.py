@@ -1,16 +1,17 @@
-"""Pictures from windows: the same as from one piece, on any number of threads, with layers that sum to them."""
-
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pipeline.analytic.bounces.table import bounce_table
+from pipeline.scenes import bounces
 from pipeline.scenes import picture as pictures
 from pipeline.scenes.frame import render
 from pipeline.scenes.loading import FilmWindow, load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import TruthAnswers, picture, sharpened, windows
-from pipeline.scenes.shade import colours_of
+from pipeline.scenes.shade import colours_of, compose
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.options import TruthOptions
@@ -76,8 +77,8 @@ def test_a_window_shows_what_the_whole_frame_shows_there(table):
 
 def test_windows_and_threads_change_nothing(table, monkeypatch):
     expected, counts = whole(table)
-    for name, value in (("QUERIES", 500), ("CHUNK", 37)):
-        monkeypatch.setattr(pictures, name, value)
+    monkeypatch.setattr(pictures, "QUERIES", 500)
+    monkeypatch.setattr(pictures, "CHUNK", 37)
     cut, again = whole(table, threads=3)
     np.testing.assert_allclose(cut["rgb"], expected["rgb"], atol=2e-6)
     assert (counts == again).all() and 0 < counts[1] < counts[0]
@@ -156,3 +157,27 @@ def test_samples_soften_silhouettes(table):
     np.testing.assert_allclose(9 * nine, np.round(9 * nine), atol=1e-6)
     assert ((nine > 0) & (nine < 1)).mean() > 0.02
     assert nine.mean() == pytest.approx(one.mean(), rel=0.03)
+
+
+@pytest.fixture
+def few_walks(monkeypatch):
+    """Make small tables of light between yarns."""
+    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
+
+
+def test_all_bounces_add_the_light_of_the_table_to_what_faces_the_lamp(table, few_walks):
+    """The layers of the diffuse light, each by its family; gaps, highlights and what is no cloth stay as they were."""
+    every = replace(table, options=OPTIONS.model_copy(update={"bounces": "all"}))
+    one, more = (whole(loaded, layers=True)[0] for loaded in (table, every))
+    added = dict.fromkeys(COMPONENTS[2:], np.zeros(one["rgb"].shape))
+    for key, gbuffer in render(table, 0.0, SIZE).gbuffers.items():
+        fabric = table.cloths[key][1]
+        queries = gbuffer.queries(fabric.repeat)
+        light = bounces.later_bounces(fabric, queries, colours_of(fabric, queries))
+        for family, name in enumerate(COMPONENTS[2:]):
+            added[name] = added[name] + compose(gbuffer, light[:, family])
+    for name in ("backdrop", *COMPONENTS, "rgb"):
+        wanted = added.get(name, sum(added.values()) if name == "rgb" else 0.0)
+        np.testing.assert_allclose(more[name] - one[name], wanted, rtol=1e-4, atol=1e-6, err_msg=name)
+    assert min(light.max() for light in added.values()) > 1e-3
+    np.testing.assert_allclose(whole(every)[0]["rgb"], more["rgb"], atol=1e-6)

@@ -1,5 +1,3 @@
-"""What a scene asks: ranges that hold its queries, and nothing that never occurs."""
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -44,13 +42,10 @@ def test_stretched_footprints_keep_their_ratio_and_area_and_what_a_model_does_no
     assert shaped.queries(frozenset({"behind"})).behind > 0.4
 
 
-def test_classes_of_size_sum_to_one():
+def test_classes_of_size_sum_to_one_and_a_scene_without_lit_cloth_is_one_sentence():
     found = required(QueryOptions(sigma=(0.05, 32.0)))
     assert sum(found.sizes.values()) == pytest.approx(1.0)
     # Log-uniform: each class has the share of its width in the logarithm.
     assert found.sizes["small"] == pytest.approx(np.log(0.3 / 0.05) / np.log(32 / 0.05), abs=0.03)
-
-
-def test_a_scene_without_lit_cloth_is_one_sentence():
     with pytest.raises(BadInput, match="no cloth that is lit"):
         required(QueryOptions(), count=0)

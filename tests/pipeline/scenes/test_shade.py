@@ -1,5 +1,3 @@
-"""From places to queries, and from components to pictures."""
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The scenes that come with the package: what they show, and that their frames move by less than a pixel."""
-
 import numpy as np
 import pytest
 
@@ -34,11 +32,9 @@ def test_every_fabric_is_seen_and_lit_in_legal_queries(shown):
 
 
 def test_frames_move_by_less_than_a_pixel(shown):
-    """A pixel's new place, measured in the ellipse of its old footprint, in pixels of the full picture.
-
-    |J^-1 d| is the length of d along the ellipse's axes over its standard deviations, times pixel_sigma. The median
-    bounds the motion; pixels that pass an edge see another fold.
-    """
+    """A pixel's new place, measured in the ellipse of its old footprint, in pixels of the full picture. |J^-1 d| is the
+    length of d along the ellipse's axes over its standard deviations, times pixel_sigma. The median bounds the motion;
+    pixels that pass an edge see another fold."""
     loaded, first, second, _ = shown
     assert loaded.scene.frames >= 24
     for key in loaded.cloths:
@@ -47,15 +43,10 @@ def test_frames_move_by_less_than_a_pixel(shown):
         d = np.stack([new.u[b] - old.u[a], new.v[b] - old.v[a]], axis=-1)
         cosine, sine = np.cos(old.angle[a]), np.sin(old.angle[a])
         along, across = d[:, 0] * cosine + d[:, 1] * sine, d[:, 1] * cosine - d[:, 0] * sine
-        moved = (
-            loaded.camera.size[0]
-            / WIDTH
-            * OPTIONS.pixel_sigma
-            * np.hypot(along / old.sigma[a], across / old.sigma_minor[a])
-        )
+        moved = np.hypot(along / old.sigma[a], across / old.sigma_minor[a])
+        moved *= loaded.camera.size[0] / WIDTH * OPTIONS.pixel_sigma
         assert len(shared) > 0.8 * len(old.pixel)
-        assert 0.05 < np.median(moved) < 1.0
-        assert np.quantile(moved, 0.9) < 1.0
+        assert np.median(moved) > 0.05 and np.quantile(moved, 0.9) < 1.0
 
 
 def test_only_the_curtain_is_lit_from_behind_by_the_sun(shown):
@@ -71,8 +62,7 @@ def test_yarns_are_not_stretched_in_sheets(shown):
     _, first, *_ = shown
     for gbuffer in first.gbuffers.values():
         facing = np.abs(gbuffer.wo[:, 2]) > 0.9
-        ratio = gbuffer.sigma_minor[facing] / gbuffer.sigma[facing]
-        assert (ratio > 0.85).all()
+        assert (gbuffer.sigma_minor[facing] / gbuffer.sigma[facing] > 0.85).all()
 
 
 def test_the_roll_and_the_sphere_are_curved_and_the_plane_is_not(shown):

@@ -1,5 +1,3 @@
-"""What a scene is made of, without loading it: equal to what Mitsuba finds."""
-
 import os
 import re
 
@@ -59,10 +57,7 @@ def test_a_file_that_mitsuba_would_not_survive_is_one_sentence(tmp_path, monkeyp
         files(load_scene(tmp_path / "sofa.xml"))
 
 
-def test_a_scene_that_includes_itself_is_read_once(tmp_path):
+def test_a_scene_that_includes_itself_is_read_once_and_shipped_ones_say_all_that_they_wear(tmp_path):
     (tmp_path / "sofa.xml").write_text(f'<scene>{SHAPE.format("a.ply")}<include filename="sofa.xml"/></scene>')
     assert [element.tag for element in elements(load_scene(tmp_path / "sofa.xml"))].count("shape") == 1
-
-
-def test_shipped_scenes_say_all_that_they_wear():
     assert all(worn(scene) and files(scene) == [] and callable(scene.source) for scene in SHIPPED.values())

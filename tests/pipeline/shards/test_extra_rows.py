@@ -1,5 +1,3 @@
-"""Rows about a texture's texels and about the silhouette, against the truth at other points."""
-
 import numpy as np
 import pytest
 
@@ -40,7 +38,6 @@ def test_all_texels_of_a_fabric_are_seen_under_directions_of_their_own():
 
 
 def test_rows_are_the_same_in_any_cut_and_for_any_number_of_samples():
-    """Cuts within a sample, and more samples, change no row."""
     told = []
     whole = SAMPLES.answer(LINING, 0, 64, told.append)
     assert told[-1] == 64

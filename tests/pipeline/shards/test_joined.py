@@ -1,5 +1,3 @@
-"""Joined files: all rows in order in groups of one size, known again by their facts and their checksums."""
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq

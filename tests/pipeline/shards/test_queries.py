@@ -1,5 +1,3 @@
-"""Queries: a pure function of options, stream and row; and the distributions they claim."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The script of pipeline/shards/README.md, run on a data set of one shard in a process that knows nothing of us."""
-
 import re
 import subprocess
 import sys

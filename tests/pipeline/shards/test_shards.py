@@ -1,5 +1,3 @@
-"""Shards on disk: the same bytes for the same task, every kind of damage named, and the manifest beside them."""
-
 import json
 
 import numpy as np
@@ -24,7 +22,6 @@ EXTRA = [SAMPLES.model_copy(update={"texels_per_yarn": 1}), OPACITY, GRAZING]
 
 
 def read_shard(path):
-    """Return the queries and answers of a shard."""
     return rows_of(read_columns(path, "components"))
 
 

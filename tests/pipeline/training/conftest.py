@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.query import Answers
+from tests.datasets import write_dataset
 from weaves.fabric import load_fabric
 
 NAMES = ("polyester_lining", "cotton_twill")
@@ -18,25 +17,17 @@ def answered(fabric, queries):
     fade = 1.0 / (1.0 + queries.sigma)
     wave = 0.5 + 0.5 * fade * np.sin(2 * np.pi * queries.u / ends) * np.cos(2 * np.pi * queries.v / picks)
     tilt = queries.wi[:, 2] * (1.0 + queries.wo[:, 0])
-    rough = fabric.warp.roughness
-    mean = np.stack([0.1 * rough * wave * tilt, 0.05 * tilt, 0.2 * wave * tilt, 0.2 * (1 - wave) * tilt], axis=-1)
-    return Answers.opaque(
-        mean.astype(np.float32), np.full((len(mean), 4), 1e-3, np.float32), np.full(len(mean), 64, np.int32)
-    )
+    columns = [0.1 * fabric.warp.roughness * wave * tilt, 0.05 * tilt, 0.2 * wave * tilt, 0.2 * (1 - wave) * tilt]
+    mean = np.stack(columns, axis=-1).astype(np.float32)
+    return Answers.opaque(mean, np.full_like(mean, 1e-3), np.full(len(mean), 64, np.int32))
 
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    """Return the folder of a data set with two seen fabrics."""
-    folder = tmp_path_factory.mktemp("dataset")
-    fabrics = {name: load_fabric(name) for name in NAMES}
-    shards = []
-    for name, fabric in fabrics.items():
+    folder, parts = tmp_path_factory.mktemp("dataset"), []
+    for fabric in map(load_fabric, NAMES):
         for split, rows, seed in (("train", 4096, 1), ("validation", 512, 2)):
             queries = draw_queries(QueryOptions(), fabric.weave.repeat, seed, 0, rows)
-            file = f"part-{name}-{split}.parquet"
-            write_columns(folder / file, "components", name, columns_of(queries, answered(fabric, queries)), {})
-            shards.append(ShardEntry(file=file, fabric=name, split=split, start=0, rows=rows, sha256="0" * 64))
-    roles = {"seen": list(NAMES), "population": [], "unseen": []}
-    Manifest(name="tiny", fingerprint="f" * 16, roles=roles, fabrics=fabrics, about={}, shards=shards).save(folder)
+            parts.append((fabric.name, split, 0, queries, answered(fabric, queries)))
+    write_dataset(folder, {"seen": list(NAMES), "population": [], "unseen": []}, parts)
     return folder

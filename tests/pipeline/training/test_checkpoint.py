@@ -7,7 +7,6 @@ from pipeline.training.checkpoint import State, read_checkpoint
 
 
 def state(path, seed=0):
-    """A network that has learnt for three steps."""
     torch.manual_seed(seed)
     network = torch.nn.Linear(2, 3)
     learner = State(network, torch.optim.AdamW(network.parameters()), 0.9, "identity", path)

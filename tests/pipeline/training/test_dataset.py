@@ -3,11 +3,11 @@ import pytest
 import torch
 from torch.utils.data import DataLoader
 
-from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.manifest import Manifest
 from pipeline.shards.pieces import DatasetRows
-from pipeline.shards.store import columns_of, write_columns
 from pipeline.training.dataset import COLUMNS, Batches, Order, RowStream, TrainingRows, load_rows
 from pipeline.truth.query import Answers, Queries
+from tests.datasets import write_dataset
 from weaves.errors import BadInput
 
 
@@ -38,8 +38,7 @@ def test_every_round_visits_every_fabric_and_every_epoch_every_row_once():
 
 
 def test_few_rows_are_repeated_and_no_more_fabrics_taken_than_there_are():
-    _, rows = Order([3], batch=8, fabrics=1, seed=0).step(0)
-    assert sorted(np.bincount(rows[0])) == [2, 3, 3]
+    assert sorted(np.bincount(Order([3], batch=8, fabrics=1, seed=0).step(0)[1][0])) == [2, 3, 3]
     order = Order([10, 10], batch=9, fabrics=8, seed=0)
     assert (order.fabrics, order.each) == (2, 4)
 
@@ -62,11 +61,9 @@ def test_columns_are_where_batches_look_for_them(tmp_path):
     *columns, mean, transparency = (part[0] if part.size == 1 else part for part in numbers)
     queries = Queries(*columns)
     answers = Answers.opaque(mean, np.zeros((1, 4), np.float32), np.ones(1, np.int32))
-    columns = columns_of(queries, answers._replace(transparency=transparency))
-    write_columns(tmp_path / "one.parquet", "components", "denim", columns, {})
-    shard = ShardEntry(file="one.parquet", fabric="denim", split="train", start=0, rows=1, sha256="0" * 64)
-    manifest = Manifest(name="one", fingerprint="0", roles={}, fabrics={}, about={}, shards=[shard])
-    rows = load_rows(manifest, tmp_path, ["denim"], tmp_path / "rows.npy")
+    answers = answers._replace(transparency=transparency)
+    write_dataset(tmp_path, {"seen": ["denim"]}, [("denim", "train", 0, queries, answers)])
+    rows = load_rows(Manifest.load(tmp_path), tmp_path, ["denim"], tmp_path / "rows.npy")
     np.testing.assert_array_equal(rows.table, np.arange(17)[None])
     batch = Batches(rows, Order([1], batch=1, fabrics=1, seed=0), torch.device("cpu")).step(0)
     for name in Queries._fields:
@@ -84,7 +81,6 @@ def stream(folder, split="train", names=NAMES, **rest):
 
 
 def rows_in(batches):
-    """Return the rows that batches hold as tuples."""
     columns = ("fabric", "u", "v", "sigma", "diffuse_weft")
     return [row for batch in batches for row in zip(*(batch[name].tolist() for name in columns), strict=True)]
 
@@ -98,10 +94,6 @@ def expected(folder, split="train"):
     return found
 
 
-def test_without_a_seed_rows_have_the_order_of_the_files(folder):
-    assert rows_in(stream(folder, seed=None, rows=1000)) == expected(folder)
-
-
 @pytest.mark.parametrize("rows", [1, 100, 4095, 10_000])
 def test_every_row_comes_once(rows, folder):
     batches = list(stream(folder, "validation", rows=rows))
@@ -109,11 +101,14 @@ def test_every_row_comes_once(rows, folder):
     assert max(len(batch["u"]) for batch in batches) == min(rows, 512)
 
 
-def test_the_order_is_that_of_the_seed_and_changes_with_each_pass(folder):
+def test_the_order_is_that_of_the_files_or_of_the_seed_and_changes_with_each_pass(folder):
+    assert rows_in(stream(folder, seed=None, rows=1000)) == expected(folder)
     one, other = stream(folder, seed=3), stream(folder, seed=4)
     first, second = rows_in(one), rows_in(one)
     assert first != second and sorted(first) == sorted(second)
     assert rows_in(stream(folder, seed=3)) == first != rows_in(other)
+    workers = DataLoader(stream(folder, seed=None), batch_size=None, num_workers=2)
+    assert sorted(rows_in(workers)) == sorted(expected(folder))
 
 
 def test_rows_are_shuffled_well_within_a_shard(folder):
@@ -124,17 +119,10 @@ def test_rows_are_shuffled_well_within_a_shard(folder):
     assert abs(places[: ROWS // 2].mean() - (ROWS - 1) / 2) < 5 * ROWS / np.sqrt(12 * ROWS / 2)
 
 
-def test_workers_of_a_loader_share_the_shards(folder):
-    loader = DataLoader(stream(folder, seed=None), batch_size=None, num_workers=2)
-    assert sorted(rows_in(loader)) == sorted(expected(folder))
-
-
 def test_columns_are_tensors_of_their_own_type(folder):
     batch = next(iter(stream(folder, rows=7)))
-    assert {name: values.dtype for name, values in batch.items() if values.dtype != torch.float32} == {
-        "fabric": torch.int64,
-        "count": torch.int32,
-    }
+    others = {name: values.dtype for name, values in batch.items() if values.dtype != torch.float32}
+    assert others == {"fabric": torch.int64, "count": torch.int32}
     assert {len(values) for values in batch.values()} == {7}
 
 

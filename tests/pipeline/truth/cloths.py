@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.draft import Draft, Matrix
 from weaves.fabric import Fabric, load_fabric
@@ -38,6 +39,12 @@ def equal_queries(wi, wo, sigma=2.0, rows=1, centre=(0.3, 0.7)):
     return Queries.round(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
 
 
+def fixed(count, estimator="owen", **options):
+    """Return options that spend this number of points on each query."""
+    limits = {"relative_error": 1e-9, "absolute_error": 0.0, "min_count": count, "max_count": count}
+    return TruthOptions(estimator=estimator, **limits | options)
+
+
 LOPSIDED = woven("denim", ("#.#", "##.", ".##"), {"width": 0.8, "twist": 20.0}, {"bend": 35.0, "relief": 1.2})
 """Without symmetries of its own: yarns unlike, with gaps."""
 
@@ -68,6 +75,29 @@ def exchanged_axes(queries):
     )  # fmt: skip
 
 
+IMAGES = {
+    "half a turn": lambda q: (redrawn(OVER[::-1, ::-1]), reversed_axes(q, -1, -1)),
+    "mirror": lambda q: (redrawn(OVER[:, ::-1], mirrored=True), reversed_axes(q, -1, 1)),
+    "exchange": lambda q: (redrawn(~OVER.T, swap=True, mirrored=True), exchanged_axes(q)),
+    "begun elsewhere": lambda q: (redrawn(np.roll(OVER, (-2, -1), (0, 1))), q._replace(u=q.u - ONE, v=q.v - ONE - ONE)),
+    "drawn twice": lambda q: (redrawn(np.tile(OVER, (1, 2))), q),
+}
+"""`LOPSIDED` and queries about it, drawn in another way: answers are the same, those of warp and weft exchanged."""
+
+ONE = np.float32(1)
+
+
+def on_lattice(queries):
+    """Return queries whose centres lie on a lattice of 1/64, so that single precision moves them exactly."""
+    return queries._replace(u=np.round(queries.u * 64) / 64, v=np.round(queries.v * 64) / 64)
+
+
+def moved_far(queries):
+    """Return queries on the lattice, and the same 1,024 and 2,048 repeats of `LOPSIDED` away."""
+    near, (ends, picks) = on_lattice(queries), np.float32(LOPSIDED.weave.repeat)
+    return near, near._replace(u=near.u + np.float32(1024) * ends, v=near.v - np.float32(2048) * picks)
+
+
 def cylinders(**changes):
     """Return round warps side by side that never bend: cylinders of diameter 1 at distance 1."""
     return woven("denim", ("##", "##"), width=1.0, relief=1.0, **changes)
@@ -85,10 +115,8 @@ def along_cylinders(count=40, most=1.4, viewer=0.0, seed=2):
 
 def cylinder_answers(fabric, queries):
     """Return specular and diffuse component and transparency of `cylinders`, (N, 3), by integrals over the angle v.
-
     Across the yarns the light has the angle t to the normal. It meets a yarn from v = t - pi/2, where its surface turns
-    away, to where the neighbour's shadow begins: sin(v - t) = 2 cos t - 1. Formulas as printed [Wang2022SpongeCake].
-    """
+    away, to where the neighbour's shadow begins: sin(v - t) = 2 cos t - 1. Formulas as printed [Wang2022SpongeCake]."""
     yarn, depth = fabric.warp, fabric.optical_thickness
     wi, wo = (w.astype(np.float64) for w in (queries.wi, queries.wo))
     side, t = np.where(wi[:, 0] < 0.0, -1.0, 1.0), np.arctan2(np.abs(wi[:, 0]), wi[:, 2])

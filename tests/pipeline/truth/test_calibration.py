@@ -1,29 +1,13 @@
-"""The calibration itself; reports/truth/calibration.py compares its errors with true ones."""
-
-import itertools
-
 import numpy as np
 import pytest
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.calibration import BEHIND_FACTORS, FRONT_FACTORS, SAMPLED, TRANSPARENCY_FACTORS, calibrate
+from pipeline.truth.calibration import FRONT_FACTORS, SAMPLED, calibrate
 from pipeline.truth.cloth import Raw
 from pipeline.truth.estimator import ESTIMATORS, estimate, uncalibrated
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.truth.cloths import fixed
 from weaves.fabric import load_fabric
-
-
-def test_errors_are_factors_of_the_reported_ones():
-    for stage, behind in itertools.product(FRONT_FACTORS, (False, True)):
-        mean, reported = np.array([[0.3, 0.0, 0.4, 0.0, 0.2]]), np.array([[0.01, 0.0, 0.02, 0.03, 0.04]])
-        error, bound = calibrate(Raw(mean, reported, np.array([64]), np.array([stage])), np.array([behind]))
-        own = (BEHIND_FACTORS if behind else FRONT_FACTORS)[stage]
-        for factors, columns, size in ((own, slice(4), 0.5), (TRANSPARENCY_FACTORS[stage], slice(4, 5), 1.0)):
-            scaled = factors.reported * reported[:, columns]
-            limited = scaled / (1.0 + scaled / (factors.largest * size))
-            expected = np.sqrt(limited**2 + (factors.missed * size) ** 2)
-            np.testing.assert_allclose(error[:, columns], expected, rtol=1e-12)
-            np.testing.assert_allclose(bound[:, columns], factors.cover * expected, rtol=1e-12)
 
 
 def test_a_hidden_patch_has_no_error():
@@ -48,7 +32,7 @@ def test_a_component_that_no_point_has_shown_has_an_error():
     """One family of yarns fills a narrow footprint: the other one may still have been missed."""
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=(0.05, 0.08), max_angle=30.0), fabric.weave.repeat, 5, 0, 60)
-    raw = uncalibrated(fabric, queries, TruthOptions(estimator="mc", min_count=64, max_count=64), 1)
+    raw = uncalibrated(fabric, queries, fixed(64, "mc"), 1)
     size = np.linalg.norm(raw.mean[:, :4], axis=1, keepdims=True)
     assert (raw.stage == SAMPLED).all()
     unseen = (raw.mean[:, :4] == 0.0) & (size > 0.0)

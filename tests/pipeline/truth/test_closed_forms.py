@@ -1,5 +1,3 @@
-"""Every estimator on cylinders side by side, whose answers are integrals of one angle: its error, bound and order."""
-
 import math
 from typing import get_args
 
@@ -15,7 +13,7 @@ from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.node_table.tables import NOT_REFINED, NodeTable
 from pipeline.truth.options import EstimatorName, Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows
-from tests.pipeline.truth.cloths import along_cylinders, cylinder_answers, cylinders, woven
+from tests.pipeline.truth.cloths import along_cylinders, cylinder_answers, cylinders, fixed, woven
 
 ROUND = cylinders(twist=20.0, roughness=0.4, blend=0.6).model_copy(update={"optical_thickness": 0.8})
 ASKED = along_cylinders(viewer=1.2)
@@ -47,32 +45,24 @@ def test_the_exact_answers_are_what_is_known_without_an_integral():
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_answers_are_exact_within_the_errors_they_state(estimator):
-    """3 of 1,000 lie beyond their bounds; the rms error is at most about that of the standard errors, and 1 %.
-
-    For a table without refinement cylinders are the worst cloth: all borders of shadows lie alike, across nodes.
-    Without the neighbour's shadow diffuse light would be 17 % off.
-    """
+    """3 of 1,000 lie beyond their bounds; the rms error is at most about that of the standard errors, and 1 %. For a
+    table without refinement cylinders are the worst cloth: all borders of shadows lie alike, across nodes. Without the
+    neighbour's shadow diffuse light would be 17 % off."""
     options = TruthOptions(estimator=estimator, relative_error=0.005, max_count=1 << 14)
     answers = estimate(ROUND, ASKED, options, 1)
-    found, bound, stated = (
-        of_warp(*parts)
-        for parts in (
-            (answers.mean, answers.transparency),
-            (np.where(answers.mean == 0.0, 0.0, answers.bound), answers.transparency_bound),
-            (np.where(answers.mean == 0.0, 0.0, answers.standard_error), answers.transparency_standard_error),
-        )
-    )
+    dark = answers.mean == 0.0
+    found = of_warp(answers.mean, answers.transparency)
+    bound = of_warp(np.where(dark, 0.0, answers.bound), answers.transparency_bound)
+    stated = of_warp(np.where(dark, 0.0, answers.standard_error), answers.transparency_standard_error)
     wrong = np.abs(found - EXACT)
     assert (wrong > bound + 1e-6).mean() < 0.02
     size = np.linalg.norm(EXACT[:, :2], axis=1)
-    assert np.sqrt(np.mean(np.square(wrong[:, :2] / size[:, None]).sum(axis=1))) < (
-        0.02 if estimator == "node_table" else 0.01
-    )
+    rms = np.sqrt(np.mean(np.square(wrong[:, :2] / size[:, None]).sum(axis=1)))
+    assert rms < (0.02 if estimator == "node_table" else 0.01)
     assert np.sqrt(np.mean(wrong**2)) < 1.5 * np.sqrt(np.mean(stated**2)) + 1e-6
 
 
 def order(counts, errors):
-    """Return the order of convergence, fitted to logarithms."""
     return -stats.linregress(np.log(counts), np.log(errors)).slope
 
 
@@ -85,8 +75,7 @@ def test_points_converge_by_their_order(estimator, low, high):
     """Independent ones by 1/2; a line across the yarns is cut at a few places: R2 by 1, scrambled nets by 1 to 3/2."""
     counts, errors = [64, 256, 1024, 4096], []
     for count in counts:
-        limits = {"relative_error": 1e-9, "absolute_error": 0.0, "min_count": count, "max_count": count}
-        answers = estimate(ROUND, ASKED, TruthOptions(estimator=estimator, **limits), 1)
+        answers = estimate(ROUND, ASKED, fixed(count, estimator), 1)
         errors.append(rms(of_warp(answers.mean, answers.transparency)))
     assert low < order(counts, errors) < high, errors
 
@@ -111,9 +100,8 @@ def test_tables_converge_with_their_nodes():
     cloth, columns, index = cloth_side(ROUND, TruthOptions()), columns_of(ASKED), np.arange(len(ASKED.u))
     counts, errors = [8, 16, 32, 64], []
     for count in counts:
-        found = NodeTable(lambda cells, count=count: count, 128, FINE_LINE).answer(
-            cloth, columns, index, *NOT_REFINED, 0
-        )
+        table = NodeTable(lambda cells, count=count: count, 128, FINE_LINE)
+        found = table.answer(cloth, columns, index, *NOT_REFINED, 0)
         errors.append(rms(of_warp(found.mean[:, :4], found.mean[:, 4])))
     assert order(counts, errors) > 1.0 and errors[2] < 2e-3, errors
 

@@ -1,5 +1,3 @@
-"""The patch BSDF: an outside rendering, an oracle in NumPy, statistics of the estimators, and invariants."""
-
 import math
 from typing import get_args
 
@@ -12,87 +10,31 @@ from pipeline.truth.estimator import estimate, uncalibrated
 from pipeline.truth.monte_carlo import RANDOMISATIONS
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.truth.cloths import direction, equal_queries, woven
+from tests.pipeline.truth.cloths import direction, equal_queries, fixed, woven
 from tests.presets import PRESETS, slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.population import Population, Ranges, population_fabrics
-from weaves.surface import surface_at as oracle
-
-EXACT = TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-5, min_count=1 << 20, max_count=1 << 20)
 
 
 def test_diffuse_matches_a_mitsuba_rendering_of_the_geometry():
-    """Rationale: the geometry, its shadows and masks were rendered as a mesh by Mitsuba 3 (plain weave, u_max 22/16).
-
-    Expected: C_warp, C_weft with w_d = 1 at polar angles 30/30, azimuth 30/210 degrees, repeat average. The rendering's
-    own error is 0.05 % rms; twice that is allowed.
-    """
+    """The geometry, its shadows and masks were rendered as a mesh by Mitsuba 3 (plain weave, u_max 22/16). C_warp,
+    C_weft with w_d = 1 at polar angles 30/30, azimuth 30/210 degrees, repeat average. The rendering's own error is 0.05
+    % rms; twice that is allowed."""
     fabric = woven("polyester_lining", None, {"bend": 22.0}, {"bend": 16.0}, blend=1.0, width=1.0, relief=1.0)
-    answer = estimate(fabric, equal_queries(direction(30, 30), direction(30, 210), 20.0), EXACT, 1)
+    answer = estimate(fabric, equal_queries(direction(30, 30), direction(30, 210), 20.0), fixed(1 << 20), 1)
     np.testing.assert_allclose(answer.mean[0, 2:], [0.099296, 0.109176], rtol=1e-3)
-
-
-def _patch_by_oracle(fabric, wi, wo, texels):
-    """Integrate one repeat on a grid with NumPy alone: textbook formulas, visibility by a march."""
-    ends, picks = fabric.weave.repeat
-    x, y = (g.ravel() for g in np.meshgrid(*((np.arange(n * texels) + 0.5) / texels for n in (ends, picks))))
-    point = oracle(fabric, x, y)
-    wi, wo = np.array(wi), np.array(wo)
-
-    def seen(w):
-        free = point.normal @ w > 0
-        flat, step = math.hypot(w[0], w[1]), 0.006
-        rise = np.ptp(point.height)
-        for s in np.arange(step, rise / (w[2] / flat) + step, step):
-            height = oracle(fabric, (x + s * w[0] / flat) % ends, (y + s * w[1] / flat) % picks).height
-            free &= height <= point.height + s * w[2] / flat
-        return free
-
-    area = np.where(seen(wo), point.normal @ wo / point.normal[:, 2], 0.0)
-    lit = np.where(seen(wi), area, 0.0)
-    means = []
-    cos_i, cos_o = (np.maximum(point.normal @ w, 1e-12) for w in (wi, wo))
-    for family, yarn in enumerate((fabric.warp, fabric.weft)):
-        half = (wi + wo) / np.linalg.norm(wi + wo)
-        q = 1 - (point.tangent @ half) ** 2 * (1 - 1 / yarn.roughness**2)
-        s_i, s_o = (np.sqrt(1 - (1 - yarn.roughness**2) * (point.tangent @ w) ** 2) for w in (wi, wo))
-        depth = fabric.optical_thickness * (s_i / cos_i + s_o / cos_o)
-        f = (1 - np.exp(-depth)) / (math.pi * yarn.roughness * q**2) / (4 * (s_i * cos_o + s_o * cos_i))
-        means.append(np.sum(f * cos_i * lit * (point.yarn == family)) / area.sum())
-    for family, yarn in enumerate((fabric.warp, fabric.weft)):
-        diffuse = (yarn.blend * cos_i + (1 - yarn.blend) * wi[2]) / math.pi
-        means.append(np.sum(diffuse * lit * (point.yarn == family)) / area.sum())
-    return means
-
-
-def test_all_components_match_an_oracle_that_shares_no_code():
-    # Directions are no mirror pair, and the swapped pair differs by far more than the tolerance.
-    fabric, wi, wo = load_fabric("denim"), direction(60, 20), direction(20, 150)
-    answer = estimate(fabric, equal_queries(wi, wo, 20.0), EXACT, 1).mean[0]
-    np.testing.assert_allclose(answer, _patch_by_oracle(fabric, wi, wo, 40), rtol=0.02)
-    swapped = estimate(fabric, equal_queries(wo, wi, 20.0), EXACT, 1).mean[0]
-    assert (np.abs(swapped / answer - 1) > 0.1).any()
 
 
 @pytest.mark.parametrize("estimator", [slow("mc"), "owen"])
 def test_reported_errors_cover_the_true_error(estimator):
-    """z-scores against a reference with 64 times the points, footprints of a yarn and more.
-
-    With 16 randomisations z follows Student's t with 15 degrees of freedom: .9 % lie beyond 3, and the ratio
-    estimator's skewness at fixed count adds to it; 2 % are allowed, and the mean z must vanish within
-    Sidak-corrected noise.
-    """
+    """z-scores against a reference with 64 times the points, footprints of a yarn and more. With 16 randomisations z
+    follows Student's t with 15 degrees of freedom: .9 % lie beyond 3, and the ratio estimator's skewness at fixed count
+    adds to it; 2 % are allowed, and the mean z must vanish within Sidak-corrected noise."""
     fabric = load_fabric("wool_gabardine")
     queries = draw_queries(QueryOptions(sigma=(1.0, 8.0), max_angle=80.0), fabric.weave.repeat, 5, 0, 120)
-    reference = estimate(
-        fabric,
-        queries,
-        TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-9, min_count=1 << 16, max_count=1 << 16),
-        8,
-    )
-    options = TruthOptions(estimator=estimator, absolute_error=0.0, relative_error=1e-9, min_count=1024, max_count=1024)
-    answers = estimate(fabric, queries, options, 2)
+    reference = estimate(fabric, queries, fixed(1 << 16), 8)
+    answers = estimate(fabric, queries, fixed(1024, estimator), 2)
     seen = answers.standard_error > 1e-5
     z = (answers.mean - reference.mean)[seen] / np.hypot(answers.standard_error, reference.standard_error)[seen]
     assert (np.abs(z) > 3).mean() < 0.02
@@ -113,10 +55,8 @@ def test_the_stopping_rule_reaches_the_error_or_spends_its_points():
 
 
 def test_hidden_patches_do_not_understate_their_error():
-    """Two runs differ by no more than their stated errors say, hidden patches at grazing angles included.
-
-    Before every randomisation had to see the patch, the measured variance was 24 times the reported one here.
-    """
+    """Two runs differ by no more than their stated errors say, hidden patches at grazing angles included. Before every
+    randomisation had to see the patch, the measured variance was 24 times the reported one here."""
     fabric = load_fabric("twill_4_4")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, 600)
     first, second = (estimate(fabric, queries, TruthOptions(estimator="owen", max_count=1024), seed) for seed in (1, 2))
@@ -148,19 +88,12 @@ def test_bad_queries_are_named(field, value, words):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 def test_bounds_of_adaptive_estimates_hold_on_every_preset(name):
-    """Default options and query distribution against 32,768 points: .3 % beyond the bound by its definition.
-
-    1 % of 1,600 components are allowed: errors of one query are correlated, and presets differ. Stopping by its own
-    noisy error makes more outliers than Student's t has.
-    """
+    """Default options and query distribution against 32,768 points: .3 % beyond the bound by its definition. 1 % of
+    1,600 components are allowed: errors of one query are correlated, and presets differ. Stopping by its own noisy
+    error makes more outliers than Student's t has."""
     fabric = load_fabric(name)
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 11, 0, 400)
-    exact = estimate(
-        fabric,
-        queries,
-        TruthOptions(estimator="owen", absolute_error=0.0, relative_error=1e-9, min_count=1 << 15, max_count=1 << 15),
-        12,
-    )
+    exact = estimate(fabric, queries, fixed(1 << 15), 12)
     answers = estimate(fabric, queries, TruthOptions(estimator="owen"), 13)
     beyond = np.abs(answers.mean - exact.mean) > answers.bound + 3 * exact.standard_error
     assert beyond.mean() < 0.01
@@ -182,10 +115,8 @@ OPTIONS = TruthOptions(relative_error=0.005, max_count=1 << 14)
 
 
 def test_stages_are_those_of_the_answers():
-    """Tables alone know no seed, and a least count of points concerns what is sampled only.
-
-    A refined answer knows it too if its doubts turn out small enough without an integral.
-    """
+    """Tables alone know no seed, and a least count of points concerns what is sampled only. A refined answer knows it
+    too if its doubts turn out small enough without an integral."""
     queries = draw_queries(QueryOptions(), FABRIC.weave.repeat, 4, 0, 300)
     auto = uncalibrated(FABRIC, queries, OPTIONS, 4)
     assert set(auto.stage.tolist()) == {COARSE_TABLE, FINE_TABLE, REFINED, SAMPLED}
@@ -197,12 +128,8 @@ def test_stages_are_those_of_the_answers():
     more = uncalibrated(FABRIC, queries, OPTIONS.model_copy(update={"min_count": 1 << 14}), 4)
     np.testing.assert_array_equal(auto.mean[auto.stage != SAMPLED], more.mean[auto.stage != SAMPLED])
     assert (auto.count[auto.stage == SAMPLED] < more.count[auto.stage == SAMPLED]).any()
-
-
-def test_every_answer_is_a_table_s_own_at_an_error_of_100_per_cent():
-    queries = draw_queries(QueryOptions(), FABRIC.weave.repeat, 4, 0, 50)
-    answers = uncalibrated(FABRIC, queries, OPTIONS.model_copy(update={"relative_error": 1.0}), 4)
-    assert np.isin(answers.stage, (COARSE_TABLE, FINE_TABLE)).mean() > 0.95
+    rough = uncalibrated(FABRIC, queries.take(slice(50)), OPTIONS.model_copy(update={"relative_error": 1.0}), 4)
+    assert np.isin(rough.stage, (COARSE_TABLE, FINE_TABLE)).mean() > 0.95
 
 
 @pytest.mark.parametrize("name", ["polyester_lining", "gauze"])
@@ -233,8 +160,7 @@ def test_rotated_ellipses_are_tabulated_with_the_reported_error(name, behind):
     fabric = load_fabric(name)
     kinds = QueryOptions(sigma=(0.3, 3.0), stretch=6.0, behind=behind, max_angle=75.0)
     queries = draw_queries(kinds, fabric.weave.repeat, 12, 0, 100)
-    converged = TruthOptions(estimator="owen", relative_error=1e-9, absolute_error=0.0, min_count=8192, max_count=8192)
-    exact = estimate(fabric, queries, converged, 4)
+    exact = estimate(fabric, queries, fixed(8192), 4)
     found = {}
     for estimator in ("auto", "owen"):
         options = TruthOptions(estimator=estimator, relative_error=0.1, min_count=64, max_count=128)
@@ -247,25 +173,15 @@ def test_rotated_ellipses_are_tabulated_with_the_reported_error(name, behind):
 
 @pytest.mark.slow
 def test_a_shadow_edge_between_two_azimuths_is_reported():
-    """The edge of a yarn hides part of the next one from this viewer at one of the two azimuths beside it.
-
-    A table that interpolated the horizons in between was 38 % off here, and reported .6 %.
-    """
-    yarns = Ranges(
-        roughness_warp=(0.05, 0.7),
-        roughness_weft=(0.05, 0.7),
-        relief=(0.5, 1.5),
-        bend=(10.0, 60.0),
-        twist=(-35.0, 35.0),
-        width=(0.6, 0.95),
-    )
+    """The edge of a yarn hides part of the next one from this viewer at one of the two azimuths beside it. A table that
+    interpolated the horizons in between was 38 % off here, and reported .6 %."""
+    shape = {"relief": (0.5, 1.5), "bend": (10.0, 60.0), "twist": (-35.0, 35.0), "width": (0.6, 0.95)}
+    yarns = Ranges(roughness_warp=(0.05, 0.7), roughness_weft=(0.05, 0.7), **shape)
     fabric = population_fabrics(Population(count=12, seed=951, plain=yarns, twill=yarns, satin=yarns))[11]
     wi, wo = np.float32([[0.7100, 0.2397, 0.6621]]), np.float32([[0.8969, 0.0632, 0.4376]])
-    queries = Queries.round([5.5051], [2.9416], [0.1756], wi, wo)._replace(
-        sigma_minor=np.float32([0.0791]), angle=np.float32([3.025])
-    )
-    many = TruthOptions(estimator="owen", relative_error=1e-9, min_count=1 << 14, max_count=1 << 14)
-    exact = estimate(fabric, queries, many, 1).mean[0]
+    queries = Queries.round([5.5051], [2.9416], [0.1756], wi, wo)
+    queries = queries._replace(sigma_minor=np.float32([0.0791]), angle=np.float32([3.025]))
+    exact = estimate(fabric, queries, fixed(1 << 14), 1).mean[0]
     table, auto = (estimate(fabric, queries, TruthOptions(estimator=name), 1) for name in ("node_table", "auto"))
     assert np.abs(table.mean[0] - exact).max() > 0.3 * np.linalg.norm(exact)
     assert (np.abs(table.mean[0] - exact) <= table.bound[0]).all()

@@ -1,5 +1,3 @@
-"""The invariants hold on cloth, and each of them finds the physics that breaks it."""
-
 import math
 
 import numpy as np
@@ -107,16 +105,24 @@ def test_estimators_agree_within_their_bounds(brief, monkeypatch):
         assert broken(invariants.agreement) == found
 
 
-def test_a_slab_that_is_not_reciprocal_is_found(monkeypatch):
-    whole = invariants.reflection
-    monkeypatch.setattr(invariants, "reflection", lambda *a: whole(*a) * (1.0 + 1e-15 * (a[3] > a[4])))
-    assert broken(invariants.point_reciprocity) == ["reciprocity of a point, reflection"]
-
-
-def test_colour_that_does_not_add_up_is_found(brief, monkeypatch):
-    whole = invariants._lattice
-    monkeypatch.setattr(invariants, "_lattice", lambda *a: whole(*a) * (1.0 + 1e-9))
-    assert broken(invariants.repeat_average) == ["coloured components / coloured whole − 1"]
+@pytest.mark.parametrize(
+    ("part", "factor", "test", "found"),
+    [
+        (
+            "reflection",
+            lambda *a: 1.0 + 1e-15 * (a[3] > a[4]),
+            "point_reciprocity",
+            "reciprocity of a point, reflection",
+        ),
+        ("_lattice", lambda *a: 1.0 + 1e-9, "repeat_average", "coloured components / coloured whole − 1"),
+    ],
+)
+def test_a_slab_that_is_not_reciprocal_and_colour_that_does_not_add_up_are_found(
+    brief, monkeypatch, part, factor, test, found
+):
+    whole = getattr(invariants, part)
+    monkeypatch.setattr(invariants, part, lambda *a: whole(*a) * factor(*a))
+    assert broken(getattr(invariants, test)) == [found]
 
 
 def test_the_worst_of_many_is_called_broken_as_rarely_as_stated():

@@ -1,5 +1,3 @@
-"""The decision whether a patch is hidden, against the closed form of its probability."""
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -13,14 +11,11 @@ def _concealed(share, doubt):
     return conceal(share, doubt, mean, error), mean, error
 
 
-def test_a_visible_patch_keeps_its_answer():
+def test_a_visible_patch_keeps_its_answer_and_a_hidden_one_is_black_and_certain():
     undecided, mean, error = _concealed(0.5, 0.01)
     assert not undecided
     np.testing.assert_array_equal(mean, [0.1, 0.2, 0.0, 0.4, 0.5])
     np.testing.assert_allclose(error, 0.01, rtol=1e-12)
-
-
-def test_a_hidden_patch_is_black_and_certain():
     for doubt in (0.0, 1e-5):
         undecided, mean, error = _concealed(0.5 * HIDDEN_SHARE, doubt)
         assert not undecided and not mean.any()

@@ -1,5 +1,3 @@
-"""The example of pipeline/truth/README.md."""
-
 import re
 from pathlib import Path
 

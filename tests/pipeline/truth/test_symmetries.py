@@ -1,5 +1,3 @@
-"""What holds for every estimator: the same cloth, drawn or seen in another way, has the same answers."""
-
 from typing import get_args
 
 import numpy as np
@@ -8,7 +6,7 @@ import pytest
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import EstimatorName, TruthOptions
-from tests.pipeline.truth.cloths import LOPSIDED, OVER, exchanged_axes, redrawn, reversed_axes, woven
+from tests.pipeline.truth.cloths import IMAGES, LOPSIDED, OVER, moved_far, on_lattice, redrawn, reversed_axes, woven
 
 REPEAT = LOPSIDED.weave.repeat
 ALL = get_args(EstimatorName)
@@ -46,40 +44,21 @@ def assert_equal(one, other, worst):
 
 
 @pytest.mark.parametrize("estimator", RULES)
-def test_a_cloth_turned_by_half_a_turn_and_a_mirrored_one(estimator):
-    """A mirror reverses the sense of the twists, half a turn does not."""
-    own = answers(LOPSIDED, QUERIES, estimator)
-    half_turn = answers(redrawn(OVER[::-1, ::-1]), reversed_axes(QUERIES, -1, -1), estimator)
-    assert_equal(own, half_turn, RULES[estimator])
-    mirrored = reversed_axes(QUERIES, -1, 1)
-    assert_equal(own, answers(redrawn(OVER[:, ::-1], mirrored=True), mirrored, estimator), RULES[estimator])
-    assert np.abs(own - answers(redrawn(OVER[:, ::-1]), mirrored, estimator)).max() > 0.01 * own.max()
-
-
-@pytest.mark.parametrize("estimator", RULES)
-def test_warp_and_weft_change_places(estimator):
-    """The transposed draft, yarns exchanged: a mirror in the diagonal, and a quarter turn after a mirror."""
-    there = answers(redrawn(~OVER.T, swap=True, mirrored=True), exchanged_axes(QUERIES), estimator)
-    assert_equal(answers(LOPSIDED, QUERIES, estimator), there[:, [1, 0, 3, 2, 4]], RULES[estimator])
-
-
-@pytest.mark.parametrize("estimator", RULES)
-def test_a_repeat_may_begin_anywhere_and_be_drawn_twice(estimator):
-    """Centres are on a lattice of 1/64, so that single precision moves them exactly."""
-    queries = QUERIES._replace(u=np.round(QUERIES.u * 64) / 64, v=np.round(QUERIES.v * 64) / 64)
+def test_a_cloth_drawn_in_another_way_has_the_same_answers(estimator):
+    """A mirror reverses the sense of the twists: without that the mirrored cloth answers otherwise."""
+    queries = on_lattice(QUERIES)
     own = answers(LOPSIDED, queries, estimator)
-    moved = queries._replace(u=queries.u - np.float32(1), v=queries.v - np.float32(2))
-    assert_equal(own, answers(redrawn(np.roll(OVER, (-2, -1), axis=(0, 1))), moved, estimator), RULES[estimator])
-    assert_equal(own, answers(redrawn(np.tile(OVER, (1, 2))), queries, estimator), RULES[estimator])
+    for image, draw in IMAGES.items():
+        there = answers(*draw(queries), estimator)
+        assert_equal(own, there[:, [1, 0, 3, 2, 4]] if image == "exchange" else there, RULES[estimator])
+    wrong = answers(redrawn(OVER[:, ::-1]), reversed_axes(queries, -1, 1), estimator)
+    assert np.abs(own - wrong).max() > 0.01 * own.max()
 
 
 @pytest.mark.parametrize("estimator", ALL)
 def test_translation_by_repeats_changes_nothing(estimator):
-    near = QUERIES._replace(u=np.round(QUERIES.u * 64) / 64, v=np.round(QUERIES.v * 64) / 64)
-    ends, picks = np.float32(REPEAT)
-    far = near._replace(u=near.u + np.float32(1024) * ends, v=near.v - np.float32(2048) * picks)
-    own = answers(LOPSIDED, near, estimator)
-    np.testing.assert_allclose(answers(LOPSIDED, far, estimator), own, rtol=1e-5, atol=1e-6 * own.max())
+    near, far = (answers(LOPSIDED, queries, estimator) for queries in moved_far(QUERIES))
+    np.testing.assert_allclose(far, near, rtol=1e-5, atol=1e-6 * near.max())
 
 
 @pytest.mark.parametrize("estimator", ALL)

@@ -24,23 +24,18 @@ def test_tone_mapping_is_exposure_and_the_srgb_curve():
     """Linear .21404 is sRGB 127.5/255 by IEC 61966-2-1; 0 stays 0, what is too bright is cut, no cloth is clear."""
     linear = np.array([[[0.21404 / tiles.EXPOSURE] * 3, [0.0] * 3, [9.0] * 3, [1.0] * 3]])
     shown = decoded(tiles.picture(exr(linear, [[1, 1, 1, 0]])))[0, :: tiles.SCALE]
-    assert shown[0, :3].tolist() in ([127] * 3, [128] * 3)
-    assert shown[1].tolist() == [0, 0, 0, 255]
-    assert shown[2].tolist() == [255, 255, 255, 255]
-    assert shown[3].tolist() == [0, 0, 0, 0]
+    assert shown[0, :3].tolist() in ([127] * 3, [128] * 3) and shown[1].tolist() == [0, 0, 0, 255]
+    assert shown[2].tolist() == [255, 255, 255, 255] and shown[3].tolist() == [0, 0, 0, 0]
 
 
 def test_difference_is_blue_where_dark_and_red_where_bright():
     truth = exr(np.full((1, 4, 3), 0.5), [[1, 1, 1, 0]])
     shown = exr(np.array([[[0.5] * 3, [0.2] * 3, [0.9] * 3, [5.0] * 3]]), [[1, 1, 1, 0]])
     same, dark, bright, outside = decoded(tiles.difference(shown, truth))[0, :: tiles.SCALE]
-    assert np.ptp(same[:3]) < 4
-    assert dark[2] > dark[0]
-    assert bright[0] > bright[2]
-    assert outside[3] == 0
+    assert np.ptp(same[:3]) < 4 and dark[2] > dark[0] and bright[0] > bright[2] and outside[3] == 0
 
 
-def test_drawdown_starts_at_the_bottom_left():
+def test_drawdowns_start_at_the_bottom_left_and_in_colours_show_the_thread_on_top():
     fabric = load_fabric("denim")
     picture = decoded(tiles.drawdown(fabric))
     middle = tiles.CELL_PIXELS // 2
@@ -48,9 +43,6 @@ def test_drawdown_starts_at_the_bottom_left():
     picks, ends = fabric.weave.warp_over.shape
     assert (cells[:picks, :ends] == fabric.weave.warp_over).all()
     assert (cells[picks : 2 * picks, :ends] == fabric.weave.warp_over).all()
-
-
-def test_the_drawdown_in_colours_shows_the_thread_on_top():
     fabric = load_fabric("houndstooth")
     picture = decoded(tiles.colours(fabric))
     side = len(picture) // tiles.CELLS
@@ -65,8 +57,7 @@ def test_maps_repeat_with_the_weave(draw):
     fabric = load_fabric("denim")
     picture = decoded(draw(fabric))
     ends, side = fabric.weave.repeat[0] * tiles.CELL_PIXELS, tiles.CELLS * tiles.CELL_PIXELS
-    assert picture.shape[:2] == (side, side)
-    assert (picture[:, : side - ends] == picture[:, ends:]).all()
+    assert picture.shape[:2] == (side, side) and (picture[:, : side - ends] == picture[:, ends:]).all()
     assert np.ptp(picture[..., :3]) > 50
     assert draw is tiles.height or picture[..., 2].min() >= 127, "normals point up in blue"
 

@@ -1,5 +1,3 @@
-"""Films as PyAV reads them back."""
-
 import numpy as np
 import pytest
 
@@ -35,5 +33,4 @@ def test_a_film_that_fails_leaves_the_one_before(tmp_path):
     (tmp_path / "a.mp4").write_bytes(b"before")
     with pytest.raises(KeyboardInterrupt):
         write_film(tmp_path / "a.mp4", frames(), (32, 24), 24)
-    assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
-    assert (tmp_path / "a.mp4").read_bytes() == b"before"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"] and (tmp_path / "a.mp4").read_bytes() == b"before"

@@ -11,8 +11,7 @@ def test_variances_of_pixels_average_to_the_variance():
     random = np.random.default_rng(5)
     shown, noise = random.random((4, 6, 7)), 0.1 * random.random((4, 6, 7))
     variances = temporal_variances(shown, noise)
-    assert variances.shape == (6, 7)
-    assert variances.mean() == pytest.approx(temporal_variance(shown, noise), rel=1e-12)
+    assert variances.shape == (6, 7) and variances.mean() == pytest.approx(temporal_variance(shown, noise), rel=1e-12)
     # Two frames that differ by d have the variance d^2 / 2.
     assert temporal_variances(np.array([[1.0, 2.0], [1.0, 5.0]]), 0.5) == pytest.approx([-0.25, 4.5 - 0.25])
 

@@ -23,8 +23,7 @@ def test_intervals_cover_under_correlated_noise():
         _, low, high = block_interval(rows, DISC, ImageOptions())
         by_blocks += low <= 1 <= high
         by_pixels += abs(rows.mean() - 1) < 1.96 * rows.std() / np.sqrt(rows.size)
-    assert by_blocks >= 170
-    assert by_pixels < 100
+    assert by_blocks >= 170 and by_pixels < 100
 
 
 def test_independent_pixels_have_the_usual_standard_error():
@@ -56,8 +55,7 @@ def test_it_is_the_difference_of_both_mean_squared_errors():
     a, b = TRUTH + 0.1 * HARD, TRUTH + 0.2 * HARD
     difference, low, high = mse_difference(a, b, TRUTH, MASK, OPTIONS)
     assert difference == pytest.approx((0.04 - 0.01) * np.mean(HARD[MASK] ** 2), rel=1e-12)
-    assert low < difference < high
-    assert mse_difference(b, a, TRUTH, MASK, OPTIONS)[0] == -difference
+    assert low < difference < high and mse_difference(b, a, TRUTH, MASK, OPTIONS)[0] == -difference
     assert mse_difference(a, a, TRUTH, MASK, OPTIONS) == (0.0, 0.0, 0.0)
 
 

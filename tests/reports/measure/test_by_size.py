@@ -1,5 +1,3 @@
-"""Errors and times by the size of footprints: each class by itself."""
-
 from reports.measure.by_size import EDGES, MEASURES, SIZES, measure_by_size, measure_errors_by_size
 
 
@@ -14,8 +12,7 @@ def test_errors_are_those_of_the_class_alone(dataset, points, options):
     assert by["size_time", "k = 1"].value > 0
     # The whole lies between its classes.
     values = [value for _, value in few.curve]
-    assert min(values) <= few.value <= max(values)
-    assert {low for low, _ in few.curve} <= set(EDGES[:-1])
+    assert min(values) <= few.value <= max(values) and {low for low, _ in few.curve} <= set(EDGES[:-1])
     # Errors alone are the same numbers.
     alone = measure_errors_by_size(points, dataset, options.seed)
     assert alone == [record for record in found if record.metric != "size_time"]

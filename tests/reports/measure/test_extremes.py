@@ -1,6 +1,5 @@
-"""Methods at their extremes: what is asked, closed forms of what is measured, and the model that comes along."""
-
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -9,14 +8,14 @@ import torch
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodesOptions
 from pipeline.models.registry import load_methods, load_model, pretrained_folder
-from pipeline.models.runtimes import runs
+from pipeline.models.runtimes import RUNTIMES, runs
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import faults
+from pipeline.truth.query import LOWEST_VIEWER, faults
 from reports.measure.extremes import FAR, FOOTPRINTS, extremes, lustrous, measure_extremes
-from reports.options import EXTREME_PRECISIONS
+from reports.options import EXTREME_PRECISIONS, RuntimeName
 from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import load_fabric
 
@@ -72,6 +71,22 @@ def test_closed_forms():
     assert {record.fabric for record in found.values()} == {LINING.name}, "what is not covered is not asked"
 
 
+def test_viewers_too_low_for_parallax_have_no_truth(monkeypatch):
+    """They are answered, and not compared; lights that graze are."""
+    monkeypatch.setattr(Scaled, "truth", TruthOptions(estimator="owen", parallax=True, min_count=32, max_count=32))
+
+    def predict(method, fabric, queries, seed=0):
+        low = queries.wo[:, 2] < LOWEST_VIEWER
+        answers = np.full((len(low), 4), 7.0, np.float32)
+        answers[~low] = 1.1 * estimate(fabric, queries.take(~low), method.truth, 0).mean
+        return answers
+
+    monkeypatch.setattr(Scaled, "predict", predict)
+    found = measured(Scaled())
+    for metric in ("extreme_error", "extreme_grazing"):
+        assert found["", metric].value == pytest.approx(0.1, rel=1e-5)
+
+
 def spoilt(answers, queries):
     answers[queries.sigma < 1e-3] = np.nan
     answers[queries.sigma > 1e4, 2] = -1.0
@@ -82,8 +97,7 @@ def spoilt(answers, queries):
 def test_what_cannot_be_is_counted_and_leaves_the_rest_to_be_measured():
     found = measured(Scaled(spoil=spoilt))
     # Near and far: 18 queries a footprint, each twice.
-    assert found["", "extreme_not_finite"].value == 2 * 2 * 18
-    assert found["", "extreme_negative"].value == 2 * 18
+    assert found["", "extreme_not_finite"].value == 2 * 2 * 18 and found["", "extreme_negative"].value == 2 * 18
     assert [size for size, _ in found["", "extreme_error"].curve] == [1e-2, 1.0, 1e4]
     assert ("", "extreme_large") not in found, "no pair is finite"
 
@@ -93,8 +107,11 @@ def test_places_and_sizes_that_change_the_answer_are_seen():
     assert measured(drift)["", "extreme_far"].value == pytest.approx(0.1, rel=0.01)
     shrink = Scaled(spoil=lambda answers, queries: answers * np.where(queries.sigma > 1e4, 0.75, 1.0)[:, None])
     found = measured(shrink)
-    assert found["", "extreme_far"].value == 0.0
-    assert found["", "extreme_large"].value == pytest.approx(0.25, rel=0.02)
+    assert found["", "extreme_far"].value == 0.0 and found["", "extreme_large"].value == pytest.approx(0.25, rel=0.02)
+
+
+def test_the_names_of_runtimes_are_those_of_the_models():
+    assert set(RUNTIMES) == set(get_args(RuntimeName))
 
 
 @pytest.mark.parametrize("cloth", [LINING, lustrous(TWILL)], ids=lambda fabric: fabric.name)

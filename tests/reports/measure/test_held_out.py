@@ -12,8 +12,7 @@ def test_more_points_err_less_and_the_truth_hardly(dataset, points, oracle):
     denim, _ = dataset
     found = [{record.metric: record for record in measure_errors(p, denim, 0)} for p in (*points, oracle)]
     one, two, sixteen, truth = (records["mse"].value for records in found)
-    assert one > two > sixteen > 10 * abs(truth)
-    assert 4 < two / sixteen < 16
+    assert one > two > sixteen > 10 * abs(truth) and 4 < two / sixteen < 16
     assert found[0]["mse"].low < one < found[0]["mse"].high
     assert found[0]["mse_measured"].value - found[0]["truth_noise"].value == pytest.approx(one)
     assert found[0]["zero_answers"].value > found[2]["zero_answers"].value
@@ -27,9 +26,7 @@ def test_more_points_err_less_and_the_truth_hardly(dataset, points, oracle):
 def test_repeats_agree_and_random_methods_draw_anew_with_another_seed(dataset, points):
     few = HeldOutFabric(dataset[0].fabric, dataset[0].queries.take(slice(100)), dataset[0].truth.take(slice(100)))
     first, again, other = (measure_errors(points[0], few, seed) for seed in (0, 0, 1))
-    assert first == again
-    assert first[0].count == 100
-    assert first[0].value != other[0].value
+    assert first == again and first[0].count == 100 and first[0].value != other[0].value
 
 
 def test_truth_reports_its_own_error(dataset):
@@ -65,5 +62,4 @@ def test_what_answers_cost_is_measured_of_every_method_and_the_truth(dataset, po
     assert all(r.unit == "ms" and len(r.samples) == r.count == EDITS for r in adding)
     named = [rows.fabric.optics() for rows in dataset]
     added = [optics for optics in known if optics not in named]
-    assert len(added) == 2 * EDITS
-    assert all(one not in added[:index] for index, one in enumerate(added))
+    assert len(added) == 2 * EDITS and all(one not in added[:index] for index, one in enumerate(added))

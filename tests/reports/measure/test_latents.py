@@ -1,5 +1,3 @@
-"""Between fabrics and after edits: methods whose errors and times are known, and a tiny untrained network."""
-
 import time
 
 import pytest
@@ -51,14 +49,12 @@ def test_pairs_differ_in_one_thing_and_have_one_repeat():
         assert pair.first.weave.repeat == pair.second.weave.repeat
         assert (pair.first.weave == pair.second.weave) == (pair.differs == "yarns")
         same = (pair.first.warp, pair.first.weft) == (pair.second.warp, pair.second.weft)
-        assert same == (pair.differs == "draft")
-        assert Fabric.model_validate(between(pair, 0.5).model_dump())
+        assert same == (pair.differs == "draft") and Fabric.model_validate(between(pair, 0.5).model_dump())
 
 
 def test_between_are_the_numbers_in_between():
     pair = pairs()[0]
-    assert between(pair, 0.0).optics() == pair.first.optics()
-    assert between(pair, 1.0).optics() == pair.second.optics()
+    assert between(pair, 0.0).optics() == pair.first.optics() and between(pair, 1.0).optics() == pair.second.optics()
     quarter = between(pair, 0.25)
     for name in ("bend", "twist", "roughness"):
         ends = getattr(pair.first.warp, name), getattr(pair.second.warp, name)
@@ -72,11 +68,9 @@ def test_the_truth_has_no_error_where_it_is_the_truth(measured):
     Answers are no linear function of roughness and bend: the blend of answers errs most in the middle.
     """
     curves = {(record.metric, record.note): record for record in measured}
-    assert len(curves) == len(measured) == 3
-    assert ("reencode_error", "draft of denim") not in curves
+    assert len(curves) == len(measured) == 3 and ("reencode_error", "draft of denim") not in curves
     anew, blended = (dict(curves[metric, "yarns of satin_8"].curve) for metric in ("reencode_error", "path_error"))
-    assert list(anew) == list(SHARES)
-    assert set(anew.values()) == {blended[0.0], blended[1.0]} == {0.0}
+    assert list(anew) == list(SHARES) and set(anew.values()) == {blended[0.0], blended[1.0]} == {0.0}
     assert set(dict(curves["path_error", "draft of denim"].curve).values()) == {0.0}
     assert curves["path_error", "yarns of satin_8"].value == blended[0.5] == max(blended.values()) > 0.02
 
@@ -85,10 +79,8 @@ def test_edits_of_a_yarn_are_waited_for_and_edits_of_a_colour_are_not():
     method = Slow()
     yarn, colour = measure_edits(method, load_fabric("denim"), repeats=5)
     assert len(method.asked) == 1 + 6  # the fabric, one edit to warm up, five timed ones: none twice
-    assert yarn.low <= yarn.value <= yarn.high
-    assert yarn.value >= 3.0 and yarn.unit == "ms" and yarn.count == 5
-    assert colour.value < yarn.value
-    assert (yarn.note, colour.note) == ("a yarn", "a colour")
+    assert yarn.low <= yarn.value <= yarn.high and yarn.value >= 3.0 and yarn.unit == "ms" and yarn.count == 5
+    assert colour.value < yarn.value and (yarn.note, colour.note) == ("a yarn", "a colour")
 
 
 def test_a_network_is_measured():

@@ -24,11 +24,7 @@ def call():
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")
 @pytest.mark.parametrize(
-    ("call", "size"),
-    [
-        ("two of three arrays", 128 * MB),
-        pytest.param("torch", 16 * MB, marks=pytest.mark.slow),
-    ],
+    ("call", "size"), [("two of three arrays", 128 * MB), pytest.param("torch", 16 * MB, marks=pytest.mark.slow)]
 )
 def test_what_a_call_holds_at_once_is_counted_and_what_it_held_before_is_not(call, size):
     """Twice the size, within a tenth and what is stated as unsure, in a process that holds nothing else."""

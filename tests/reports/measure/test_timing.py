@@ -44,10 +44,8 @@ def test_methods_take_turns_after_the_warm_up():
     a, b = time_side_by_side(contenders, repeats=11, warm_up=2, clock=clock)
     assert calls == ["a", "b", "b"] * 13
     # Calls of a take 1000, 1100, ... 2000 ns for 10 queries: median 1500, quartiles 1250 and 1750.
-    assert a.samples == pytest.approx(range(100, 210, 10))
-    assert a.quartiles == pytest.approx((125, 150, 175))
-    assert b.quartiles == pytest.approx((4, 4, 4))
-    assert len(a.samples) == 11
+    assert a.samples == pytest.approx(range(100, 210, 10)) and a.quartiles == pytest.approx((125, 150, 175))
+    assert b.quartiles == pytest.approx((4, 4, 4)) and len(a.samples) == 11
 
 
 def test_on_several_threads_each_makes_the_call_at_the_same_time():
@@ -60,8 +58,7 @@ def test_on_several_threads_each_makes_the_call_at_the_same_time():
 
     contender = Contender(predict, many_queries(10), threads=3)
     time_side_by_side([contender], repeats=2, warm_up=1)
-    assert contender.rows == 30
-    assert len(names) == 3
+    assert contender.rows == 30 and len(names) == 3
 
 
 @pytest.mark.parametrize(("cost", "rows"), [(1, 1000), (10_000, 1000), (40_000, 512), (300_000, 64), (10**9, 16)])
@@ -77,8 +74,7 @@ def test_slow_methods_answer_fewer_queries(cost, rows):
 
 
 def test_thread_counts_are_said_once():
-    assert thread_counts([0, 1]) == sorted({1, cores()})
-    assert thread_counts([4, 2, 4]) == [2, 4]
+    assert thread_counts([0, 1]) == sorted({1, cores()}) and thread_counts([4, 2, 4]) == [2, 4]
 
 
 def test_real_time_passes_on_one_thread_of_torch_and_what_a_method_did_not_run_is_waiting():
@@ -90,5 +86,4 @@ def test_real_time_passes_on_one_thread_of_torch_and_what_a_method_did_not_run_i
         assert torch.get_num_threads() == 1
     finally:
         torch.set_num_threads(before)
-    assert idle.quartiles[1] >= 1e6
-    assert 0.85 < idle.waited < 1.0 and math.isnan(many.waited)
+    assert idle.quartiles[1] >= 1e6 and 0.85 < idle.waited < 1.0 and math.isnan(many.waited)

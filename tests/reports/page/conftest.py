@@ -144,9 +144,8 @@ def page_input(made_up, tmp_path_factory):
     live = folder / "live-denim-01234567.html"
     live.write_bytes(b"<title>denim</title>")
     danger = load_fabric("denim").model_copy(update={"source": "<script>alert('cloth')</script> & more"})
-    row = MetricRow(
-        "added_largest_error", "largest error", "Largest error of all queries.", unit="1/sr", format="percent"
-    )
+    words = "added_largest_error", "largest error", "Largest error of all queries."
+    row = MetricRow(*words, unit="1/sr", format="percent")
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(catalogue.METRICS, row.name, row)
         yield PageInput(

@@ -29,8 +29,7 @@ def test_ticks_of_both_signs_are_powers_of_ten_and_few():
 @pytest.mark.parametrize("count", [1, 5, 40])
 def test_labels_keep_apart(count):
     places = figures._apart([0.1 * (index // 3) for index in range(count)], 0.2, 3.0)
-    assert all(b - a >= 0.2 - 1e-9 for a, b in pairwise(places))
-    assert places[-1] <= 3.0
+    assert all(b - a >= 0.2 - 1e-9 for a, b in pairwise(places)) and places[-1] <= 3.0
 
 
 def test_of_a_method_with_knobs_the_last_spectrum_and_the_baselines_are_drawn(made_up):
@@ -41,17 +40,14 @@ def test_of_a_method_with_knobs_the_last_spectrum_and_the_baselines_are_drawn(ma
 
 
 @SCHEMES
-def test_every_method_has_a_colour_of_its_own(scheme):
+def test_every_method_has_a_colour_and_a_mark_of_its_own(scheme):
+    assert len({*(mark for mark, _, _ in METHODS.values()), *MARKS}) == len(METHODS) + len(MARKS)
     names = ["truth", "woven", "neumip", "point_sampled", "woven_wide", "another"]
     colours = scheme.colours(names)
     assert len(set(colours.values())) == len(names)
     assert scheme.colours(["woven", "woven"]) == {"woven": colours["woven"]}
     assert {*CLASSES, *NAMES} <= set(scheme.methods)
     assert len(set(scheme.methods.values()) | set(scheme.others)) == len(scheme.methods) + len(scheme.others)
-
-
-def test_every_model_has_a_mark_that_no_other_has():
-    assert len({*(mark for mark, _, _ in METHODS.values()), *MARKS}) == len(METHODS) + len(MARKS)
 
 
 def test_a_page_gives_names_their_colours_for_good():

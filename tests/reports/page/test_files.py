@@ -1,7 +1,7 @@
 import pytest
 
 from reports.page.files import FILES, read_files, write_files
-from weaves.errors import BadInput
+from tests.refusals import refusal
 
 ABC = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"  # SHA-256 of "abc", FIPS 180-4
 
@@ -31,10 +31,8 @@ def test_files_of_an_earlier_page_are_removed_and_others_kept(folder):
 
 @pytest.mark.parametrize("content", ["", "[]", '{"a": 1}', '{"../a": "b"}', '{"/a": "b"}'])
 def test_what_is_no_list_is_bad_input(folder, content):
-    with pytest.raises(BadInput, match=r"files\.json: does not exist"):
-        read_files(folder)
+    assert "files.json: does not exist" in refusal(read_files, folder)
     (folder / FILES).write_text(content)
-    with pytest.raises(BadInput, match=r"files\.json"):
-        read_files(folder)
+    assert "files.json" in refusal(read_files, folder)
     write_files(folder, ["records.json"])
     assert (folder / "figures" / "a.png").exists()

@@ -33,8 +33,7 @@ def drawn():
 
 def test_no_label_covers_another_or_a_mark_or_leaves_its_panel(drawn):
     figure, texts, boxes = drawn
-    assert len(boxes) == 20
-    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    assert len(boxes) == 20 and not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
     half = MARK * figure.dpi / 72
     for text, box in zip(texts, boxes, strict=True):
         panel = text.axes.bbox

@@ -1,5 +1,3 @@
-"""Pictures of a page: their order, and strips of frames."""
-
 import io
 from pathlib import Path
 
@@ -46,8 +44,7 @@ def test_strips_are_in_order_and_say_their_errors():
     assert [(strip.fabric, strip.scene) for strip in found] == [
         ("basket", "plane"), ("denim", "sphere"), ("denim", "plane"), ("", "attic"),
     ]  # fmt: skip
-    assert found[1].role == "unseen"
-    assert [cell["method"] for cell in found[1].cells] == ["truth", "woven"]
+    assert found[1].role == "unseen" and [cell["method"] for cell in found[1].cells] == ["truth", "woven"]
     assert [strip.cells[-1]["mse"] for strip in found[1:]] == ["2.00e−3", "–", "5.00e−4"]
 
 

@@ -1,21 +1,11 @@
-"""The table of README.md, reports/RESULTS.md, and blocks that a command writes."""
-
 import math
 
 import pytest
 
 from reports.record import Machine, Record
-from reports.tables.documents import (
-    README_METHODS,
-    block,
-    kept_time,
-    markers,
-    readme_block,
-    results_page,
-    two_decimals,
-    with_block,
-)
-from weaves.errors import BadInput
+from reports.tables import documents
+from reports.tables.documents import README_METHODS, block, markers, readme_block, results_page
+from tests.refusals import refusal
 
 MACHINE = Machine(
     cpu="Test CPU", cores=2, threads=2, system="Linux", python="3.11", packages={"numpy": "2.0"}, date="2026-01-01T12"
@@ -86,19 +76,16 @@ def test_a_fresh_run_changes_no_byte_while_times_are_within_a_quarter(records):
     assert changed.splitlines() == expected
 
 
-def test_a_time_is_kept_within_a_quarter():
-    assert [kept_time("2×", fresh) for fresh in (2.5, 1.6, 2.6, 1.5)] == ["2×", "2×", "2.6×", "1.5×"]
-    assert [kept_time("–", 3.21), kept_time("12×", 11.8)] == ["3.2×", "12×"]
+def test_a_time_is_kept_within_a_quarter_and_numbers_have_no_sign_at_zero():
+    assert [documents.kept_time("2×", fresh) for fresh in (2.5, 1.6, 2.6, 1.5)] == ["2×", "2×", "2.6×", "1.5×"]
+    assert [documents.kept_time("–", 3.21), documents.kept_time("12×", 11.8)] == ["3.2×", "12×"]
+    assert [documents.two_decimals(value) for value in (-0.004, 0.0, -0.123)] == ["0.00", "0.00", "−0.12"]
 
 
-def test_numbers_have_no_sign_at_zero():
-    assert [two_decimals(value) for value in (-0.004, 0.0, -0.123)] == ["0.00", "0.00", "−0.12"]
-
-
-def test_records_without_the_baseline_are_refused(records):
+def test_records_without_the_baseline_or_of_no_recipe_are_refused(records, made_up):
     rest = [record for record in records if record.method != "point_sampled"]
-    with pytest.raises(BadInput, match="two random points"):
-        readme_block(rest, MACHINE, "", "file")
+    assert "two random points" in refusal(readme_block, rest, MACHINE, "", "file")
+    assert "names no recipe" in refusal(results_page, made_up, MACHINE, "file")
 
 
 def test_the_file_says_where_its_numbers_come_from(made_up):
@@ -123,22 +110,16 @@ def test_without_two_random_points_there_are_no_ratios(records):
     assert "\n\n\n" not in page, "a section without sentences has no empty paragraph"
 
 
-def test_records_of_no_recipe_are_refused(made_up):
-    with pytest.raises(BadInput, match="names no recipe"):
-        results_page(made_up, MACHINE, "file")
-
-
 FIRST, LAST = markers("speeds")
 TEXT = f"before\n{FIRST}\nold\n{LAST}\nafter\n"
 
 
 def test_a_block_is_replaced_and_nothing_else():
     assert block(TEXT, "speeds", "file") == "old\n"
-    assert with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
-    assert with_block(TEXT, "speeds", "old", "file") == TEXT
+    assert documents.with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
+    assert documents.with_block(TEXT, "speeds", "old", "file") == TEXT
 
 
 @pytest.mark.parametrize("text", ["nothing", f"{FIRST}\nno end", f"{LAST}\n{FIRST}\n"])
 def test_a_missing_marker_is_named(text):
-    with pytest.raises(BadInput, match=r"notes\.md: has no block 'speeds'"):
-        block(text, "speeds", "notes.md")
+    assert refusal(block, text, "speeds", "notes.md").startswith("notes.md: has no block 'speeds'")

@@ -1,5 +1,3 @@
-"""Errors at equal time: the rival's curve, class by class."""
-
 import math
 
 import pytest
@@ -10,21 +8,16 @@ from reports.tables.equal_time import equal_time_table, error_at, size_table
 
 
 def test_the_curve_of_a_parameter_is_straight_in_both_logarithms():
-    # Error falls as time^-1/2, as that of random points does: exactly so at times between the settings.
+    """Error falls as time^-1/2, as that of random points does: exactly so at times between the settings.
+
+    A setting that a faster one beats does not help its family; from what is lost in noise on nothing is left to beat.
+    """
     curve = [(t, t**-0.5) for t in (100.0, 400.0, 1600.0)]
-    assert error_at(curve, 250.0) == pytest.approx(250.0**-0.5)
-    assert math.isnan(error_at(curve, 99.0))
+    assert error_at(curve, 250.0) == pytest.approx(250.0**-0.5) and math.isnan(error_at(curve, 99.0))
     assert error_at(curve, 1e6) == pytest.approx(1600.0**-0.5)
-
-
-def test_a_setting_that_a_faster_one_beats_does_not_help_its_family():
     assert error_at([(100.0, 0.1), (200.0, 0.5), (400.0, 0.05)], 200.0) == pytest.approx(math.sqrt(0.1 * 0.05))
-
-
-def test_from_what_is_lost_in_noise_on_nothing_is_left_to_beat():
     curve = [(100.0, 0.2), (200.0, 0.0), (400.0, 0.1)]
-    assert error_at(curve, 150.0) == pytest.approx(0.2)
-    assert error_at(curve, 300.0) == error_at(curve, 500.0) == 0.0
+    assert error_at(curve, 150.0) == pytest.approx(0.2) and error_at(curve, 300.0) == error_at(curve, 500.0) == 0.0
 
 
 TIMES = {("ours", ""): 200.0, ("points", "k = 1"): 100.0, ("points", "k = 4"): 400.0}
@@ -47,8 +40,7 @@ def test_a_method_is_compared_with_every_setting_at_its_own_time():
     table = equal_time_table(size_table(list(records())))
     assert set(table["method"]) == {"ours"} and set(table["rival"]) == {"points"}
     ratio = table[table["measure"] == "specular"].set_index("size")["ratio"]
-    assert ratio["below .1"] == pytest.approx(0.5)
-    assert ratio["1 to 3"] == pytest.approx(4.0)
+    assert ratio["below .1"] == pytest.approx(0.5) and ratio["1 to 3"] == pytest.approx(4.0)
 
 
 def test_each_setting_of_the_front_is_compared_with_all_but_itself():

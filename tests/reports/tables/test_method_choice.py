@@ -1,5 +1,3 @@
-"""The choice of a method: predictions add up as squared errors and times do, and wishes are met or answered."""
-
 import math
 
 import pandas as pd

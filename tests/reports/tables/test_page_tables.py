@@ -1,5 +1,3 @@
-"""Tables of a page: cells with intervals and ranges, words, what is marked and what is left out."""
-
 import math
 
 import pytest
@@ -19,11 +17,6 @@ def sections_of(records):
     return result_tables(records, frames, facts(records, frames["errors"]))
 
 
-def tables_of(records, section):
-    """Return the tables of a section, from Records."""
-    return sections_of(records).get(section, [])
-
-
 def cells_of(table, label):
     """Return the cells of a row by the titles of their columns."""
     (row,) = [row for row in table.rows if row.label.replace("\u00a0", " ") == label]
@@ -31,27 +24,22 @@ def cells_of(table, label):
     return dict(zip(titles, row.cells, strict=True))
 
 
-def test_a_table_has_numbers_on_the_right():
+def test_a_table_has_numbers_on_the_right_and_settings_of_a_method_are_a_group():
     table = markdown_table(("method", "ns"), [("points", "12"), ("woven", "3")])
     assert table.splitlines() == ["| method | ns |", "| :-- | --: |", "| points | 12 |", "| woven | 3 |"]
-
-
-def test_settings_of_a_method_are_a_group():
-    rows = [
-        TableRow(f"{name}", (TableCell("1"),), name, setting) for name, setting in (("a", "1"), ("a", "2"), ("b", ""))
-    ]
+    settings = ("a", "1"), ("a", "2"), ("b", "")
+    rows = [TableRow(f"{name}", (TableCell("1"),), name, setting) for name, setting in settings]
     groups = ResultTable("t", ("method", "x"), tuple(rows)).groups
     assert [(head, len(part)) for head, part in groups] == [("a", 2), ("", 1)]
 
 
 def test_a_paragraph_without_its_value_is_left_out():
-    assert paragraphs(["a {b}", "c"], {"b": 1}) == ["a 1", "c"]
-    assert paragraphs(["a {b}", "c"], {}) == ["c"]
+    assert paragraphs(["a {b}", "c"], {"b": 1}) == ["a 1", "c"] and paragraphs(["a {b}", "c"], {}) == ["c"]
 
 
 def test_networks_trained_once_are_left_out_of_a_single_unseen_fabric(made_up, three_trainings):
     """Neumip was trained once: its errors on the unseen fabric have no range; woven's have."""
-    assert [table.title.partition(",")[0] for table in tables_of(made_up, "aliasing")]
+    assert [table.title.partition(",")[0] for table in sections_of(made_up)["aliasing"]]
     sections = sections_of(three_trainings)
     labels = {table.key: [row.label for row in table.rows] for table in sections["aliasing"]}
     assert "NeuMIP" in labels["seen"] and "NeuMIP" not in labels["unseen"] and "woven" in labels["unseen"]
@@ -63,7 +51,7 @@ def test_networks_trained_once_are_left_out_of_a_single_unseen_fabric(made_up, t
 
 
 def test_several_unseen_fabrics_have_geometric_means(two_unseen):
-    (over,) = [table for table in tables_of(two_unseen, "error") if table.title.startswith("Means over unseen")]
+    (over,) = [table for table in sections_of(two_unseen)["error"] if table.title.startswith("Means over unseen")]
     assert [row.label for row in over.rows][:1] == ["woven"] and "NeuMIP" not in [row.label for row in over.rows]
     ratio = cells_of(over, "woven")["× lower"]
     assert ratio.text == "2.2×" and ratio.interval.startswith("(")
@@ -77,7 +65,7 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
         for threads, time in ((4, 120.0), (1, 400.0), (2, 210.0))
     ]
     records += [subject.of("prepare_time", 12.5, 9), subject.of("peak_memory", 3e7, 3)]
-    (timing,) = tables_of(records, "time")
+    (timing,) = sections_of(records)["time"]
     shown = {title: cell.text for title, cell in cells_of(timing, "woven").items()}
     assert shown["ns a query"] == "400" and shown["ns a query, 4 threads"] == "120"
     assert shown["ms a frame"] == "829" and shown["ms a frame, 4 threads"] == "249"
@@ -87,7 +75,7 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
 def test_records_of_before_intervals_are_shown_without_one():
     records = CALIBRATIONS.to_records([Calibration("auto", "solid", 0.9, 0.002, 0.8, 1.0, 1.0, 0.0, 100)])
     old = [record.model_copy(update={"low": None, "high": None}) for record in records]
-    shown = [str(tables_of(found, "accuracy")[0].rows[0].cells[1]) for found in (old, records)]
+    shown = [str(sections_of(found)["accuracy"][0].rows[0].cells[1]) for found in (old, records)]
     assert shown == ["0.90", "0.90 (0.80 … 1.00)"]
 
 
@@ -110,7 +98,7 @@ RECORDS = [
 
 def attic(records):
     """Return the table of the attic."""
-    (table,) = tables_of(records, "scenes")
+    (table,) = sections_of(records)["scenes"]
     return table
 
 
@@ -133,8 +121,7 @@ def test_a_scene_has_the_range_over_trainings_beside_its_interval():
 def test_numbers_of_a_scene_have_their_intervals_and_the_last_row_is_the_truths_noise():
     table = attic(RECORDS)
     shown = {title: (cell.text, cell.interval) for title, cell in cells_of(table, "woven").items()}
-    assert shown["MSE"] == ("2.00e−3", "(1.80 … 2.30)e−3")
-    assert shown["PSNR, dB"] == ("31.2", "(30.1 … 32.9)")
+    assert shown["MSE"] == ("2.00e−3", "(1.80 … 2.30)e−3") and shown["PSNR, dB"] == ("31.2", "(30.1 … 32.9)")
     assert shown["colour"] == ("in the noise", "(0 … 3.1 %)")
     assert shown["flicker"] == ("−2.00e−3", "(−2.10 … 0.35)e−3")
     assert shown["ms a frame"] == ("12.5", "") and shown["SSIM"] == ("–", "")

@@ -1,5 +1,3 @@
-"""Sentences of a page: what is the cheapest, the paper's comparison, other work on the machine, facts of the limits."""
-
 import math
 
 import pandas as pd
@@ -8,43 +6,29 @@ import pytest
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.bounded import Bounded
 from reports.record import Record
-from reports.tables.sentences import (
-    BOUNDED,
-    QUIET,
-    busy,
-    cheapest_sentences,
-    facts,
-    headline,
-    learnt,
-    scene_sentences,
-    trade,
-    waited,
-)
+from reports.tables import sentences as told
 
 
 def test_the_cheapest_within_each_limit_is_said():
-    table = pd.DataFrame(
-        {
-            "role": ["seen", "seen", "seen", "unseen"],
-            "method": ["prefiltered", "soft_nodes", "woven", "woven"],
-            "setting": ["", "k = 4", "", ""],
-            "ns": [240.0, 1500.0, 4000.0, 4000.0],
-            "error": [0.1, 0.04, 0.05, 0.011],
-            "flicker": [0.03, 0.02, 0.002, math.nan],
-        }
-    )
-    seen, unseen = (text.replace("\u00a0", " ") for text in cheapest_sentences(table))
+    rows = [
+        ("seen", "prefiltered", "", 240.0, 0.1, 0.03),
+        ("seen", "soft_nodes", "k = 4", 1500.0, 0.04, 0.02),
+        ("seen", "woven", "", 4000.0, 0.05, 0.002),
+        ("unseen", "woven", "", 4000.0, 0.011, math.nan),
+    ]
+    table = pd.DataFrame(rows, columns=["role", "method", "setting", "ns", "error", "flicker"])
+    seen, unseen = (text.replace("\u00a0", " ") for text in told.cheapest_sentences(table))
     assert seen == (
         "Seen fabrics, error of the colour: cheapest within 10 %: prefiltered (240 ns); cheapest within 5 %: soft "
         "nodes, k = 4 (1,500 ns); no method reaches 2 % or 1 %."
     )
     assert unseen.endswith("cheapest within 10 %, 5 % and 2 %: woven (4,000 ns); no method reaches 1 %.")
-    (flicker,) = (text.replace("\u00a0", " ") for text in cheapest_sentences(table, "flicker"))
+    (flicker,) = (text.replace("\u00a0", " ") for text in told.cheapest_sentences(table, "flicker"))
     assert flicker == (
         "Seen fabrics, flicker: cheapest within .1 of the truth: prefiltered (240 ns); cheapest within .01 of the "
         "truth: woven (4,000 ns); no method reaches .001 of the truth."
     )
-    assert cheapest_sentences(table[:0]) == []
+    assert told.cheapest_sentences(table[:0]) == []
 
 
 SCENES = pd.DataFrame(
@@ -61,7 +45,7 @@ SCENES = pd.DataFrame(
 
 def test_scenes_name_the_cheapest_and_what_is_in_the_noise():
     """An error lost in the noise counts as the end of its interval; a flicker below the truth's is as far as above."""
-    found = {scene: [t.replace("\u00a0", " ") for t in texts] for scene, texts in scene_sentences(SCENES).items()}
+    found = {name: [t.replace("\u00a0", " ") for t in texts] for name, texts in told.scene_sentences(SCENES).items()}
     assert found["attic"] == [
         "Error of the colour: cheapest within 10 %: soft nodes, k = 4 (10.0 ms); cheapest within 5 %: woven (20.0 "
         "ms); cheapest within 2 %: soft nodes, k = 8 (45.6 ms).",
@@ -70,27 +54,19 @@ def test_scenes_name_the_cheapest_and_what_is_in_the_noise():
         "In the noise of the truth: the error of soft nodes, k = 4 and soft nodes, k = 8.",
     ]
     assert found["cellar"] == []  # nobody was timed there
-    assert scene_sentences(SCENES[:0]) == {}
+    assert told.scene_sentences(SCENES[:0]) == {}
 
 
 def test_the_trade_names_the_cheapest_methods_and_what_two_points_get():
-    table = pd.DataFrame(
-        {
-            "role": "seen",
-            "method": ["point_sampled", "soft_nodes", "woven"],
-            "setting": ["k = 2", "k = 1", ""],
-            "fabrics": 8,
-            "ns": [500.0, 1000.0, 4000.0],
-            "error": [0.4, 0.045, 0.03],
-        }
-    )
-    lead, figures = trade(table)
+    rows = [("point_sampled", "k = 2", 500.0, 0.4), ("soft_nodes", "k = 1", 1000.0, 0.045), ("woven", "", 4000.0, 0.03)]
+    table = pd.DataFrame(rows, columns=["method", "setting", "ns", "error"]).assign(role="seen", fabrics=8)
+    lead, figures = told.trade(table)
     assert lead.replace("\u00a0", " ") == (
         "A pixel of two random points has an error of 40 % on the 8 seen fabrics. Cheapest within 10 % and 5 % error: "
         "soft nodes, k = 1 at 2× the time of two points; within 2 % error: no method."
     )
     assert [figure["value"] for figure in figures] == ["2×", "2×", "–", "40 %"]
-    assert trade(table[1:]) == trade(table[:0]) == ("", [])
+    assert told.trade(table[1:]) == told.trade(table[:0]) == ("", [])
 
 
 def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8, seeds=0, least=math.nan, most=math.nan):
@@ -102,21 +78,21 @@ def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8, seeds=0, least=ma
 
 
 def test_the_headline_admits_a_defeat_and_calls_one_training_one():
-    defeat = headline("woven", "", *tables(0.5, 1.66), paper=False)
-    once = headline("woven", "", *tables(9.13, 0.8, seeds=1), paper=False)
+    defeat = told.headline("woven", "", *tables(0.5, 1.66), paper=False)
+    once = told.headline("woven", "", *tables(9.13, 0.8, seeds=1), paper=False)
     where = "than point sampling at 2 points on the 8 seen fabrics"
     assert defeat == f"Woven reaches 2.0× higher MSE {where}, at 1.7× its time."
     assert once == f"Woven reaches 9.1× lower MSE {where}, at 0.8× its time (one training)."
-    assert "8 seen fabrics (one training); the paper" in headline("woven", "", *tables(9.13, seeds=1))
+    assert "8 seen fabrics (one training); the paper" in told.headline("woven", "", *tables(9.13, seeds=1))
 
 
 def test_several_trainings_have_a_range():
-    text = headline("woven", "", *tables(9.13, seeds=3, least=5.7, most=13.21), paper=False)
+    text = told.headline("woven", "", *tables(9.13, seeds=3, least=5.7, most=13.21), paper=False)
     assert "reaches 9.1× lower MSE (5.7× to 13.2× over 3 trainings) than" in text and "one training" not in text
-    worse = headline("woven", "", *tables(0.5, seeds=3, least=0.25, most=0.8), paper=False)
+    worse = told.headline("woven", "", *tables(0.5, seeds=3, least=0.25, most=0.8), paper=False)
     assert "2.0× higher MSE (1.2× to 4.0× over 3 trainings)" in worse
     # All but one are lost in the noise of the truth.
-    assert "trainings" not in headline("woven", "", *tables(0.5, seeds=3))
+    assert "trainings" not in told.headline("woven", "", *tables(0.5, seeds=3))
 
 
 @pytest.mark.parametrize(
@@ -129,25 +105,26 @@ def test_several_trainings_have_a_range():
 def test_several_unseen_fabrics_have_a_geometric_mean_and_an_interval(mean, low, high, words):
     errors, timing = tables(100.0, role="unseen", fabrics=9, seeds=3, least=1.0, most=2.0)
     errors = errors.assign(ratio_fabrics=mean, ratio_fabrics_low=low, ratio_fabrics_high=high)
-    text = headline("woven", "", errors.assign(ratio_fabrics_least=5.5, ratio_fabrics_most=7.0), timing, paper=False)
+    errors = errors.assign(ratio_fabrics_least=5.5, ratio_fabrics_most=7.0)
+    text = told.headline("woven", "", errors, timing, paper=False)
     assert words in text
     ends = "3.1× to 12.4×" if mean > 1 else "1.0× to 4.0×"
     assert text.endswith(f"on the 9 unseen fabrics (geometric mean, 95 % interval over fabrics {ends}).")
 
 
 def test_headline_says_only_what_was_measured():
-    assert headline("woven", "", *tables(math.nan, 1.0)) == ""
-    assert "its time" not in headline("woven", "", *tables(3.0), paper=False)
-    assert "on one unseen fabric" in headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
+    assert told.headline("woven", "", *tables(math.nan, 1.0)) == ""
+    assert "its time" not in told.headline("woven", "", *tables(3.0), paper=False)
+    assert "on one unseen fabric" in told.headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
 
 
 def test_the_headline_is_of_what_is_learnt_and_bounded_where_that_was_measured():
     methods = [("point_sampled", "k = 1"), ("point_sampled", "k = 2"), ("woven", ""), ("neumip", "")]
     methods += [("woven", "bounded"), ("selvage", ""), ("selvage", "unbounded")]
     errors = pd.DataFrame(methods, columns=["method", "setting"])
-    assert learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("selvage", "")]
-    assert learnt(errors, {"woven", "neumip", "selvage"}) == [("point_sampled", "k = 1")]
-    assert Bounded(SoftNodes()).setting == f"k = 2 {BOUNDED}"
+    assert told.learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("selvage", "")]
+    assert told.learnt(errors, {"woven", "neumip", "selvage"}) == [("point_sampled", "k = 1")]
+    assert Bounded(SoftNodes()).setting == f"k = 2 {told.BOUNDED}"
 
 
 def of(*shares):
@@ -155,35 +132,34 @@ def of(*shares):
 
 
 def test_the_median_over_methods_is_said():
-    assert waited(of(0.0, 0.25, 0.9)) == 0.25
+    assert told.waited(of(0.0, 0.25, 0.9)) == 0.25
     none = pd.DataFrame()
-    assert {"waited": "25.0 %", "busy": "25.0 %"}.items() <= facts(of(0.0, 0.25, 0.9), none).items()
-    quiet = facts(of(0.001), none)
+    assert {"waited": "25.0 %", "busy": "25.0 %"}.items() <= told.facts(of(0.0, 0.25, 0.9), none).items()
+    quiet = told.facts(of(0.001), none)
     assert quiet["waited"] == "0.1 %" and "busy" not in quiet
-    assert facts([], none) == {} and math.isnan(waited([]))
+    assert told.facts([], none) == {} and math.isnan(told.waited([]))
 
 
 @pytest.mark.parametrize(
     ("a", "b", "words"), [(0.0, 0.0, ""), (0.0, 0.3, "B waited 30 %"), (0.4, 0.3, "A waited 40 %")]
 )
 def test_a_comparison_warns_of_busy_machines_alone(a, b, words):
-    sentences = busy(of(a), of(b))
-    assert len(sentences) == bool(words)
-    assert all(words in sentence for sentence in sentences)
-    assert busy(of(QUIET), []) and busy([], []) == []
+    sentences = told.busy(of(a), of(b))
+    assert len(sentences) == bool(words) and all(words in sentence for sentence in sentences)
+    assert told.busy(of(told.QUIET), []) and told.busy([], []) == []
 
 
 def test_facts_name_trainings_unseen_fabrics_and_the_energy_bound():
     errors = pd.DataFrame({"method": ["woven", "selvage", "soft_nodes"], "setting": "", "zero_answers": 0.0})
     errors = errors.assign(role="unseen", fabrics=[9, 1, 1])
-    values = facts([], errors.assign(seeds=[1, 3, 0]))
+    values = told.facts([], errors.assign(seeds=[1, 3, 0]))
     assert (values["once"], values["several"], values["training_counts"]) == ("woven", "selvage", "3")
     assert values["unseen_fabrics"] == 9 and "one_unseen" not in values and "bounded" not in values
-    values = facts([], errors.assign(seeds=0, fabrics=1, setting=BOUNDED))
+    values = told.facts([], errors.assign(seeds=0, fabrics=1, setting=told.BOUNDED))
     assert values["one_unseen"] == "One" and values["bounded"] and "once" not in values and "several" not in values
 
 
 def test_a_measure_that_was_not_installed_is_known_where_scenes_were_measured():
     frame = Record(method="woven", scene="attic", metric="frame_time", value=20.0)
-    assert "not_by_eye" in facts([frame], pd.DataFrame())
-    assert "not_by_eye" not in facts([frame, frame.of("fovvideovdp", 9.0, 4)], pd.DataFrame())
+    assert "not_by_eye" in told.facts([frame], pd.DataFrame())
+    assert "not_by_eye" not in told.facts([frame, frame.of("fovvideovdp", 9.0, 4)], pd.DataFrame())

@@ -1,5 +1,3 @@
-"""The tables of error against time: what is on the front, and what is the cheapest."""
-
 import math
 
 import pandas as pd
@@ -9,29 +7,19 @@ from reports.tables.tradeoff import cheapest, tradeoff_table
 
 ERRORS = pd.DataFrame(
     [
-        ("slow", "", "seen", 2, 0.01),
-        ("fast", "k = 1", "seen", 2, 0.2),
-        ("fast", "k = 2", "seen", 2, 0.1),
-        ("poor", "", "seen", 2, 0.15),
-        ("narrow", "", "seen", 1, 0.001),
-        ("lost", "", "seen", 2, 0.0),
-        ("untimed", "", "seen", 2, 0.001),
-        ("fast", "k = 1", "unseen", 1, 0.3),
+        ("slow", "", "seen", 2, 0.01), ("fast", "k = 1", "seen", 2, 0.2), ("fast", "k = 2", "seen", 2, 0.1),
+        ("poor", "", "seen", 2, 0.15), ("narrow", "", "seen", 1, 0.001), ("lost", "", "seen", 2, 0.0),
+        ("untimed", "", "seen", 2, 0.001), ("fast", "k = 1", "unseen", 1, 0.3),
     ],
     columns=["method", "setting", "role", "fabrics", "colour_rrmse"],
-).assign(colour_rrmse_least=math.nan, colour_rrmse_most=math.nan)
+).assign(colour_rrmse_least=math.nan, colour_rrmse_most=math.nan)  # fmt: skip
 TIMING = pd.DataFrame(
     [
-        ("slow", "", 900.0, 1.0),
-        ("fast", "k = 1", 100.0, 1.0),
-        ("fast", "k = 2", 200.0, 1.0),
-        ("poor", "", 300.0, 1.0),
-        ("narrow", "", 10.0, 1.0),
-        ("lost", "", 10.0, 1.0),
-        ("truth", "", 9e4, math.nan),
+        ("slow", "", 900.0, 1.0), ("fast", "k = 1", 100.0, 1.0), ("fast", "k = 2", 200.0, 1.0),
+        ("poor", "", 300.0, 1.0), ("narrow", "", 10.0, 1.0), ("lost", "", 10.0, 1.0), ("truth", "", 9e4, math.nan),
     ],
     columns=["method", "setting", "median_ns", "bytes_stored"],
-)
+)  # fmt: skip
 
 
 def test_the_table_compares_what_answers_for_the_same_fabrics():

@@ -1,5 +1,3 @@
-"""A bias is found where there is one, with an error that covers it; Records bring it back."""
-
 import math
 
 import numpy as np

@@ -12,8 +12,7 @@ def test_the_comparison_of_normal_errors():
     error = rng.uniform(0.5, 2.0, (200_000, 1))
     wrong, nothing = error * rng.standard_normal(error.shape), np.zeros_like(error)
     ratio, exceeded = compared(wrong, error, 2.9677 * error, nothing)
-    assert ratio == pytest.approx(1.0, rel=0.01)
-    assert exceeded == pytest.approx(0.003, rel=0.15)
+    assert ratio == pytest.approx(1.0, rel=0.01) and exceeded == pytest.approx(0.003, rel=0.15)
     # The reference's own error is subtracted.
     noisy = wrong + error * rng.standard_normal(error.shape)
     ratio, _ = compared(noisy, error, error, error)
@@ -23,18 +22,13 @@ def test_the_comparison_of_normal_errors():
 @pytest.mark.parametrize(
     ("ratio", "exceeded", "low", "high", "holds"),
     [
-        (0.9, 0.002, 0.85, 0.95, True),
-        (0.9, 0.002, None, None, True),
-        (0.7, 0.002, None, None, False),
-        (0.7, 0.002, 0.5, 0.85, True),
-        (0.7, 0.002, 0.65, 0.75, False),
-        (1.4, 0.002, 1.3, 1.5, False),
-        # 8,000 values: 24 beyond their bound are expected, 38 have a chance of .5 %.
-        (1.0, 36 / 8000, 0.9, 1.1, True),
-        (1.0, 38 / 8000, 0.9, 1.1, False),
+        (0.9, 0.002, 0.85, 0.95, True), (0.9, 0.002, None, None, True), (0.7, 0.002, None, None, False),
+        (0.7, 0.002, 0.5, 0.85, True), (0.7, 0.002, 0.65, 0.75, False), (1.4, 0.002, 1.3, 1.5, False),
+        (1.0, 36 / 8000, 0.9, 1.1, True), (1.0, 38 / 8000, 0.9, 1.1, False),
     ],
-)
+)  # fmt: skip
 def test_a_row_holds_within_its_limits(ratio, exceeded, low, high, holds):
+    """Of 8,000 values 24 beyond their bound are expected; 38 have a chance of .5 %."""
     assert Calibration("auto", "solid", ratio, exceeded, low, high, 1.0, 0.0, 2000).holds is holds
 
 

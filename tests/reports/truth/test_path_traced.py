@@ -1,5 +1,3 @@
-"""Error against time of path-traced frames: numbers of a tiny frame, Records, and equal times in closed form."""
-
 import math
 
 import pytest
@@ -23,10 +21,9 @@ def test_every_method_has_an_error_and_a_time():
     for one in found:
         assert math.isfinite(one.error) and one.seconds > 0 and one.count == 2
         assert math.isnan(one.gain) == (one.method == OTHER)
-    back = RECORDS.from_records(RECORDS.to_records(found))
-    assert [(one.method, one.fabric, one.samples, one.error) for one in back] == [
-        (one.method, one.fabric, one.samples, one.error) for one in found
-    ]
+    both = (RECORDS.from_records(RECORDS.to_records(found)), found)
+    back, there = ([(one.method, one.fabric, one.samples, one.error) for one in rows] for rows in both)
+    assert back == there
 
 
 def test_errors_between_two_times_follow_a_power_law():

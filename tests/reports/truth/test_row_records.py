@@ -1,5 +1,3 @@
-"""Rows written as Records come back equal; NaN has no Record; Records of other measurements are left out."""
-
 import math
 from dataclasses import dataclass
 from typing import Annotated
@@ -36,8 +34,7 @@ def test_rows_are_one_record_a_number_and_come_back_equal():
         subject.model_copy(update={"metric": metric, "value": value, "note": note})
         for metric, value, note in (("worst_error", 0.5, "x = 3"), ("naive_error", 0.25, ""), ("not_finite", 2.0, ""))
     ]
-    assert ROWS.from_records(records) == FOUND
-    assert type(ROWS.from_records(records)[0].failures) is int
+    assert ROWS.from_records(records) == FOUND and type(ROWS.from_records(records)[0].failures) is int
 
 
 def test_nan_has_no_record_and_comes_back_as_the_default():
@@ -46,16 +43,10 @@ def test_nan_has_no_record_and_comes_back_as_the_default():
     assert ROWS.from_records(records)[0].rival == math.inf
 
 
-@pytest.mark.parametrize(
-    "stray",
-    [
-        Record(method="truth", setting="front | warp", fabric="denim", metric="mse", value=1.0),
-        Record(method="truth", setting="front", fabric="denim", metric="worst_error", value=1.0),
-        Record(method="truth", setting="back | weft", fabric="denim", metric="worst_error", value=1.0),
-    ],
-    ids=["another metric", "another setting", "a row of which the rest is missing"],
-)
-def test_records_that_are_no_row_are_left_out(stray):
+@pytest.mark.parametrize("about", [("front | warp", "mse"), ("front", "worst_error"), ("back | weft", "worst_error")])
+def test_records_that_are_no_row_are_left_out(about):
+    """Of another metric, of another setting, and of a row of which the rest is missing."""
+    stray = Record(method="truth", setting=about[0], fabric="denim", metric=about[1], value=1.0)
     assert ROWS.from_records([stray, *ROWS.to_records(FOUND[:1])]) == FOUND[:1]
 
 

@@ -1,5 +1,3 @@
-"""What a sampler saves: estimates agree in the mean, and lobes beat the cosine where highlights are."""
-
 import math
 
 import pytest

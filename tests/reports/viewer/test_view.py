@@ -1,5 +1,3 @@
-"""The file that `twillight view` writes, its parts, and the sentences for what cannot be shown."""
-
 import fnmatch
 import json
 import re

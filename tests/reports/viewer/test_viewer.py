@@ -173,13 +173,11 @@ MOVE = """(async () => {{
 @pytest.mark.parametrize(
     ("name", "value", "changes"),
     [
-        ("Turn", "30", {"turn": 30.0}),
-        ("Tilt", "25", {"tilt": 25.0}),
-        ("Distance", str(np.log(300.0)), {"distance": 300.0}),
-        ("Light, turn", "20", {"light_turn": 20.0}),
+        ("Turn", "30", {"turn": 30.0}), ("Tilt", "25", {"tilt": 25.0}),
+        ("Distance", str(np.log(300.0)), {"distance": 300.0}), ("Light, turn", "20", {"light_turn": 20.0}),
         ("Light, tilt", "70", {"light_tilt": 70.0}),
     ],
-)
+)  # fmt: skip
 def test_sliders_move_viewer_and_light(fresh, name, value, changes):
     fresh.run(MOVE.format(name=name, value=value))
     if name == "Distance":
@@ -191,16 +189,11 @@ def test_sliders_move_viewer_and_light(fresh, name, value, changes):
 @pytest.mark.parametrize(
     ("name", "value", "moved"),
     [
-        ("Warp, roughness", "0.2", [0]),
-        ("Weft, roughness", "0.2", [1]),
-        ("Warp, twist", "35", [0]),
-        ("Weft, twist", "-35", [1]),
-        ("Warp, normal’s weight", "1", [2]),
-        ("Weft, normal’s weight", "0", [3]),
-        ("Optical thickness", str(np.log(0.5)), [0, 1]),
-        ("Bend", "1", [0, 1, 2, 3]),
+        ("Warp, roughness", "0.2", [0]), ("Weft, roughness", "0.2", [1]), ("Warp, twist", "35", [0]),
+        ("Weft, twist", "-35", [1]), ("Warp, normal’s weight", "1", [2]), ("Weft, normal’s weight", "0", [3]),
+        ("Optical thickness", str(np.log(0.5)), [0, 1]), ("Bend", "1", [0, 1, 2, 3]),
     ],
-)
+)  # fmt: skip
 def test_sliders_of_yarns_move_their_components_alone(fresh, name, value, moved):
     before = components(fresh, 2)
     fresh.run(MOVE.format(name=name, value=value))
@@ -331,8 +324,7 @@ def test_every_control_has_a_name_and_takes_the_focus(page):
     nameless = """[...document.querySelectorAll("input, select, button, canvas")].filter(element =>
         !(element.getAttribute("aria-label") || element.textContent.trim() || element.closest("label"))
         || element.tabIndex < 0).map(element => element.outerHTML)"""
-    assert page.run(nameless) == []
-    assert page.run("document.querySelectorAll('[data-name]').length") >= 20
+    assert page.run(nameless) == [] and page.run("document.querySelectorAll('[data-name]').length") >= 20
 
 
 def test_without_webgl_a_still_picture_and_a_sentence(whole, tmp_path):
@@ -340,8 +332,7 @@ def test_without_webgl_a_still_picture_and_a_sentence(whole, tmp_path):
     with viewer(whole, tmp_path, without) as own:
         assert own.run("byId('notice').textContent") == ("This is a still picture: This browser has no WebGL 2.")
         assert own.run("byId('still').getBoundingClientRect().width * byId('still').naturalWidth") > 0
-        assert own.run("getComputedStyle(byId('panel')).display") == "none"
-        assert own.errors == []
+        assert own.run("getComputedStyle(byId('panel')).display") == "none" and own.errors == []
 
 
 def test_nothing_is_written_to_the_console_and_nothing_is_asked_for(page):

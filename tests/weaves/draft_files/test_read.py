@@ -1,7 +1,4 @@
-"""Reading of draft files: what each section means, real files, and what is refused."""
-
 import io
-import signal
 import zipfile
 from importlib.metadata import files
 from pathlib import Path
@@ -11,31 +8,22 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from tests.refusals import accepted, ends, refusal
 from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
 from weaves.draft import Draft, smallest_repeat
 from weaves.draft_files.read import read_draft
 from weaves.draft_files.wif_sections import MOST_WIF_BYTES
-from weaves.errors import MOST_LETTERS, BadInput
 
 SAMPLES = {str(path): Path(path.locate()) for path in files("dtx-to-wif") if "test_data" in path.parts}
 """Files that come with the library; its own tests say which are bad."""
 VALID = sorted(name for name in SAMPLES if "bad_" not in name)
 BAD = sorted(name for name in SAMPLES if "bad_" in name)
 
-SECONDS = 120  # far above the two seconds that are stated: it ends a reader that hangs, whatever else the machine does
-
 
 @pytest.fixture(autouse=True)
 def _ends():
-    """Fail, rather than wait, where a reader does not return."""
-
-    def late(number, frame):
-        raise AssertionError(f"it takes more than {SECONDS} s")
-
-    signal.signal(signal.SIGALRM, late)
-    signal.alarm(SECONDS)
-    yield
-    signal.alarm(0)
+    with ends():
+        yield
 
 
 @pytest.fixture
@@ -52,22 +40,13 @@ def rows(draft):
     return Draft(smallest_repeat(draft.warp_over)).rows()
 
 
-def refusal(read, content, suffix=".wif"):
-    with pytest.raises(BadInput) as refused:
-        read(content, suffix)
-    sentence = str(refused.value)
-    assert len(sentence) <= MOST_LETTERS and sentence.isprintable()
-    return sentence
-
-
 def test_the_sections_of_a_twill(read):
     draft = read(wif())
     assert rows(draft) == BALANCED_ROWS and draft.warp_over.shape == (8, 8)
     assert (draft.title, draft.program, draft.remarks) == ("Small cloth", "Loom 2", ())
     assert draft.ends.colours == ("#ffffff",) * 8 and draft.picks.colours == ("#aa1020",) * 8
     assert (draft.ends.width, draft.picks.width) == pytest.approx((0.75, 0.5))
-    assert draft.ends.per_cm == pytest.approx(720 / 12 / 2.54)
-    assert draft.picks.per_cm == pytest.approx(1 / 0.254)
+    assert draft.ends.per_cm == pytest.approx(720 / 12 / 2.54) and draft.picks.per_cm == pytest.approx(1 / 0.254)
 
 
 def test_liftplans_several_treadles_and_falling_sheds(read):
@@ -89,8 +68,7 @@ def test_single_colours_and_lengths_of_threads(read):
         wif(WARP_COLORS="2=2\n5=\n8=2", WEFT_COLORS="1=1", WARP_SPACING="1=20\n2=4", WARP_THICKNESS="1=5\n2=3\n3=")
     )
     white, red = "#ffffff", "#aa1020"
-    assert draft.ends.colours == (white, red, *[white] * 5, red)
-    assert draft.picks.colours == (white, *[red] * 7)
+    assert draft.ends.colours == (white, red, *[white] * 5, red) and draft.picks.colours == (white, *[red] * 7)
     assert draft.ends.width == pytest.approx((5 + 3 + 6 * 9) / (20 + 4 + 6 * 12))
 
 
@@ -240,13 +218,6 @@ def test_a_weavepoint_file_without_yarns_per_inch(read):
 small = st.sampled_from([name for name in VALID if SAMPLES[name].stat().st_size < 20_000])
 
 
-def is_read_or_one_sentence(read, content, suffix):
-    try:
-        read(content, suffix)
-    except BadInput as refused:
-        assert len(str(refused)) <= MOST_LETTERS and str(refused).isprintable()
-
-
 @settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(small, st.data())
 def test_a_damaged_file_is_a_draft_or_one_sentence(read, name, data):
@@ -254,7 +225,7 @@ def test_a_damaged_file_is_a_draft_or_one_sentence(read, name, data):
     for place in data.draw(st.lists(st.integers(0, len(content) - 1), max_size=6)):
         content[place] ^= 1 << data.draw(st.integers(0, 7))
     left = data.draw(st.integers(0, len(content)))
-    is_read_or_one_sentence(read, bytes(content[:left] if data.draw(st.booleans()) else content), SAMPLES[name].suffix)
+    accepted(read, bytes(content[:left] if data.draw(st.booleans()) else content), SAMPLES[name].suffix)
 
 
 words = st.sampled_from(["[WIF]", "[WARP]", "[TIEUP]", *"=1,%;\n[] \0", "color", "nan"])
@@ -264,4 +235,4 @@ words = st.sampled_from(["[WIF]", "[WARP]", "[TIEUP]", *"=1,%;\n[] \0", "color",
 @given(st.lists(words, max_size=60), st.sampled_from([".wif", ".dtx"]))
 @example(["[WIF]", "\n", "[WARP]", "\n", "color", "=", ","], ".wif")
 def test_any_words_are_a_draft_or_one_sentence(read, pieces, suffix):
-    is_read_or_one_sentence(read, "".join(pieces), suffix)
+    accepted(read, "".join(pieces), suffix)

@@ -1,15 +1,11 @@
-"""Fabrics from drafts: repeats, colours, sizes, assumptions, and what is no cloth."""
-
-import re
-
 import numpy as np
 import pytest
 
+from tests.refusals import refusal
 from tests.weaves.draft_files.drafts import BALANCED_ROWS, numbered, wif
 from weaves.colour import linear_rgb
 from weaves.draft_files.read import read_draft
 from weaves.draft_files.to_fabric import fabric_of
-from weaves.errors import BadInput
 from weaves.fabric import PRESETS, load_fabric
 
 denim, voile = load_fabric("denim"), load_fabric("voile")
@@ -29,9 +25,7 @@ def imported(tmp_path):
 def test_a_twill_with_its_size_and_the_yarns_of_denim(imported, tmp_path):
     found = imported(wif())
     fabric = found.fabric
-    assert fabric.weave.rows() == BALANCED_ROWS
-    assert fabric.yarns_per_cm == (23.62, 3.937)
-    assert fabric.colours is None
+    assert fabric.weave.rows() == BALANCED_ROWS and fabric.yarns_per_cm == (23.62, 3.937) and fabric.colours is None
     assert (fabric.warp.width, fabric.weft.width) == (0.75, 0.5)
     assert fabric.warp.optics() | {"width": 1.0} == denim.warp.optics()
     assert fabric.weft.optics() | {"width": 1.0} == denim.weft.optics()
@@ -51,8 +45,7 @@ def test_a_draft_of_214_threads_with_nine_colours_is_plain(imported):
     )  # fmt: skip
     found = imported(text)
     fabric = found.fabric
-    assert fabric.weave.rows() == [".#", "#."]
-    assert fabric.colours is not None and len(fabric.colours.palette) == 9
+    assert fabric.weave.rows() == [".#", "#."] and fabric.colours is not None and len(fabric.colours.palette) == 9
     ends, picks = fabric.colours.threads("ends"), fabric.colours.threads("picks")
     assert len(ends) == len(picks) == 214 and ends == picks[::-1]
     # The greenest makes light: all are dimmed alike.
@@ -126,8 +119,7 @@ def test_a_last_repeat_that_is_not_whole_is_left_out(imported):
 def test_layers_that_lie_loose_are_said(imported):
     # Ends 1 and 3 weave with picks 1 and 3, ends 2 and 4 with picks 2 and 4, the first layer on top.
     found = imported(wif(TIEUP="1=1\n2=1,3,2\n3=3\n4=1,3,4"))
-    assert not found.fabric.weave.hangs_together()
-    assert any("loose" in sentence for sentence in found.assumed)
+    assert not found.fabric.weave.hangs_together() and any("loose" in sentence for sentence in found.assumed)
 
 
 UNEVEN = numbered([end * end * end % 4 + 1 for end in range(200)] + [1, 2, 3, 4])
@@ -147,13 +139,7 @@ MANY = numbered([f"{k % 256},{k // 256},0" for k in range(300)])
     ],
 )  # fmt: skip
 def test_what_is_no_cloth_is_refused(imported, change, named):
-    with pytest.raises(BadInput, match=re.escape(named)):
-        imported(wif(**change))
-
-
-def test_a_number_of_a_yarn_that_is_not_allowed_is_refused(imported):
-    with pytest.raises(BadInput, match=r"warp\.bend = 95"):
-        imported(wif(), given={"warp": {"bend": 95.0}, "weft": {}})
+    assert named in refusal(imported, wif(**change))
 
 
 def test_the_shipped_houndstooth_is_a_twill_of_four_and_four():

@@ -1,5 +1,3 @@
-"""`twillight import`, `export --mesh`, `export --wif` and `view`: the files, what is printed, what cannot be used."""
-
 import numpy as np
 
 from reports.viewer import view
@@ -88,16 +86,14 @@ def _srgb(linear):
     return 255 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
-def test_a_view_of_a_large_repeat_is_refused_before_any_work(twillight, monkeypatch, tmp_path):
-    monkeypatch.setattr(view, "MOST_REPEAT_CELLS", 3)
-    monkeypatch.setattr(view, "content", None)
-    code, _, told = twillight("view", "gingham", "--out", "x.html")
-    assert code == 2 and "at most 3 cells" in told and not list(tmp_path.iterdir())
-
-
-def test_a_page_of_a_fabric_is_written_whole(twillight, monkeypatch, tmp_path):
+def test_a_page_of_a_fabric_is_written_whole_and_one_of_a_large_repeat_refused_before_any_work(
+    twillight, refused, monkeypatch, tmp_path
+):
     found = shown_of(0, (2,), (1.0,), 32)
+    with monkeypatch.context() as patch:
+        patch.setattr(view, "MOST_REPEAT_CELLS", 3)
+        patch.setattr(view, "content", None)
+        assert "at most 3 cells" in refused("view", "gingham", "--out", "x.html") and not list(tmp_path.iterdir())
     monkeypatch.setattr(view, "content", lambda fabric, truth: found)
     code, said, _ = twillight("view", "gingham", "--out", "a/x.html")
-    assert code == 0 and "5 views" in said
-    assert [path.name for path in (tmp_path / "a").iterdir()] == ["x.html"]
+    assert code == 0 and "5 views" in said and [path.name for path in (tmp_path / "a").iterdir()] == ["x.html"]

@@ -1,5 +1,3 @@
-"""The table of bounces: it returns what was tabulated, and no cloth makes light."""
-
 import math
 
 import numpy as np
@@ -7,12 +5,12 @@ import pytest
 
 from pipeline.analytic.bounces.table import bounce_table, bounced
 from pipeline.analytic.bounces.walks import transport
-from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import height_field
-from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from tests.directions import sphere, unit
+from tests.pipeline.models.against_truth import truth_of
 from tests.pipeline.truth.cloths import LOPSIDED, woven
+from tests.presets import slow
 
 CLOSED = woven("polyester_lining", width=1.0, blend=1.0)
 WAYS = np.float32([unit(*angles) for angles in ((10, 40), (35, 130), (50, 300), (65, 200))])
@@ -56,13 +54,41 @@ def test_bounces_grow_with_every_colour(closed):
 )
 def test_white_cloth_in_a_furnace_makes_no_light(fabric, least):
     """All bounces of white diffuse yarns: closed Lambertian cloth returns all light, others return less."""
-    above = np.float32(sphere(48, 32))
+    above = np.float32(sphere(32, 24))
     above = above[above[:, 2] > 0.0]
     table, ones = bounce_table(fabric), np.ones(len(above))
     for viewer in np.float32([unit(0.1, 0), unit(35, 100), unit(65, 250)]):
         wo = np.tile(viewer, (len(above), 1))
         queries = Queries.round(0.3 * ones, 0.7 * ones, 50.0 * ones, above, wo)
-        first = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean[:, 2:].sum(axis=1)
+        first = truth_of(fabric, queries)[:, 2:].sum(axis=1)
         later = bounced(table, above, wo, np.ones((2, 1))).sum(axis=(1, 2))
         total = (first + later).sum() * 2.0 * math.pi / len(above)
         assert least < total < 1.01
+
+
+@pytest.mark.parametrize(("name", "blend"), [("gauze", 1.0), slow("voile", 0.5), slow("organza", 0.0)])
+def test_white_cloth_that_lets_light_through_makes_none(name, blend):
+    """Light from all around, k_d + k_dt = 1: what yarns return and what comes through gaps is at most 1."""
+    fabric, around = woven(name, blend=blend), np.float32(sphere(48, 32))
+    table, ones = bounce_table(fabric, 1 << 13, through=True), np.ones(len(around))
+    for viewer in np.float32([unit(0.1, 0), unit(35, 100), unit(65, 250)]):
+        wo = np.tile(viewer, (len(around), 1))
+        queries = Queries.round(0.3 * ones, 0.7 * ones, 50.0 * ones, around, wo)
+        first = truth_of(fabric, queries)[:, 2:]
+        for share in (0.9, 0.5, 0.1):
+            colours = np.array([[share], [share], [1.0 - share], [1.0 - share]])
+            later = (bounced(table, around, wo, colours) * colours).sum()
+            once = np.where(around[:, 2:] > 0.0, share, 1.0 - share) * first
+            gap = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width)
+            assert 0.3 < (once.sum() + later) * 4.0 * math.pi / len(around) < 1.01 - 0.5 * gap * viewer[2]
+
+
+def test_yarns_that_transmit_nothing_look_as_in_the_table_of_reflections():
+    """Closed cloth, k_dt = 0: walks are the same up to the third yarn, then fewer; no light comes from behind."""
+    table, own = bounce_table(CLOSED, 1 << 14, through=True), bounce_table(CLOSED, 1 << 14)
+    colours = np.array([[1e-6, 0.9], [1e-6, 0.9], [0.0, 0.0], [0.0, 0.0]])
+    both, one = bounced(table, LIGHTS, VIEWERS, colours)[:, :2], bounced(own, LIGHTS, VIEWERS, colours[:2])
+    assert both[..., 0] == pytest.approx(one[..., 0], rel=1e-5, abs=1e-6 * one[..., 0].max())
+    assert np.sqrt(np.mean((both - one)[..., 1] ** 2)) < 0.05 * one[..., 1].mean()
+    behind = bounced(table, LIGHTS * np.float32([1.0, 1.0, -1.0]), VIEWERS, colours)
+    assert np.abs(behind[:, :2]).max() < 1e-6 and behind[:, 2:].max() > 1e-3

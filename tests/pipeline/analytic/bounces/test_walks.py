@@ -1,5 +1,3 @@
-"""Walks between yarns against closed forms, and what they keep: reciprocity and energy."""
-
 import math
 
 import numpy as np
@@ -24,11 +22,9 @@ def test_starting_points_cover_what_is_seen_from_above(fabric):
 
 
 def test_round_yarns_side_by_side_give_each_other_what_lines_of_sight_say():
-    """Cylinders of diameter 1: from a point at the angle v, the neighbour fills angles from its tangent line down.
-
-    Of what a point sends across, the share between two angles to its normal is half the difference of their sines.
-    What reaches the neighbour leaves the cloth, or reaches another yarn.
-    """
+    """Cylinders of diameter 1: from a point at the angle v, the neighbour fills angles from its tangent line down. Of
+    what a point sends across, the share between two angles to its normal is half the difference of their sines. What
+    reaches the neighbour leaves the cloth, or reaches another yarn."""
     sine = (np.arange(4000) + 0.5) / 2000 - 1.0
     v = np.arcsin(sine)
     x, y = 1.0 - 0.5 * sine, -0.5 * np.cos(v)
@@ -47,6 +43,16 @@ def test_light_takes_each_way_in_both_directions():
     sums = transport(height_field(cylinders(blend=1.0)), 1 << 16, ways, ways)
     there, back = sums.second, sums.second.transpose(3, 2, 1, 0)
     assert np.linalg.norm(there - back) < 0.03 * np.linalg.norm(there)
+
+
+def test_gaps_count_as_seen_where_neither_face_hides_them():
+    """From straight above all of them: what is seen is the plane. At 85 degrees yarns hide all gaps."""
+    fabric = woven("gauze")
+    sums = transport(height_field(fabric), 1 << 10, np.array([unit(0, 0), unit(85, 0), unit(85, 90)]), unit(0, 0)[None])
+    field = height_field(fabric)
+    start = starting_points(field, 1 << 10)
+    assert sums.seen[0] - start.area.sum() == pytest.approx(0.16 * different_cells(field), rel=2e-2)
+    assert (sums.seen[1:] < 2.0 * math.cos(math.radians(85.0)) * different_cells(field)).all()
 
 
 def test_light_that_is_not_sent_on_leaves():

@@ -1,5 +1,3 @@
-"""Horizons of straight yarns side by side: the tangent from a point to the next cylinder."""
-
 import numpy as np
 import pytest
 
@@ -13,10 +11,8 @@ from tests.pipeline.truth.cloths import woven
 
 
 def tangent_sine(v, x, beta):
-    """Return the sine of elevation of the next cylinder, at distance 1, from angle v of one of radius 1/2.
-
-    In the plane across the yarns, stretched by beta; along them a slope is less by the cosine to that plane.
-    """
+    """Return the sine of elevation of the next cylinder, at distance 1, from angle v of one of radius 1/2. In the plane
+    across the yarns, stretched by beta; along them a slope is less by the cosine to that plane."""
     across, up = 0.5 * np.sin(v) * np.sign(x), 0.5 * np.cos(v)
     elevation = np.arctan2(-up, 1.0 - across) + np.arcsin(0.5 / np.hypot(1.0 - across, up))
     slope = np.maximum(beta * np.tan(elevation) * abs(x), 0.0)

@@ -1,22 +1,9 @@
-"""Lobes at a point: its tangent, what of it is seen, and its density, against the truth's surface and marches."""
-
 import math
 
 import numpy as np
 import pytest
 
-from pipeline.analytic.importance.lobes import (
-    FLAKE_ROWS,
-    NEAR,
-    POINT_ROWS,
-    SHARE,
-    STRAIGHT,
-    TX,
-    TZ,
-    Lobes,
-    find_rows,
-    point_places,
-)
+from pipeline.analytic.importance import lobes as point
 from pipeline.analytic.importance.mixture import STRAIGHT_ON, density_rows
 from pipeline.analytic.importance.surface import tabulate_surface
 from pipeline.truth.cloth import cloth_side
@@ -44,10 +31,14 @@ def points_of(fabric):
 
 def lobes_of(fabric, queries):
     """Return the lobes of points, and the densities of their wi."""
-    lobes = Lobes(np.empty((COUNT, FLAKE_ROWS, 3), np.float32), np.empty((COUNT, STRAIGHT + 1), np.float32))
+    lobes = point.Lobes(
+        np.empty((COUNT, point.FLAKE_ROWS, 3), np.float32), np.empty((COUNT, point.STRAIGHT + 1), np.float32)
+    )
     footprints = (queries.u, queries.v, queries.sigma, queries.sigma, np.zeros_like(queries.sigma))
-    scratch, pdf = np.empty((POINT_ROWS, 1), np.float32), np.empty(COUNT, np.float32)
-    find_rows(tabulate_surface(fabric), footprints, queries.wo, point_places(1), np.float32(2.0), scratch, lobes)
+    scratch, pdf = np.empty((point.POINT_ROWS, 1), np.float32), np.empty(COUNT, np.float32)
+    point.find_rows(
+        tabulate_surface(fabric), footprints, queries.wo, point.point_places(1), np.float32(2.0), scratch, lobes
+    )
     density_rows(lobes, queries.wi, queries.wo, pdf)
     return lobes, pdf
 
@@ -56,12 +47,8 @@ def lobes_of(fabric, queries):
 def test_a_cloth_turned_or_mirrored_has_its_lobes_turned_or_mirrored(x, y):
     """A mirror reverses the twists. Points within a deviation of an edge, or of a cell of a grid, may lie beyond it."""
     queries = points_of(LOPSIDED)
-    own, there = (
-        lobes_of(cloth, asked)[1].astype(np.float64)
-        for cloth, asked in (
-            (LOPSIDED, queries), (redrawn(OVER[::y, ::x], mirrored=x * y < 0), reversed_axes(queries, x, y))
-        )
-    )  # fmt: skip
+    image = redrawn(OVER[::y, ::x], mirrored=x * y < 0), reversed_axes(queries, x, y)
+    own, there = (lobes_of(*pair)[1].astype(np.float64) for pair in ((LOPSIDED, queries), image))
     assert np.quantile(np.abs(there / own - 1.0), 0.95) < 1e-2
     assert np.quantile(np.abs(lobes_of(LOPSIDED, reversed_axes(queries, x, y))[1] / own - 1.0), 0.5) > 0.05
 
@@ -77,12 +64,12 @@ def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
         x, y, wo = float(queries.u[n]), float(queries.v[n]), queries.wo[n].astype(float)
         family, side, z, nx, ny, nz, tx, ty, tz = surface_at(front, x, y, int(x), int(y))
         if family == GAP:
-            right += lobes.rest[n, STRAIGHT] > 0.9 or lobes.flakes[n, SHARE].sum() == 0
+            right += lobes.rest[n, point.STRAIGHT] > 0.9 or lobes.flakes[n, point.SHARE].sum() == 0
             continue
-        found = lobes.flakes[n, TX : TZ + 1, 0].astype(float)
+        found = lobes.flakes[n, point.TX : point.TZ + 1, 0].astype(float)
         right += abs(found @ (tx, ty, tz)) > 1.0 - 1e-3
         seen = wo @ (nx, ny, nz) > 0.0 and bool(visible(front, x, y, z, side, ray(*wo, 0.0)))
-        share = float(lobes.flakes[n, SHARE, 0])
+        share = float(lobes.flakes[n, point.SHARE, 0])
         seen_alike += seen == (share > 0.0)
         checked += 1
         wi, alpha = queries.wi[n].astype(float), front.yarn[family, ALPHA]
@@ -92,7 +79,7 @@ def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
         )
         near = wi[2] > 0.0
         wanted = share * (own + (1.0 - STRAIGHT_ON) * mirrored if near else STRAIGHT_ON * own)
-        wanted += lobes.rest[n, NEAR if near else NEAR + 1] * abs(wi[2]) / math.pi
+        wanted += lobes.rest[n, point.NEAR if near else point.NEAR + 1] * abs(wi[2]) / math.pi
         assert pdf[n] == pytest.approx(wanted, rel=2e-3)
     assert right >= 0.98 * COUNT
     # A coarse grid of horizons and a ramp decide what a march decides here.

@@ -1,5 +1,3 @@
-"""The sampler of one point: chi-square over the sphere against the density of flakes, and its digits."""
-
 import math
 
 import mpmath
@@ -7,37 +5,23 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.importance.lobes import (
-    FLAKE_ROWS,
-    POINT_ROWS,
-    SHARE,
-    STRAIGHT,
-    Lobes,
-    find_rows,
-    point_places,
-)
-from pipeline.analytic.importance.mixture import density_rows, draw_rows, sample_flake_scatter
-from pipeline.analytic.importance.surface import tabulate_surface
+from pipeline.analytic.importance.mixture import sample_flake_scatter
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.sequences import independent_pair
 from pipeline.truth.scattering.slab import density, sigma
-from tests.pipeline.truth.cloths import woven
+from tests.directions import unit
+from tests.presets import slow
 
 LEVEL = 1e-3  # chance that a right sampler fails the chi-square test anywhere
 ROWS, COLUMNS, NODES = 16, 32, 48  # cells in polar angle and azimuth, and quadrature nodes along each side of a cell
 
 
-def _unit(degrees, azimuth_degrees):
-    theta, phi = math.radians(degrees), math.radians(azimuth_degrees)
-    return math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)
-
-
 # Given direction and tangent: both tilted; grazing; nearly along the fibre; from behind, across the fibre.
 PAIRS = {
-    "tilted": (_unit(35, 20), _unit(75, 65)),
-    "grazing": (_unit(84, 200), _unit(97, 40)),
-    "along": (_unit(50, 110), _unit(51, 111)),
-    "behind": (_unit(140, 300), _unit(90, 30)),
+    "tilted": (unit(35, 20), unit(75, 65)),
+    "grazing": (unit(84, 200), unit(97, 40)),
+    "along": (unit(50, 110), unit(51, 111)),
+    "behind": (unit(140, 300), unit(90, 30)),
 }
 CONFIGURATIONS = [(alpha, pair) for alpha in (0.1, 0.3, 1.0) for pair in PAIRS]
 
@@ -50,7 +34,6 @@ def flake_scatter_pdf(wx, wy, wz, sx, sy, sz, tx, ty, tz, alpha):
 
 @allocating_kernel
 def _directions(w, t, alpha, key, count):
-    """Return `count` sampled directions."""
     directions = np.empty((count, 3))
     for k in range(count):
         first, second = independent_pair(key, k)
@@ -60,10 +43,8 @@ def _directions(w, t, alpha, key, count):
 
 @allocating_kernel
 def _cell_integrals(w, t, alpha, rows, columns, nodes):
-    """Return the integral of the pdf over cells in polar angle and azimuth, by midpoints.
-
-    Nodes equal in cosine would lie 4 degrees apart at the poles, and lose 6e-4 of a ridge that crosses them.
-    """
+    """Return the integral of the pdf over cells in polar angle and azimuth, by midpoints. Nodes equal in cosine would
+    lie 4 degrees apart at the poles, and lose 6e-4 of a ridge that crosses them."""
     cells = np.zeros((rows, columns))
     step = math.pi / (rows * nodes)
     for row in range(rows * nodes):
@@ -94,33 +75,17 @@ def _chi_square(counts, expected):
     return stats.chi2.sf(((counts - expected) ** 2 / expected).sum(), len(counts) - 1)
 
 
-def _check_chi_square(index, count, folder):
-    """Rationale: samples must fall into the cells of the sphere as the pdf says.
-
-    Expected: p-values above the Sidak share of LEVEL over all configurations. The counts expected come from NODES^2
-    midpoints a cell; the pdf jumps at the direction opposite to the given one, and doubling the nodes moves no cell
-    by more than a small part of its statistical error.
-    """
+@pytest.mark.parametrize("count", [400_000, slow(10_000_000)])
+@pytest.mark.parametrize("index", range(len(CONFIGURATIONS)))
+def test_directions_pass_a_chi_square_test(index, count):
+    """P-values above the Sidak share of LEVEL over all configurations; NODES^2 midpoints a cell. The pdf jumps at the
+    direction opposite to the given one: doubling the nodes moves no cell by more than a small part of its statistical
+    error."""
     alpha, pair = CONFIGURATIONS[index]
     w, t = (np.array(x) for x in PAIRS[pair])
     expected = count * _cell_integrals(w, t, alpha, ROWS, COLUMNS, NODES)
-    counts = _counts(_directions(w, t, alpha, np.uint64(100 + index), count))
-    value = _chi_square(counts, expected)
-    least = 1.0 - (1.0 - LEVEL) ** (1.0 / len(CONFIGURATIONS))
-    if value <= least:
-        np.savez(folder / "evidence.npz", counts=counts, expected=expected, w=w, t=t, alpha=alpha)
-    assert value > least, f"p = {value:.2e} at alpha {alpha}, {pair}; counts and expected in {folder}/evidence.npz"
-
-
-@pytest.mark.parametrize("index", range(len(CONFIGURATIONS)))
-def test_directions_pass_a_chi_square_test(index, tmp_path):
-    _check_chi_square(index, 400_000, tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("index", range(len(CONFIGURATIONS)))
-def test_many_directions_pass_a_chi_square_test(index, tmp_path):
-    _check_chi_square(index, 10_000_000, tmp_path)
+    value = _chi_square(_counts(_directions(w, t, alpha, np.uint64(100 + index), count)), expected)
+    assert value > 1.0 - (1.0 - LEVEL) ** (1.0 / len(CONFIGURATIONS)), f"alpha {alpha}, {pair}"
 
 
 def test_the_chi_square_test_sees_a_roughness_off_by_two_percent():
@@ -141,17 +106,14 @@ def test_the_pdf_integrates_to_1():
 
 @pytest.mark.parametrize("alpha", [0.01, 0.1, 1.0])
 def test_samples_keep_their_digits_near_the_fibre_axis(alpha):
-    """Rationale: alpha = .01 and a given direction along the fibre is where matrix forms lose four digits.
-
-    Expected: n.d = sqrt(1 - first), where n and d are rebuilt from the returned direction with S^(1/2) and its inverse
-    in 50 digits. Tolerance: the direction is rounded to 1e-16; S^(-1/2) magnifies that by 1/alpha, and the half vector
-    by 1/|w + s|.
-    """
+    """A given direction along the fibre is where matrix forms lose four digits at alpha = .01. n.d = sqrt(1 - first),
+    where n and d are rebuilt from the returned direction with S^(1/2) and its inverse in 50 digits. Tolerance: the
+    direction is rounded to 1e-16; S^(-1/2) magnifies that by 1/alpha, and the half vector by 1/|w + s|."""
     mpmath.mp.dps = 50
     rng = np.random.default_rng(7)
     for tilt in (0.0, 1e-9, 1e-4, 0.01, 0.3):
         for _ in range(12):
-            t = np.array(_unit(rng.uniform(20, 160), rng.uniform(0, 360)))
+            t = np.array(unit(rng.uniform(20, 160), rng.uniform(0, 360)))
             across = np.cross(t, rng.normal(size=3))
             w = math.cos(tilt) * t + math.sin(tilt) * across / np.linalg.norm(across)
             w = t if tilt == 0.0 else w / np.linalg.norm(w)
@@ -177,49 +139,3 @@ def test_first_number_0_mirrors_in_the_axis_and_round_flakes_need_no_tangent():
     w, t = PAIRS["tilted"]
     assert sample_flake_scatter(*w, *t, 1.0, 0.0, 0.3) == pytest.approx(w, abs=1e-15)
     assert np.dot(sample_flake_scatter(*w, *t, 1.0, 0.5, 0.3), w) == pytest.approx(0.0, abs=1e-15)
-
-
-@pytest.mark.parametrize("sigma", [0.02, 0.4, 8.0])
-def test_the_mixture_of_a_footprint_has_its_mass_and_its_samples(sigma):
-    """Probabilities add up to 1, the density to what does not go straight through; samples fall on both sides by it.
-
-    Midpoints on a sphere of 200 by 400 integrate lobes of alpha = .3 to 1e-3. Shares of 20,000 samples of each of eight
-    looks lie within the range that binomial counts leave with chance 1 - LEVEL, all together.
-    """
-    fabric, rng, looks, count = woven("voile", roughness=0.3, twist=20.0), np.random.default_rng(5), 8, 20_000
-    places, size = rng.random((looks, 2)) * 2.0, np.full(looks, sigma, np.float32)
-    wo = rng.normal(size=(looks, 3))
-    wo[:, 2] = np.abs(wo[:, 2]) + 0.3
-    wo = (wo / np.linalg.norm(wo, axis=1, keepdims=True)).astype(np.float32)
-    lobes = Lobes(np.empty((looks, FLAKE_ROWS, 10), np.float32), np.empty((looks, STRAIGHT + 1), np.float32))
-    u, v = (np.ascontiguousarray(axis, np.float32) for axis in places.T)
-    scratch = np.empty((POINT_ROWS, 8), np.float32)
-    footprints = (u, v, size, size, np.zeros_like(size))
-    find_rows(tabulate_surface(fabric), footprints, wo, point_places(8), np.float32(2.0), scratch, lobes)
-    np.testing.assert_allclose(lobes.flakes[:, SHARE].sum(axis=1) + lobes.rest.sum(axis=1), 1.0, atol=1e-5)
-
-    polar, azimuth = (np.arange(200) + 0.5) / 200 * math.pi, (np.arange(400) + 0.5) / 200 * math.pi
-    sphere = np.stack(
-        [axis.ravel() for axis in np.broadcast_arrays(
-            np.sin(polar)[:, None] * np.cos(azimuth), np.sin(polar)[:, None] * np.sin(azimuth), np.cos(polar)[:, None]
-        )], axis=1,
-    ).astype(np.float32)  # fmt: skip
-    area = np.repeat(np.sin(polar), 400) * 2.0 * math.pi**2 / (200 * 400)
-    least = 1.0 - (1.0 - LEVEL) ** (1.0 / (3 * looks * 2))
-    for look in range(looks):
-        own = Lobes(*(np.repeat(part[look : look + 1], len(sphere), axis=0) for part in lobes))
-        pdf = np.empty(len(sphere), np.float32)
-        density_rows(own, sphere, np.repeat(wo[look : look + 1], len(sphere), axis=0), pdf)
-        mass = pdf * area
-        straight = float(lobes.rest[look, STRAIGHT])
-        assert mass.sum() == pytest.approx(1.0 - straight, abs=1e-3)
-        own, towards = Lobes(*(part[:count] for part in own)), np.repeat(wo[look : look + 1], count, axis=0)
-        wi, drawn, through = np.empty((count, 3), np.float32), np.empty(count, np.float32), np.empty(count, np.bool_)
-        draw_rows(own, towards, rng.random((count, 3)), wi, drawn, through)
-        again = np.empty(count, np.float32)
-        density_rows(own, wi, towards, again)
-        np.testing.assert_allclose(drawn[~through], again[~through], rtol=1e-5)
-        assert (wi[through] == -wo[look]).all()
-        shares = {straight: through, mass[sphere[:, 2] > 0.0].sum(): ~through & (wi[:, 2] > 0.0)}
-        for share, members in shares.items():
-            assert stats.binomtest(int(members.sum()), count, min(float(share), 1.0)).pvalue > least

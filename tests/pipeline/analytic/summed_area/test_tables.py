@@ -44,7 +44,6 @@ def test_from_above_the_surface_covers_the_cloth(tables):
 
 def test_lanes_keep_to_their_part_of_a_yarn(tables):
     """Means of v lie in the lane's eighth, spreads are at most those of its ends."""
-    own = tables.surface[1:]
     of_yarn = np.unique(tables.slots[:, : tables.starts[2]])
     own = tables.surface[of_yarn[of_yarn > 0]]
     full = own[:, AREA] > 1e-4

@@ -4,21 +4,12 @@ import pytest
 
 from pipeline.models.added.apart import run_apart
 from pipeline.models.added.guarded import MethodFailed
+from tests.pipeline.sent_code import Code
 from weaves.errors import WorkFailed
 
 GUARDED = "__import__('pipeline.models.added.guarded', fromlist=['WATCH'])"
 BEGIN = f"{GUARDED}.WATCH.mark(1, b'theirs', b'predict', 0.5)"
 END = f"{GUARDED}.WATCH.mark(-1, b'theirs', b'predict', 0.5)"
-
-
-class Code:
-    """A function that the other process reads from its text: this module is unknown there."""
-
-    def __init__(self, text):
-        self.text = text
-
-    def __reduce__(self):
-        return eval, (self.text,)
 
 
 def test_a_call_that_hangs_is_ended():

@@ -89,18 +89,17 @@ def test_code_that_is_no_method_gets_a_sentence(path, old, new, sentence):
         describe(f"{path}:Theirs", {}, {})
 
 
-def test_code_that_ends_its_process_gets_a_sentence(path, monkeypatch):
+def test_options_that_it_does_not_have_and_code_that_ends_its_process_get_a_sentence(path, monkeypatch):
+    for options, sentence in (
+        ({"row": 5}, "has no option 'row'; did you mean 'rows'"),
+        ({"rows": 500}, "too many rows"),
+    ):
+        with pytest.raises(BadInput, match=sentence):
+            describe(f"{path}:Theirs", options, {})
     monkeypatch.setattr(describe_module, "run_apart", run_apart)
     path.write_text("import os; os._exit(0)" + METHOD)
     with pytest.raises(BadInput, match=r"import ended its process \(exit code 0\)"):
         describe(f"{path}:Theirs", {}, {})
-
-
-def test_options_that_it_does_not_have_are_refused(path):
-    with pytest.raises(BadInput, match="has no option 'row'; did you mean 'rows'"):
-        describe(f"{path}:Theirs", {"row": 5}, {})
-    with pytest.raises(BadInput, match="too many rows"):
-        describe(f"{path}:Theirs", {"rows": 500}, {})
 
 
 @pytest.mark.parametrize(

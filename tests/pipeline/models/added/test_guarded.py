@@ -107,12 +107,9 @@ def test_bytes_are_an_integer_and_faults_name_their_function(wrong):
         guarded(wrong).prepare(DENIM)
 
 
-def test_a_failure_crosses_processes():
+def test_code_that_is_not_the_planned_one_is_refused_and_failures_cross_processes(tmp_path):
     failure = pickle.loads(pickle.dumps(MethodFailed("theirs", "too late")))
     assert (failure.name, failure.reason, str(failure)) == ("theirs", "too late", "theirs: too late")
-
-
-def test_code_that_is_not_the_planned_one_is_refused(tmp_path):
     path = tmp_path / "theirs.py"
     path.write_text("raise RuntimeError('this must not run')")
     options = OPTIONS.model_copy(update={"source": f"{path}:Theirs"})

@@ -1,5 +1,3 @@
-"""What all models that learn nothing have in common: the interface of methods, and queries that they refuse."""
-
 import numpy as np
 import pytest
 

@@ -55,7 +55,7 @@ def test_the_horizon_map_errs_by_its_bias_only():
 def test_soft_horizons_err_less(name, sigma):
     """Squared error of a grey cloth's colour at k = 10, mean over four seeds; the truth errs by a hundredth of it."""
     fabric, errors = load_fabric(name), {}
-    queries = draw_queries(QueryOptions(sigma=sigma), fabric.weave.repeat, 1, 0, 400)
+    queries = draw_queries(QueryOptions(sigma=sigma), fabric.weave.repeat, 1, 0, 200)
     truth = estimate(fabric, queries, TruthOptions(relative_error=0.02), 1)
     for visibility in ("horizon", "soft_horizon"):
         method = _sampled(10, sequence="r2", visibility=visibility)

@@ -1,7 +1,12 @@
+import numpy as np
 import pytest
 import torch
 
+from pipeline.models.curved.model import CurvedNetwork
 from pipeline.models.networks.texture import blurred, level_shapes, read_pyramid, read_texture
+from pipeline.models.neumip.model import NeumipNetwork
+from pipeline.truth.query import Queries
+from tests.pipeline.models.stand_ins import SMALL, batch_of, descend
 
 
 def test_pyramid_halves_down_to_one_texel():
@@ -52,3 +57,31 @@ def test_what_is_exported_reads_the_same(monkeypatch):
     bags = read_pyramid(levels, u, v, sigma, 4)
     monkeypatch.setattr(torch.compiler, "is_exporting", lambda: True)
     torch.testing.assert_close(read_pyramid(levels, u, v, sigma, 4), bags, rtol=1e-5, atol=1e-5)
+
+
+def stripes(count, random):
+    """Return view rays onto stripes .35 of a yarn spacing above the reference plane, up to 53 degrees, and answers."""
+    (u, v), slope, turn = random.uniform(0, 2, (2, count)), random.uniform(0, 4 / 3, count), random.uniform(0, 7, count)
+    wo = np.stack([slope * np.cos(turn), slope * np.sin(turn), np.ones(count)], -1)
+    wo /= np.linalg.norm(wo, axis=1, keepdims=True)
+    stripe, target = np.sin(np.pi * (u + 0.35 * slope * np.cos(turn))), np.zeros((count, 4))
+    target[:, 2:] = 0.2 + 0.1 * np.stack([stripe, -stripe], -1)
+    columns = (u, v, np.full(count, 0.1), np.tile([0.0, 0.0, 1.0], (count, 1)), wo)
+    return Queries.round(*columns), target.astype(np.float32)
+
+
+def error_after_a_while(kind, options):
+    torch.manual_seed(0)
+    network, random = kind(options, (2, 2)), np.random.default_rng(1)
+    optimiser = torch.optim.Adam(network.parameter_groups(1e-2))
+    descend(optimiser, 150, lambda _: network.loss(batch_of(*stripes(256, random)), random))
+    with torch.no_grad():
+        return network.loss(batch_of(*stripes(2000, np.random.default_rng(2))), random).sqrt().item()
+
+
+@pytest.mark.parametrize(("name", "kind"), [("neumip", NeumipNetwork), ("curved", CurvedNetwork)])
+def test_an_offset_learns_what_heights_displace(name, kind):
+    """In equal steps of equal networks; without one the decoder has to learn the displacement place by place."""
+    options = SMALL[name].model_copy(update={"blur": 0.0})
+    without = error_after_a_while(kind, options.model_copy(update={"offset": False}))
+    assert error_after_a_while(kind, options) < 0.75 * without

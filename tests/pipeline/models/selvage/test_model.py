@@ -1,5 +1,3 @@
-"""The network, the method, and who answers at a wished error."""
-
 import numpy as np
 import pytest
 import torch
@@ -10,13 +8,13 @@ from pipeline.compiled.arrays import nbytes
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import fallback_answers
-from pipeline.models.registry import load_model, pretrained_folder
 from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.error_network import FINEST, FLOOR, OWN, colour_weights
 from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.models.against_truth import truth_of
 from tests.pipeline.models.stand_ins import SMALL, batch_of, descend
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -25,45 +23,45 @@ from weaves.population import Population, population_fabrics
 SELVAGE = SMALL["selvage"]
 
 
-@pytest.fixture(scope="module")
-def fabrics():
-    return [load_fabric("polyester_lining"), load_fabric("cotton_twill")]
+FABRICS = [load_fabric("polyester_lining"), load_fabric("cotton_twill")]
+LINING, TWILL = FABRICS
 
 
-def true_batch(fabrics, seed, rows):
+def drawn(fabric, seed, rows, **options):
+    return draw_queries(QueryOptions(**options), fabric.weave.repeat, seed, 0, rows)
+
+
+def true_batch(seed, rows):
     """Return a step about the second fabric, with the truth as its target."""
-    asked = draw_queries(QueryOptions(), fabrics[1].weave.repeat, seed, 0, rows)
-    return batch_of(asked, estimate(fabrics[1], asked, TruthOptions(estimator="node_table"), 1).mean, 1)
+    asked = drawn(TWILL, seed, rows)
+    return batch_of(asked, truth_of(TWILL, asked, estimator="node_table"), 1)
 
 
-def trained_a_little(fabrics, steps):
+def trained_a_little(steps):
     """Return a network after some steps on one batch, with its losses."""
-    network, batch = SelvageNetwork(SELVAGE, fabrics), true_batch(fabrics, 5, 256)
+    network, batch = SelvageNetwork(SELVAGE, FABRICS), true_batch(5, 256)
     optimiser = torch.optim.AdamW(network.parameter_groups(1e-2))
     return network, descend(optimiser, steps, lambda step: network.loss(batch, np.random.default_rng(step)))
 
 
 @pytest.mark.slow
-def test_it_learns_and_training_sees_what_rendering_sees(fabrics):
+def test_it_learns_and_training_sees_what_rendering_sees():
     """The loss falls by a fifth; against the network's own predictions it is 0."""
-    network, losses = trained_a_little(fabrics, 60)
+    network, losses = trained_a_little(60)
     assert losses[-1] < 0.8 * losses[0]
     method = Selvage(network)
-    asked = draw_queries(QueryOptions(), fabrics[1].weave.repeat, 9, 0, 64)
-    answers = method.predict(fabrics[1], asked)
-    assert np.abs(answers - SoftNodes().predict(fabrics[1], asked)).max() > 1e-3
+    asked = drawn(TWILL, 9, 64)
+    answers = method.predict(TWILL, asked)
+    assert np.abs(answers - SoftNodes().predict(TWILL, asked)).max() > 1e-3
     read = network._read(batch_of(asked, answers, 1))
     answer = network(read.features, read.components, read.bounds)
     assert network.correction_loss(answer, read.target).item() < 1e-10
 
 
-def test_normalised_features_have_mean_0_and_deviation_1(fabrics):
-    network = SelvageNetwork(SelvageOptions(width=16), fabrics)
-    rows = []
-    for index, fabric in enumerate(fabrics):
-        asked = draw_queries(QueryOptions(), fabric.weave.repeat, 40 + index, 0, 2000)
-        rows.append(read_queries(tabulate(fabric), asked)[0])
-    features = np.concatenate(rows)
+def test_normalised_features_have_mean_0_and_deviation_1():
+    network = SelvageNetwork(SelvageOptions(width=16), FABRICS)
+    cases = ((fabric, drawn(fabric, 40 + index, 2000)) for index, fabric in enumerate(FABRICS))
+    features = np.concatenate([read_queries(tabulate(fabric), asked)[0] for fabric, asked in cases])
     features = np.concatenate([features, features[:, EXCHANGED] * EXCHANGED_SIGN])
     normal = (features - network.mean.numpy()) * network.scale.numpy()
     varied = features.std(axis=0) > 0.01
@@ -71,29 +69,29 @@ def test_normalised_features_have_mean_0_and_deviation_1(fabrics):
     np.testing.assert_allclose(normal[:, varied].std(axis=0), 1.0, atol=0.3)  # hidden patches are rare
 
 
-def test_exchanged_batches_teach_exchanged_answers(fabrics):
+def test_exchanged_batches_teach_exchanged_answers():
     """A batch and its exchange cost a network that knows nothing of the exchange the same, in both orders."""
-    batch = true_batch(fabrics, 3, 64)
+    batch = true_batch(3, 64)
     seeds = [next(s for s in range(50) if np.random.default_rng(s).integers(2) == side) for side in (0, 1)]
     for steps in (0, 5):
-        network, _ = trained_a_little(fabrics, steps)
+        network, _ = trained_a_little(steps)
         straight, exchanged = (network.loss(batch, np.random.default_rng(seed)).item() for seed in seeds)
         assert (straight == pytest.approx(exchanged, rel=1e-5)) == (steps == 0)
 
 
-def test_viewers_behind_the_cloth_are_refused(fabrics):
-    asked = draw_queries(QueryOptions(), fabrics[0].weave.repeat, 1, 0, 8)
+def test_viewers_behind_the_cloth_are_refused():
+    asked = drawn(LINING, 1, 8)
     with pytest.raises(BadInput, match="selvage"):
-        Selvage(SelvageNetwork(SELVAGE)).predict(fabrics[0], asked._replace(wo=-asked.wo))
+        Selvage(SelvageNetwork(SELVAGE)).predict(LINING, asked._replace(wo=-asked.wo))
 
 
-def test_an_untrained_network_is_the_soft_nodes_over_curved_cloth_too(fabrics):
+def test_an_untrained_network_is_the_soft_nodes_over_curved_cloth_too():
     """A flat row beside curved ones keeps its bits."""
     network = SelvageNetwork(SELVAGE.model_copy(update={"bound": False}))
-    fabric, method = fabrics[0], Selvage(network)
+    fabric, method = LINING, Selvage(network)
     weights = network.architecture()["parameters"]["total"]
     assert method.bytes_stored(fabric) == nbytes(tabulate(fabric)) + 4 * weights
-    asked = draw_queries(QueryOptions(curvature=(0.05, 0.5)), fabric.weave.repeat, 1, 0, 64)
+    asked = drawn(fabric, 1, 64, curvature=(0.05, 0.5))
     asked.curvature[::3] = 0.0
     found = method.predict(fabric, asked)
     np.testing.assert_allclose(found, SoftNodes().predict(fabric, asked), rtol=1e-5, atol=1e-7)
@@ -103,12 +101,12 @@ def test_an_untrained_network_is_the_soft_nodes_over_curved_cloth_too(fabrics):
 
 
 @pytest.mark.parametrize("finest", [False, True])
-def test_light_from_behind_is_answered_by_the_soft_nodes(fabrics, finest):
+def test_light_from_behind_is_answered_by_the_soft_nodes(finest):
     """By the finest ones, if an error is wished."""
-    fabric, method, nodes = fabrics[0], Selvage(SelvageNetwork(SELVAGE), Domain.of({}, fabrics)), SoftNodes()
+    fabric, method, nodes = LINING, Selvage(SelvageNetwork(SELVAGE), Domain.of({}, FABRICS)), SoftNodes()
     if finest:
         method, nodes = method.within(0.05), SoftNodes(8)
-    asked = draw_queries(QueryOptions(behind=0.5), fabric.weave.repeat, 1, 0, 64)
+    asked = drawn(fabric, 1, 64, behind=0.5)
     behind = asked.wi[:, 2] < 0
     found = method.predict(fabric, asked)
     np.testing.assert_array_equal(found[behind], nodes.predict(fabric, asked.take(behind)))
@@ -116,28 +114,33 @@ def test_light_from_behind_is_answered_by_the_soft_nodes(fabrics, finest):
     np.testing.assert_array_equal(method.transparency(fabric, asked), nodes.transparency(fabric, asked))
 
 
-def test_a_network_told_to_shine_is_bounded(fabrics):
+def test_footprints_of_view_rays_are_those_of_its_soft_nodes():
+    """In training and in rendering; also of the finest ones, in place of a fallback without parallax."""
+    fabric, options = LINING, SELVAGE.model_copy(update={"parallax": True})
+    asked = drawn(fabric, 1, 64, sigma=(0.1, 0.5))
+    network, nodes = SelvageNetwork(options, [fabric]), SoftNodes(parallax=True)
+    method, expected = Selvage(network), nodes.predict(fabric, asked)
+    np.testing.assert_allclose(method.predict(fabric, asked), expected, rtol=1e-5, atol=1e-7)
+    np.testing.assert_array_equal(network._read(batch_of(asked, expected)).components, expected)
+    assert np.abs(expected - SoftNodes().predict(fabric, asked)).max() > 0.1 * expected.max()
+    finest = SoftNodes(8, parallax=True).predict(fabric, asked)
+    np.testing.assert_array_equal(method.within(1e-6).predict(fabric, asked), finest)
+
+
+def test_a_network_told_to_shine_is_bounded():
     """Factors of 2 everywhere: with the bound no component exceeds the sums without shadows; without it some do."""
-    fabric = fabrics[0]
-    asked = draw_queries(QueryOptions(), fabric.weave.repeat, 1, 0, 200)
-    bounds = read_queries(tabulate(fabric), asked).bounds
+    asked = drawn(LINING, 1, 200)
+    bounds = read_queries(tabulate(LINING), asked).bounds
     for bound in (True, False):
         network = SelvageNetwork(SELVAGE.model_copy(update={"bound": bound}))
         torch.nn.init.constant_(network.last.bias, 30.0)
-        answers = Selvage(network).predict(fabric, asked)
-        assert (answers <= bounds).all() == bound
-
-
-@pytest.fixture(scope="module")
-def selvage():
-    (method,) = load_model(pretrained_folder("selvage"))
-    return method
+        assert (Selvage(network).predict(LINING, asked) <= bounds).all() == bound
 
 
 def test_who_answers(selvage):
     """Each query is answered by the first answer whose estimated error is small enough."""
     denim = load_fabric("denim")
-    queries = draw_queries(QueryOptions(), denim.weave.repeat, 8, 0, 600)
+    queries = drawn(denim, 8, 600)
     own, errors = selvage.with_errors(denim, queries)
     np.testing.assert_array_equal(own, selvage.predict(denim, queries))
     wished = float(np.quantile(errors[:, OWN], 0.5))
@@ -154,14 +157,12 @@ def test_who_answers(selvage):
 @pytest.mark.slow
 def test_estimates_are_calibrated_on_cloth_never_seen(selvage):
     """Root mean squares of true errors lie within a factor of 1.5 of the estimated ones, in fifths of the estimate.
-
-    Patches that are hidden almost wholly are left out: a limit of visibility decides whether the truth is 0 there.
-    """
+    Patches that are hidden almost wholly are left out: a limit of visibility decides whether the truth is 0 there."""
     families = ("plain", "compound_twill", "large_satin", "irregular")
     population = Population(count=8, seed=7719, families=families, balanced=True, solid=0.5)
     weights, estimated, true = np.array(colour_weights(SelvageOptions())), [], []
     for fabric in population_fabrics(population):
-        queries = draw_queries(QueryOptions(sigma=(0.1, 8.0)), fabric.weave.repeat, 12, 0, 1500)
+        queries = drawn(fabric, 12, 1500, sigma=(0.1, 8.0))
         truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 3)
         values, errors = selvage.with_errors(fabric, queries)
         colour, seen = values @ weights, truth.mean.any(axis=1) & values.any(axis=1)

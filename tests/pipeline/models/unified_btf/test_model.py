@@ -17,8 +17,10 @@ BTF, LINING = SMALL["unified_btf"], load_fabric("polyester_lining")
 
 @pytest.mark.parametrize(("latent", "published"), [(32, 38_269), (8, 35_725)])
 def test_decoder_has_the_published_weights(latent, published):
-    """With RGB out: Rainer et al. 2020 and 2019."""
+    """With RGB out: Rainer et al. 2020 and 2019. Bytes: levels of 4, 2 and 1 texels a side, and the decoder."""
     assert sum(weight.numel() for weight in decoder(latent, 106, outputs=3).parameters()) == published
+    weights = sum(weight.numel() for weight in decoder(32, 16).parameters())
+    assert NetworkMethod(UnifiedBtfNetwork(BTF)).bytes_stored(LINING) == 4 * (32 * (16 + 4 + 1) + weights)
 
 
 def test_pyramid_is_averaged_down_to_one_texel():
@@ -67,12 +69,6 @@ def test_rows_it_cannot_learn_are_refused(strange):
     queries = draw_queries(QueryOptions(**strange), LINING.weave.repeat, 3, 0, 4)
     with pytest.raises(BadInput, match="leave behind, stretch and curvature out"):
         untrained(BTF, LINING).loss(batch_of(queries, torch.zeros(4, 4)), np.random.default_rng(0))
-
-
-def test_bytes_are_those_of_latents_and_decoder():
-    """Two yarns a side and two texels a yarn: levels of 4, 2 and 1 texels a side."""
-    weights = sum(weight.numel() for weight in decoder(32, 16).parameters())
-    assert NetworkMethod(UnifiedBtfNetwork(BTF)).bytes_stored(LINING) == 4 * (32 * (16 + 4 + 1) + weights)
 
 
 @pytest.mark.parametrize(

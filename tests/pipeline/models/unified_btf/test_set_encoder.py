@@ -1,5 +1,3 @@
-"""Samples of texels, and the encoder that reads any number of them in any order."""
-
 import numpy as np
 import pytest
 import torch
@@ -53,10 +51,8 @@ def test_order_and_number_of_the_samples_do_not_matter():
 
 @torch.inference_mode()
 def test_latents_converge_as_the_samples_grow():
-    """The encoder averages, so 50 to 5,000 samples leave an error that falls as n^(-1/2).
-
-    Expected: slope -0.5 in the logarithms. 64 independent sets leave about 0.02 on it; 0.1 is five deviations.
-    """
+    """The encoder averages, so 50 to 5,000 samples leave an error that falls as n^(-1/2). Expected: slope -0.5 in the
+    logarithms. 64 independent sets leave about 0.02 on it; 0.1 is five deviations."""
     model = encoder()
     exact = encoded(model, made_up(200_000, seed=99))
     counts, errors = (50, 500, 5000), []

@@ -1,5 +1,3 @@
-"""The decoder: one-blobs, and the picture of the repeat."""
-
 import numpy as np
 import pytest
 import torch
@@ -35,13 +33,10 @@ def test_periodic_blob_is_the_integral_of_a_wrapped_gaussian():
     edges = np.linspace(0, 1, 9)
     images = [np.diff(norm.cdf(edges + k, loc=x[:, None], scale=deviation), axis=-1) for k in range(-3, 4)]
     np.testing.assert_allclose(periodic_blob(x, deviation, 8), np.sum(images, axis=0), atol=1e-8)
-
-
-def test_every_number_has_its_own_width():
-    x, deviations = torch.rand(3, dtype=torch.float64), torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64)
-    together = periodic_blob(x, deviations, 8)
-    for index in range(3):
-        torch.testing.assert_close(together[index], periodic_blob(x[index], float(deviations[index]), 8))
+    # Every number has its own width.
+    deviations = torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64)
+    alone = [periodic_blob(number, float(width), 8) for number, width in zip(x[:3], deviations, strict=True)]
+    torch.testing.assert_close(periodic_blob(x[:3], deviations, 8), torch.stack(alone))
 
 
 def test_plain_blob_holds_the_integral_of_a_gaussian_over_each_bin():

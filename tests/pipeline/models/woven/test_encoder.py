@@ -45,11 +45,9 @@ def test_cloth_begun_elsewhere_is_the_cloth_with_its_draft_rolled(standard):
 
 
 def test_what_is_blended_lies_in_the_same_place():
-    """Plain weave has many standard positions, and the yarns choose: both fabrics take the first one's.
-
-    With the yarns exchanged, second = the first seen through the mirror x = y, whose own standard position is the same;
-    in the first one's position it is another cloth.
-    """
+    """Plain weave has many standard positions, and the yarns choose: both fabrics take the first one's. With the yarns
+    exchanged, second = the first seen through the mirror x = y, whose own standard position is the same; in the first
+    one's position it is another cloth."""
     plain = load_fabric("polyester_lining")
     exchanged = plain.model_copy(update={"warp": plain.weft, "weft": plain.warp})
     alone = [read_cloth([fabric], SMALL["woven"]) for fabric in (plain, exchanged)]

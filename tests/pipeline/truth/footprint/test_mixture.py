@@ -1,5 +1,3 @@
-"""Ellipses at an angle: their covariance, and the mixtures that stand for them, against the Gaussian itself."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Footprints: wrapped kernels against their closed forms."""
-
 import math
 
 import numpy as np
@@ -18,16 +16,13 @@ def test_moments_of_the_wrapped_kernel():
             assert ((x >= 0) & (x < repeat)).all()
             for k in range(4):
                 w = 2 * np.pi * k / repeat
-                size = (
-                    np.exp(-0.5 * (w * sigma) ** 2)
-                    if shape == GAUSSIAN
-                    else np.sinc(w * sigma * BOX_SIDE / (2 * np.pi))
-                )
-                expected = size * np.exp(1j * w * centre)
+                gaussian, box = np.exp(-0.5 * (w * sigma) ** 2), np.sinc(w * sigma * BOX_SIDE / (2 * np.pi))
+                expected = (gaussian if shape == GAUSSIAN else box) * np.exp(1j * w * centre)
                 assert abs(np.mean(weight * np.exp(1j * w * x)) - expected) < 2e-4
 
 
 def test_a_box_of_whole_repeats_is_the_repeat_average():
+    assert stats.uniform(0, BOX_SIDE).std() == pytest.approx(1.0) and math.isclose(BOX_SIDE, math.sqrt(12))
     for whole in (1, 2, 7):
         sigma = 2.0 * whole / BOX_SIDE
         weights = [place(Axis(BOX, 0.3, sigma, 2.0), (k + 0.5) / 64)[1] for k in range(64)]
@@ -38,7 +33,3 @@ def test_a_box_of_whole_repeats_is_the_repeat_average():
 def test_centres_far_away_are_folded(centre):
     x, _ = place(Axis(GAUSSIAN, centre, 1e-4, 4.0), 0.5)
     assert x == pytest.approx(0.25, abs=1e-9)
-
-
-def test_a_box_side_is_what_the_standard_deviation_says():
-    assert stats.uniform(0, BOX_SIDE).std() == pytest.approx(1.0) and math.isclose(BOX_SIDE, math.sqrt(12))

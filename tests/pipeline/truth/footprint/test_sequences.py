@@ -1,5 +1,3 @@
-"""Counter-based numbers: stated values, evenness, and the net property of the Owen-scrambled points."""
-
 import numpy as np
 from scipy import stats
 
@@ -56,5 +54,4 @@ def test_a_point_is_uniform_over_keys():
     points = np.array([owen_pair(np.uint64(derive(np.uint64(5), k)), 37) for k in range(40_000)])
     counts = np.histogram2d(*points.T, bins=16, range=((0, 1), (0, 1)))[0]
     assert stats.chisquare(counts.ravel()).pvalue > LEVEL
-    assert points.min() > 0.0
-    assert points.max() < 1.0
+    assert points.min() > 0.0 and points.max() < 1.0

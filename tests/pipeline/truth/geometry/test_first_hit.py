@@ -1,5 +1,3 @@
-"""First hits against a march through the oracle's heights, and the reference plane against a fine grid of them."""
-
 import math
 
 import numpy as np
@@ -74,6 +72,20 @@ def test_rays_meet_walls_where_floats_end():
         hits = [first_hit(field, 0.21 * k, 0.137 * k, field.highest, towards).what for k in range(400)]
         shares.append(np.mean(np.array(hits) == ON_WALL))
     assert 0.02 < shares[0] < 0.5 and shares[1] == 0.0
+
+
+@pytest.mark.parametrize("name", ["denim", "voile"])
+def test_a_wall_is_that_of_the_yarn_above_it(name):
+    """The surface at the hit is above the ray there; on the other side of the border it would be below."""
+    field = height_field(load_fabric(name))
+    towards, _, _ = sinking(ray(*direction(60.0, 33.0), 0.0), field.highest, field.highest)
+    above = []
+    for k in range(3000):
+        hit = first_hit(field, 0.21 * k, 0.137 * k, field.highest, towards)
+        if hit.what == ON_WALL:
+            height = surface_at(field, hit.x, hit.y, hit.end, hit.pick)[2]
+            above.append(height - field.highest - hit.distance * towards.rise)
+    assert len(above) > 30 and min(above) > 0.0
 
 
 @pytest.mark.parametrize("fabric", [LOPSIDED, woven("denim"), woven("voile")], ids=["narrow", "closed", "open"])

@@ -1,5 +1,3 @@
-"""The kernels' surface against the NumPy oracle, and its slopes against finite differences."""
-
 import numpy as np
 import pytest
 
@@ -33,9 +31,8 @@ def test_surface_matches_the_oracle(name):
     np.testing.assert_allclose(found[solid, 2], expected.height[solid], atol=1e-12)
     np.testing.assert_allclose(found[solid, 3:6], expected.normal[solid], atol=1e-11)
     np.testing.assert_allclose(found[solid, 6:9], expected.tangent[solid], atol=1e-11)
-    assert field.crown.min() > 0
-    for height, a, b in zip(expected.height[solid], x[solid], y[solid], strict=True):
-        assert height <= field.crown[int(b), int(a)] + 1e-12
+    crown = field.crown[y.astype(int), x.astype(int)]
+    assert field.crown.min() > 0 and (expected.height[solid] <= crown[solid] + 1e-12).all()
 
 
 @pytest.mark.parametrize("name", FABRICS)

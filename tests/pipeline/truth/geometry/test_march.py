@@ -1,5 +1,3 @@
-"""Positions wrapped into the repeat, and rays followed from cell to cell."""
-
 import math
 
 import numpy as np

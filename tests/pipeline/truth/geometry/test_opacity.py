@@ -1,17 +1,15 @@
-"""Curved cloth against marches through the oracle's heights, against closed forms, and against flat cloth."""
-
 import math
 
 import numpy as np
 import pytest
 
 from pipeline.truth.cloth import cloth_side
-from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.opacity import coverage, grazing_cosine, hits, opacity
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.truth.cloths import woven
+from tests.pipeline.truth.cloths import fixed, woven
+from tests.pipeline.truth.geometry.marches import leaves
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.surface import GAP, surface_at
@@ -27,33 +25,10 @@ def _wo(cosines, azimuth=0.0):
     return np.stack([sines * np.cos(azimuth), sines * np.sin(azimuth), cosines], axis=-1).astype(np.float32)
 
 
-def _queries(wo, curvature, sigma=8.0, wi=None):
+def _queries(wo, curvature, sigma=8.0):
     column = np.ones(len(wo), np.float32)
-    wi = wo if wi is None else wi
-    return Queries(
-        0.3 * column, 0.4 * column, sigma * column, wi, wo, sigma * column, 0 * column, np.float32(curvature) * column
-    )
-
-
-def _marched(fabric, x, y, z, w, curvature):
-    """Say for each point (x, y, z) whether a march towards w leaves the cloth; z = inf stands for the boundary."""
-    highest = height_field(fabric).highest
-    flat = math.hypot(w[0], w[1])
-    rise, free = w[2] / flat, np.ones(len(x), bool)
-    z = np.where(np.isinf(z), highest, z)
-    rows = np.arange(len(x))
-    for k in range(1, 1_000_000):
-        s = k * STEP
-        altitude = z[rows] + s * (rise + 0.5 * curvature * s)
-        point = surface_at(fabric, x[rows] + s * w[0] / flat, y[rows] + s * w[1] / flat)
-        hit = (point.yarn != GAP) & (point.height > altitude + 1e-9)
-        free[rows[hit]] = False
-        sinks = rise + curvature * s < 0
-        assert curvature > 0 or rise > 0
-        rows = rows[~hit & ((altitude < highest) | sinks)]
-        if not rows.size:
-            return free
-    raise AssertionError("a ray without end")
+    queries = Queries.round(0.3 * column, 0.4 * column, sigma * column, wo, wo)
+    return queries._replace(curvature=np.float32(curvature) * column)
 
 
 @pytest.mark.parametrize("name", ["denim", "silk_charmeuse"])
@@ -66,7 +41,7 @@ def test_hits_match_a_march(name, curvature, cosine):
     x, y = generator.random((2, 600)) * np.array([[ends], [picks]])
     w = -_wo(cosine, generator.random() * 2 * math.pi).astype(np.float64)
     exact = [hits(model.front, model.back, a, b, ray(*w, curvature)) for a, b in zip(x, y, strict=True)]
-    marched = ~_marched(fabric, x, y, np.full(len(x), np.inf), w, curvature)
+    marched = ~leaves(fabric, x, y, np.full(len(x), model.front.highest), w, curvature)
     assert 0.05 < marched.mean() < 0.95
     assert (marched != np.array(exact)).mean() < 0.005
 
@@ -77,7 +52,7 @@ def test_opacity_is_the_share_of_rays_that_hit_and_states_its_error(name, curvat
     fabric = load_fabric(name)
     ends, picks = fabric.weave.repeat
     wo = _wo([math.sqrt(0.04 * curvature)], 0.5)
-    options = TruthOptions(footprint="box", min_count=512, max_count=512)
+    options = fixed(512, footprint="box")
     queries = _queries(wo, curvature, sigma=ends / math.sqrt(12))
     model, towards = cloth_side(fabric, options), ray(*(-wo[0].astype(np.float64)), curvature)
     x, y = np.meshgrid((np.arange(80) + 0.5) * ends / 80, (np.arange(80) + 0.5) * picks / 80)
@@ -108,8 +83,7 @@ def test_closed_forms_along_half_cylinders():
         options = TruthOptions(relative_error=1e-3, max_count=1 << 14)
         mean, error = opacity(CORDUROY, _queries(wo, curvature), options, 5)
         share = 2 * np.sqrt(0.25 - (0.5 - depth) ** 2)
-        assert (np.abs(mean - share) < 4 * error + 1e-5).all()
-        assert (error < 2e-3).all()
+        assert (np.abs(mean - share) < 4 * error + 1e-5).all() and (error < 2e-3).all()
 
 
 def test_relief_scales_heights():
@@ -137,7 +111,7 @@ def test_grazing_cosine_is_the_step_of_opacity(name):
 
 
 def test_opacity_grows_with_the_cosine_and_falls_with_curvature():
-    fabric, options = load_fabric("basket"), TruthOptions(min_count=1024, max_count=1024)
+    fabric, options = load_fabric("basket"), fixed(1024)
     cosines = np.linspace(0.01, 0.6, 30)
     by_curvature = [opacity(fabric, _queries(_wo(cosines, 1.0), k), options, 0)[0] for k in (0.01, 0.1, 1.0)]
     for values, flatter in zip(by_curvature[1:], by_curvature, strict=False):
@@ -146,9 +120,7 @@ def test_opacity_grows_with_the_cosine_and_falls_with_curvature():
     assert all((np.diff(values) >= -0.02).all() for values in by_curvature)
     x = np.linspace(0, 4, 50)
     edges = grazing_cosine(fabric, x, 0.7, 1.0, np.array([[0.0], [1e-6], [0.01], [0.1], [1.0]]))
-    assert (np.diff(edges, axis=0) >= 0).all()
-    assert not edges[0].any()
-    assert edges[1].max() < 2e-3
+    assert (np.diff(edges, axis=0) >= 0).all() and not edges[0].any() and edges[1].max() < 2e-3
 
 
 def test_limits_known_without_sampling():
@@ -161,13 +133,9 @@ def test_limits_known_without_sampling():
     np.testing.assert_array_equal(nearly, opacity(fabric, _queries(_wo([0.02, 0.9]), 0.0), TruthOptions(), 0))
     # Points that all agree are no proof.
     mean, error = opacity(fabric, _queries(_wo([1e-4]), 1.0), TruthOptions(), 0)
-    assert mean[0] == 0
-    assert 1e-3 < error[0] < 1e-2
-
-
-def test_a_gap_is_open_from_above():
-    fabric = woven("denim", width=0.8)
-    mean, error = opacity(fabric, _queries(_wo([1.0]), 0.3), TruthOptions(relative_error=1e-3), 1)
+    assert mean[0] == 0 and 1e-3 < error[0] < 1e-2
+    # A gap is open from above.
+    mean, error = opacity(woven("denim", width=0.8), _queries(_wo([1.0]), 0.3), TruthOptions(relative_error=1e-3), 1)
     assert abs(mean[0] - 0.96) < 4 * error[0]
 
 
@@ -175,12 +143,10 @@ def test_a_gap_is_open_from_above():
     ("width", "curvature", "depth"), [(0.8, 0.0, 2.5), (0.8, 0.01, 312.0), (0.1, 1.0, 0.03), (0.1, 1.0, 0.12)]
 )
 def test_gaps_let_rays_through(width, curvature, depth):
-    """Narrow yarns against a march through yarns with two sides, per ray, and their share of a patch.
-
-    `depth` says how far beneath the fabric plane the ray would sink (for flat cloth, its slope): in the last two cases
-    it comes up again, and some rays do so through another gap or the same one. Both take yarns for solid from their
-    surface to the plane. Strips beside a narrow yarn are searched at points: .6 % of the rays may differ.
-    """
+    """Narrow yarns against a march through yarns with two sides, per ray, and their share of a patch. `depth` says how
+    far beneath the fabric plane the ray would sink (for flat cloth, its slope): in the last two cases it comes up
+    again, and some rays do so through another gap or the same one. Both take yarns for solid from their surface to the
+    plane. Strips beside a narrow yarn are searched at points: .6 % of the rays may differ."""
     fabric = woven("denim", width=width)
     model = cloth_side(fabric, TruthOptions())
     highest, lowest = model.front.highest, -model.back.highest
@@ -208,7 +174,7 @@ def test_gaps_let_rays_through(width, curvature, depth):
 
 def test_coverage_is_opacity_with_gaps_filled():
     """The same bits without gaps; with them, flat cloth covers all, and of rays that stay a share meets yarns."""
-    options, wo = TruthOptions(min_count=1024, max_count=1024), _wo(np.linspace(0.02, 0.98, 20), 0.3)
+    options, wo = fixed(1024), _wo(np.linspace(0.02, 0.98, 20), 0.3)
     solid, holed = load_fabric("denim"), woven("denim", width=0.8)
     for fabric in (solid, holed):
         covered, _ = coverage(fabric, _queries(wo, 0.3), options, 3)

@@ -1,24 +1,11 @@
-"""Loops over nodes in single precision against the point model in double precision, node by node, shadows off."""
-
 import math
 
 import numpy as np
 import pytest
 
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, height_field
+from pipeline.truth.node_table import kernels
 from pipeline.truth.node_table.build import FIRST_FINE, FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY, tabulate
-from pipeline.truth.node_table.kernels import (
-    Direction,
-    FlakeLayer,
-    HorizonSlopes,
-    Normals,
-    Tangents,
-    crossing,
-    no_shares,
-    reflected,
-    transmitted,
-    weigh,
-)
 from pipeline.truth.scattering import slab
 from tests.pipeline.truth.cloths import woven
 
@@ -38,12 +25,12 @@ def unit(x, y):
 
 def direction(w):
     """Return a direction that rises by 1, half-way between two azimuths."""
-    return Direction(*w, slope=np.float32(1.0), first=0, second=1, turn=np.float32(0.5))
+    return kernels.Direction(*w, slope=np.float32(1.0), first=0, second=1, turn=np.float32(0.5))
 
 
 def layer(field, family):
     alpha = float(field.yarn[family, ALPHA])
-    return FlakeLayer(*(np.float32(x) for x in (alpha**2, field.thickness, alpha**3 / (4 * math.pi))))
+    return kernels.FlakeLayer(*(np.float32(x) for x in (alpha**2, field.thickness, alpha**3 / (4 * math.pi))))
 
 
 @pytest.fixture(scope="module")
@@ -57,18 +44,12 @@ def pieces(table):
     for piece in table.pieces:
         count = piece[NODES_X] * piece[NODES_Y]
         if piece[PIECE_FAMILY] != GAP:
-            yield (
-                piece[PIECE_FAMILY],
-                slice(piece[FIRST_NODE], piece[FIRST_NODE] + count),
-                slice(piece[FIRST_FINE], piece[FIRST_FINE] + count),
-            )
+            yield piece[PIECE_FAMILY], *(slice(piece[k], piece[k] + count) for k in (FIRST_NODE, FIRST_FINE))
 
 
 def scattered(field, family, wi, wo, normal, tangent, inverse, **factors):
-    """Return f cos_i cos_o / n_z of every node in double precision; wi from behind is transmitted.
-
-    Terms of the formula can be multiplied by `factors`.
-    """
+    """Return f cos_i cos_o / n_z of every node in double precision; wi from behind is transmitted. Terms of the formula
+    can be multiplied by `factors`."""
     alpha = float(field.yarn[family, ALPHA]) * factors.get("alpha", 1.0)
     thickness = field.thickness * factors.get("thickness", 1.0)
     function = slab.transmission if wi[2] < 0 else slab.reflection
@@ -96,8 +77,8 @@ def specular(cloth, case, behind, **factors):
     for family, _, fine in pieces(table):
         parts = [np.ascontiguousarray(row[fine]) for row in table.fine]
         lit, shares = np.ones_like(parts[0]), np.zeros_like(parts[0])
-        function = transmitted if behind else reflected
-        surface, towards = (Normals(*parts[:4]), Tangents(*parts[4:])), (direction(wi), direction(wo))
+        function = kernels.transmitted if behind else kernels.reflected
+        surface, towards = (kernels.Normals(*parts[:4]), kernels.Tangents(*parts[4:])), (direction(wi), direction(wo))
         total = function(*surface, *towards, size, layer(field, family), lit, shares)
         wide = np.stack(parts).astype(np.float64)
         expected = scattered(field, family, given, wo.astype(np.float64), wide[:3], wide[4:], wide[3], **factors)
@@ -129,12 +110,12 @@ def test_area_diffuse_and_unscattered(cloth, case):
     field, table = cloth
     wi, wo = (unit(*w).astype(np.float32) for w in case)
     for family, nodes, fine in pieces(table):
-        normal = Normals(*(np.ascontiguousarray(row[nodes]) for row in table.normal))
+        normal = kernels.Normals(*(np.ascontiguousarray(row[nodes]) for row in table.normal))
         count = len(normal.x)
-        shares, low = no_shares(count), np.full(count, -1e3, np.float32)
+        shares, low = kernels.no_shares(count), np.full(count, -1e3, np.float32)
         shares.weight[:] = 1.0
-        flat, blend = HorizonSlopes(low, low), np.float32(field.yarn[family, BLEND])
-        found = weigh(normal, direction(wi), flat, direction(wo), flat, blend, shares)
+        flat, blend = kernels.HorizonSlopes(low, low), np.float32(field.yarn[family, BLEND])
+        found = kernels.weigh(normal, direction(wi), flat, direction(wo), flat, blend, shares)
         n, i, o = np.stack(normal[:3]).astype(np.float64), wi.astype(np.float64), wo.astype(np.float64)
         cos_i, area = i @ n, np.maximum(o @ n, 0.0) / n[2]
         own = float(field.yarn[family, BLEND])
@@ -143,14 +124,11 @@ def test_area_diffuse_and_unscattered(cloth, case):
         np.testing.assert_allclose(shares.diffuses, expected, rtol=RTOL, atol=1e-6)
         assert found == pytest.approx((area.sum(), expected.sum()), rel=RTOL)
 
-        tangent = Tangents(*(np.ascontiguousarray(row[fine]) for row in table.fine[4:]))
+        tangent = kernels.Tangents(*(np.ascontiguousarray(row[fine]) for row in table.fine[4:]))
         alpha = float(field.yarn[family, ALPHA])
-        crossed = crossing(normal, tangent, direction(wo), layer(field, family), shares.areas)
+        crossed = kernels.crossing(normal, tangent, direction(wo), layer(field, family), shares.areas)
         t = np.stack(tangent).astype(np.float64)
-        through = [
-            slab.unscattered(slab.sigma(*o, *t[:, k], alpha), float(o @ n[:, k]), field.thickness)
-            if area[k] > 0
-            else 0.0
-            for k in range(count)
-        ]
-        assert crossed == pytest.approx(area @ through, rel=RTOL)
+        seen = np.flatnonzero(area > 0)
+        sizes = [(slab.sigma(*o, *t[:, k], alpha), float(o @ n[:, k])) for k in seen]
+        through = [slab.unscattered(*size, field.thickness) for size in sizes]
+        assert crossed == pytest.approx(area[seen] @ through, rel=RTOL)

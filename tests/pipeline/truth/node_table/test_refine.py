@@ -1,5 +1,3 @@
-"""Refined nodes: a cut row against the mean of many points, and the choice of the nodes that are refined."""
-
 import math
 
 import numpy as np
@@ -15,6 +13,7 @@ from pipeline.truth.node_table.doubts import doubtful_from, no_doubts
 from pipeline.truth.node_table.kernels import no_shares
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.truth.cloths import fixed
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -86,8 +85,7 @@ def test_nodes_that_are_left_keep_a_share_of_the_requested_error():
 def test_refined_answers_are_closer_than_the_table():
     fabric = load_fabric("polyester_lining")
     queries = draw_queries(QueryOptions(sigma=(0.05, 0.5)), fabric.weave.repeat, 35, 0, 120)
-    many = TruthOptions(estimator="owen", relative_error=1e-9, min_count=1 << 13, max_count=1 << 13)
-    exact = uncalibrated(fabric, queries, many, 2).mean[:, :4]
+    exact = uncalibrated(fabric, queries, fixed(1 << 13), 2).mean[:, :4]
     errors = {}
     for error in (1.0, 0.005):
         found = uncalibrated(fabric, queries, TruthOptions(relative_error=error), 5)

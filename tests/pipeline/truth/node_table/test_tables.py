@@ -1,5 +1,3 @@
-"""Tables of nodes: which queries they know, and that they are built once."""
-
 import numpy as np
 import pytest
 
@@ -10,17 +8,19 @@ from pipeline.truth.node_table.tables import NodeTable
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
+DENIM = load_fabric("denim")
+
 
 def _table(line=FINE_LINE):
     return NodeTable(lambda cells: 4, 4, line)
 
 
-def _columns(fabric, rows=6, **options):
-    return columns_of(draw_queries(QueryOptions(**options), fabric.weave.repeat, 5, 0, rows))
+def _columns(rows=6):
+    return columns_of(draw_queries(QueryOptions(), DENIM.weave.repeat, 5, 0, rows))
 
 
 def test_a_table_is_built_once_and_again_only_for_light_from_behind():
-    cloth, table = cloth_side(load_fabric("denim"), TruthOptions()), _table()
+    cloth, table = cloth_side(DENIM, TruthOptions()), _table()
     front = table.table(cloth, False)
     assert table.table(cloth, False) is front
     both = table.table(cloth, True)
@@ -30,29 +30,25 @@ def test_a_table_is_built_once_and_again_only_for_light_from_behind():
 
 @pytest.mark.parametrize("options", [{"frame": "macro"}, {"shadows": False}], ids=str)
 def test_other_models_than_the_default_are_unknown(options):
-    fabric = load_fabric("denim")
-    assert _table().knows(cloth_side(fabric, TruthOptions()), _columns(fabric)).all()
-    assert not _table().knows(cloth_side(fabric, TruthOptions(**options)), _columns(fabric)).any()
+    assert _table().knows(cloth_side(DENIM, TruthOptions()), _columns()).all()
+    assert not _table().knows(cloth_side(DENIM, TruthOptions(**options)), _columns()).any()
 
 
 def test_curved_cloth_and_tiny_footprints_are_unknown():
-    fabric = load_fabric("denim")
-    columns = _columns(fabric)
-    changed = columns._replace(
-        curvature=np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0]), sigma_minor=np.where(np.arange(6) == 4, 0.01, 1.0)
-    )
-    found = _table().knows(cloth_side(fabric, TruthOptions()), changed._replace(sigma=np.ones(6)))
+    columns = _columns()
+    bent, narrow = np.where(np.arange(6) == 1, 0.1, 0.0), np.where(np.arange(6) == 4, 0.01, 1.0)
+    changed = columns._replace(curvature=bent, sigma=np.ones(6), sigma_minor=narrow)
+    found = _table().knows(cloth_side(DENIM, TruthOptions()), changed)
     np.testing.assert_array_equal(found, [True, False, True, True, False, True])
 
 
 def test_rotated_footprints_are_known_up_to_what_the_mixture_resolves():
     """At 45 degrees an ellipse with axes a and b has the correlation (a^2 - b^2) / (a^2 + b^2)."""
-    fabric = load_fabric("denim")
-    columns = _columns(fabric, 2)._replace(angle=np.full(2, np.pi / 4), sigma=np.full(2, 50.0))
-    cloth = cloth_side(fabric, TruthOptions())
+    columns = _columns(2)._replace(angle=np.full(2, np.pi / 4), sigma=np.full(2, 50.0))
+    cloth = cloth_side(DENIM, TruthOptions())
     for line in (COARSE_LINE, FINE_LINE):
         thin, thick = (50.0 * np.sqrt((1 - r) / (1 + r)) for r in (line.most + 1e-4, line.most - 1e-4))
         found = _table(line).knows(cloth, columns._replace(sigma_minor=np.array([thin, thick])))
         np.testing.assert_array_equal(found, [False, True])
-    boxes = cloth_side(fabric, TruthOptions(footprint="box"))
+    boxes = cloth_side(DENIM, TruthOptions(footprint="box"))
     assert not _table().knows(boxes, columns._replace(sigma_minor=np.full(2, 20.0))).any()

@@ -1,5 +1,3 @@
-"""Masses of intervals against points of the same footprint."""
-
 import numpy as np
 import pytest
 

@@ -13,6 +13,7 @@ import pytest
 from scipy import stats
 
 from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
+from tests.directions import unit
 
 LEVEL = 2.7e-3  # 3 sigma, for all comparisons of one kind together
 BINS = 4  # of |cos_o| in each hemisphere
@@ -20,21 +21,16 @@ NODES = 4000  # of the cosine between flake and fibre, each side of 0
 NODES_COSINE, NODES_AZIMUTH = 24, 180  # of the slab in each bin
 
 
-def _unit(degrees, azimuth_degrees):
-    theta, phi = math.radians(degrees), math.radians(azimuth_degrees)
-    return np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)])
-
-
 # alpha, T, light, tangent: at most in the plane of the slab, else tilted out of it.
 CONFIGURATIONS = [
-    (1.0, 2.0, _unit(0, 0), _unit(90, 0)),
-    (1.0, 0.3, _unit(60, 40), _unit(80, 0)),
-    (0.3, 2.0, _unit(0, 0), _unit(90, 90)),
-    (0.3, 0.5, _unit(50, 30), _unit(70, 100)),
-    (0.3, 5.0, _unit(75, 200), _unit(60, 10)),
-    (0.1, 2.0, _unit(30, 0), _unit(90, 90)),
-    (0.1, 1.0, _unit(65, 120), _unit(78, 100)),
-    (0.1, 4.0, _unit(20, 300), _unit(55, 250)),
+    (1.0, 2.0, unit(0, 0), unit(90, 0)),
+    (1.0, 0.3, unit(60, 40), unit(80, 0)),
+    (0.3, 2.0, unit(0, 0), unit(90, 90)),
+    (0.3, 0.5, unit(50, 30), unit(70, 100)),
+    (0.3, 5.0, unit(75, 200), unit(60, 10)),
+    (0.1, 2.0, unit(30, 0), unit(90, 90)),
+    (0.1, 1.0, unit(65, 120), unit(78, 100)),
+    (0.1, 4.0, unit(20, 300), unit(55, 250)),
 ]
 
 
@@ -61,7 +57,6 @@ class Fibres:
         self.areas = (2 * (a * edge + b * np.sin(edge))) @ mass
 
     def area(self, w):
-        """Return the projected area of the flakes towards w, (N, 3)."""
         across = np.linalg.norm(np.cross(w, self.tangent), axis=1)
         return np.interp(np.arctan2(across, np.abs(w @ self.tangent)), self.angles, self.areas)
 
@@ -131,29 +126,14 @@ def _compare(count, seed, finer=1):
     return np.array(energies), np.array(bins)
 
 
-def _assert_small(scores):
-    """Check every z-score at LEVEL for all of them, Sidak-corrected."""
-    level = 1 - (1 - LEVEL) ** (1 / scores.size)
-    assert np.abs(scores).max() < stats.norm.isf(level / 2), np.round(scores, 1)
-
-
 @pytest.mark.slow
-def test_photons_leave_as_the_slab_says():
-    """Rationale: reflection, transmission and unscattered share must be what photons do that meet one flake or none.
-
-    Expected: 8 slabs, three energies and 8 bins of the outgoing cosine each, within 3 standard errors (Sidak).
-    """
-    energies, bins = _compare(300_000, 11)
-    _assert_small(energies)
-    _assert_small(bins)
-
-
-@pytest.mark.slow
-def test_many_photons_leave_as_the_slab_says():
-    """As above, with errors 3.7 times smaller, for which the expected shares need finer sums too."""
-    energies, bins = _compare(4_000_000, 50, finer=2)
-    _assert_small(energies)
-    _assert_small(bins)
+@pytest.mark.parametrize(("count", "seed", "finer"), [(300_000, 11, 1), (4_000_000, 50, 2)])
+def test_photons_leave_as_the_slab_says(count, seed, finer):
+    """8 slabs, three energies and 8 bins of the outgoing cosine each, within 3 standard errors, Sidak-corrected. Many
+    photons need finer sums of the expected shares too."""
+    for scores in _compare(count, seed, finer):
+        level = 1 - (1 - LEVEL) ** (1 / scores.size)
+        assert np.abs(scores).max() < stats.norm.isf(level / 2), np.round(scores, 1)
 
 
 def test_the_walk_sees_a_slab_two_percent_too_thick():
@@ -165,7 +145,7 @@ def test_the_walk_sees_a_slab_two_percent_too_thick():
 
 @pytest.mark.parametrize("alpha", [0.1, 0.3, 1.0])
 def test_projected_area_integrated_from_the_density_is_sigma(alpha):
-    fibres = Fibres(alpha, _unit(70, 30))
-    w = np.array([_unit(degrees, 7 * degrees) for degrees in range(0, 180, 5)])
+    fibres = Fibres(alpha, unit(70, 30))
+    w = np.array([unit(degrees, 7 * degrees) for degrees in range(0, 180, 5)])
     ours = [sigma(*x, *fibres.tangent, alpha) for x in w]
     assert fibres.area(w) == pytest.approx(np.array(ours), rel=2e-5)

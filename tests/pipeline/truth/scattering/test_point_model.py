@@ -1,11 +1,8 @@
-"""The point model against 50-digit arithmetic and closed forms."""
-
 import math
 
 import mpmath
 import numpy as np
 import pytest
-from scipy import integrate
 
 from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
 
@@ -33,7 +30,6 @@ def _exact_flakes(i, o, t, alpha):
 
 
 def _exact_specular(i, o, t, alpha, thickness):
-    """Return f_r in 50 digits."""
     flakes, s_i, s_o, i, o = _exact_flakes(i, o, t, alpha)
     depth = mpmath.mpf(thickness) * (s_i / i[2] + s_o / o[2])
     return float(flakes * (1 - mpmath.exp(-depth)) / (4 * (s_i * o[2] + s_o * i[2])))
@@ -61,49 +57,20 @@ def test_specular_matches_50_digits():
             for _ in range(60):
                 i, o = (_unit(RNG.uniform(0, math.radians(89.9)), RNG.uniform(0, 2 * math.pi)) for _ in range(2))
                 t = _unit(RNG.uniform(0.3, math.pi - 0.3), RNG.uniform(0, 2 * math.pi))
-                ours = reflection(
-                    density(*(i + o), *t, alpha), sigma(*i, *t, alpha), sigma(*o, *t, alpha), i[2], o[2], thickness
-                )
+                sizes = sigma(*i, *t, alpha), sigma(*o, *t, alpha)
+                ours = reflection(density(*(i + o), *t, alpha), *sizes, i[2], o[2], thickness)
                 exact = _exact_specular(i, o, t, alpha, thickness)
                 worst = max(worst, abs(ours - exact) / exact)
             # i, o, t are unit to 1e-16 only; alpha = .01 magnifies what the matrix form makes of that by alpha^-2.
             assert worst < 1e-12 / alpha
 
 
-@pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0])
-def test_flakes_project_to_sigma(alpha):
-    # The integral of D <w.h> over the sphere is sigma(w); the fibre lies along z, w in the x-z plane.
-    t = (0.0, 0.0, 1.0)
-    w = _unit(0.7, 0.0)
-
-    def inner(mu, phi):
-        h = _unit(math.acos(mu), phi)
-        return density(*h, *t, alpha) * max(0.0, float(h @ w))
-
-    total, _ = integrate.dblquad(inner, 0, 2 * math.pi, -1, 1, epsabs=1e-6)
-    assert total == pytest.approx(sigma(*w, *t, alpha), rel=2e-5)
-
-
-def test_round_flakes_equal_the_lommel_seeliger_slab():
+def test_round_flakes_equal_the_lommel_seeliger_slab_and_opposite_directions_give_no_nan():
+    w = _unit(0.3, 0.2)
+    assert density(*(w - w), 0.0, 1.0, 0.0, 0.1) == 0.0
     i, o, t = _unit(0.4, 0.1), _unit(1.1, 2.0), _unit(1.2, 0.5)
     ours = reflection(density(*(i + o), *t, 1.0), sigma(*i, *t, 1.0), sigma(*o, *t, 1.0), i[2], o[2], 2.0)
     assert ours == pytest.approx(-math.expm1(-2.0 * (1 / i[2] + 1 / o[2])) / (4 * math.pi * (i[2] + o[2])), rel=1e-13)
-
-
-def test_specular_is_reciprocal_to_the_last_bit():
-    for _ in range(200):
-        i, o = (_unit(RNG.uniform(0, 1.5), RNG.uniform(0, 2 * math.pi)) for _ in range(2))
-        t = _unit(RNG.uniform(0, math.pi), RNG.uniform(0, 2 * math.pi))
-        values = [
-            reflection(density(*(a + b), *t, 0.2), sigma(*a, *t, 0.2), sigma(*b, *t, 0.2), a[2], b[2], 2.0)
-            for a, b in ((i, o), (o, i))
-        ]
-        assert values[0] == values[1]
-
-
-def test_opposite_directions_give_no_nan():
-    w = _unit(0.3, 0.2)
-    assert density(*(w - w), 0.0, 1.0, 0.0, 0.1) == 0.0
 
 
 def _crossing_pairs(count):
@@ -138,9 +105,8 @@ def test_transmission_at_equal_lambda_is_the_limit():
         for degrees in [0.0, 45.0, 89.9]:
             flakes, size, cosine = 0.7, 0.3, math.cos(math.radians(degrees))
             limit = flakes * thickness * math.exp(-thickness * size / cosine) / (4 * cosine * cosine)
-            assert transmission(flakes, size, size, cosine, cosine, thickness) == pytest.approx(
-                limit, rel=1e-14, abs=1e-300
-            )
+            found = transmission(flakes, size, size, cosine, cosine, thickness)
+            assert found == pytest.approx(limit, rel=1e-14, abs=1e-300)
 
 
 @pytest.mark.parametrize("thickness", [0.001, 2.0, 100.0])
@@ -160,17 +126,8 @@ def test_transmission_is_reciprocal_to_the_last_bit():
         assert there == back
 
 
-def test_light_across_a_flat_fibre_passes_a_layer_of_thickness_2_by_exp_minus_2():
-    # sigma = 1 across the fibre: 13.5 % go straight through.
-    size = sigma(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.1)
-    assert unscattered(size, 1.0, 2.0) == pytest.approx(0.1353352832366127, rel=1e-15)
-
-
 def test_white_flakes_return_no_more_than_they_receive():
-    """Expected: reflected, transmitted and unscattered light add up to less than 1; the rest met a second flake.
-
-    A thin layer loses nothing: the rest is of second order in T.
-    """
+    """The rest met a second flake; a thin layer loses nothing, as that is of second order in T."""
     for alpha in [0.1, 0.5, 1.0]:
         for degrees in [0.0, 50.0, 80.0]:
             i, t = _unit(math.radians(degrees), 0.4), _unit(1.3, 0.9)

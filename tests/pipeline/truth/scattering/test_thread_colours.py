@@ -1,14 +1,13 @@
-"""Colours of components where ends and picks differ in colour: closed forms and an integral on a lattice."""
-
 import math
 
 import numpy as np
 import pytest
 
+from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
-from tests.pipeline.truth.cloths import PALETTE, coloured
+from tests.pipeline.truth.cloths import PALETTE, coloured, fixed
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
 
@@ -74,29 +73,18 @@ def test_standard_errors_are_those_of_independent_repetitions():
     fabric = coloured("denim", ends=[["red", 2], ["blue", 1]], picks=[["blue", 1], ["red", 3]])
     asked = queries([0.3], [2.2], 1.4, (0.5, -0.3, 0.81), (-0.6, 0.0, 0.8))
     many = Queries(*(np.repeat(column, 200, axis=0) for column in asked))
-    options = TruthOptions(relative_error=1e-9, min_count=256, max_count=256)
-    found = component_colours(fabric, many, options, 7)
+    found = component_colours(fabric, many, fixed(256, "auto"), 7)
     # With fixed components, the patch's colour scatters as the colours do.
-    components = component_weights(fabric, asked)
+    components = estimate(fabric, asked, TruthOptions(relative_error=0.002), 3).mean[0].astype(float)
     patch = np.einsum("j,njc->nc", components, found.mean)
     ratio = patch.std(axis=0, ddof=1) / np.sqrt(np.square(found.standard_error).mean(axis=0))
     assert np.all((ratio > 0.7) & (ratio < 1.4)), ratio
-
-
-def component_weights(fabric, asked):
-    from pipeline.truth.estimator import estimate
-
-    return estimate(fabric, asked, TruthOptions(relative_error=0.002), 3).mean[0].astype(float)
 
 
 def test_a_cloth_without_an_order_has_the_colours_of_its_yarns():
     denim = load_fabric("denim")
     behind = queries([0.3], [2.2], 1.4, (0.0, 0.6, -0.8))
     found = component_colours(denim, behind, EXACT, 1)
-    transmitted = [denim.warp.diffuse_transmission_rgb, denim.weft.diffuse_transmission_rgb]
-    assert found.mean[0].tolist() == [
-        list(denim.warp.specular_rgb),
-        list(denim.weft.specular_rgb),
-        *map(list, transmitted),
-    ]
+    names, yarns = ("specular_rgb", "diffuse_transmission_rgb"), (denim.warp, denim.weft)
+    assert found.mean[0].tolist() == [list(getattr(yarn, name)) for name in names for yarn in yarns]
     assert (found.standard_error == 0).all()

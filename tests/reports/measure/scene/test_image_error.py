@@ -7,8 +7,8 @@ from scipy import ndimage
 
 from reports.measure.scene.image_error import PERCEIVED, image_errors, noise_floor
 from reports.record import Record
+from tests.refusals import refusal
 from weaves.colour import linear_rgb
-from weaves.errors import BadInput
 
 SIZE = 64
 Y, X = np.mgrid[:SIZE, :SIZE]
@@ -44,17 +44,14 @@ def test_psnr_and_ssim_of_constant_pictures():
     assert found["ssim"] == pytest.approx((2 * a * b + 1e-4) / (a**2 + b**2 + 1e-4), abs=1e-9)
 
 
-def test_flip_of_green_and_blue_and_delta_e_of_black_and_white():
+def test_flip_of_green_and_blue_delta_e_of_black_and_white_and_relative_mse_of_a_factor():
     """FLIP scales colour differences so that the one between the display's green and blue is its largest, 1.
 
-    L* are 0 and 100, mean 50: S_L = 1, so Delta E = 100.
+    L* are 0 and 100, mean 50: S_L = 1, so Delta E = 100. m = 1.1 t, t = 1 and 3 in halves: ((.1 t)^2 / (t^2 + eps 4))
+    averaged.
     """
     assert values(flat(0.0, 1.0, 0.0), flat(0.0, 0.0, 1.0))["flip_ldr"] == pytest.approx(1, abs=1e-5)
     assert values(flat(1.0, 1.0, 1.0), flat(1e-9, 1e-9, 1e-9))["delta_e"] == pytest.approx(100, abs=1e-3)
-
-
-def test_relative_mse_of_a_factor():
-    """m = 1.1 t, t = 1 and 3 in halves: ((.1 t)^2 / (t^2 + eps 4)) averaged."""
     truth = np.where(X[..., None] < 32, 1.0, 3.0) * np.ones(3)
     expected = 0.01 * (1 / (1 + 0.01 * 4) + 9 / (9 + 0.01 * 4)) / 2
     assert values(1.1 * truth, truth)["mse_relative"] == pytest.approx(expected)
@@ -90,8 +87,7 @@ def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores():
     errors = image_errors(CLOTH, truth, size, DISC)
     assert errors.mse.noise == pytest.approx((size[DISC] ** 2).mean())
     for error in (errors.mse, errors.mse_relative):
-        assert abs(error.value) < 5 * error.standard_error
-        assert error.measured == pytest.approx(error.noise, rel=0.1)
+        assert abs(error.value) < 5 * error.standard_error and error.measured == pytest.approx(error.noise, rel=0.1)
         assert error.low < error.value < error.high
     for metric, measure in errors.perceived.items():
         assert measure.value == pytest.approx(measure.floor, rel=0.1), metric
@@ -144,9 +140,7 @@ def broken(array, value):
 )
 def test_what_cannot_be_measured_is_bad_input(change, sentence):
     given = {"picture": CLOTH, "truth": CLOTH, "standard_error": EXACT, "mask": ALL} | change
-    with pytest.raises(BadInput, match=sentence) as raised:
-        image_errors(**given)
-    assert "\n" not in str(raised.value)
+    assert sentence in refusal(image_errors, **given)
 
 
 def test_a_nearly_dark_truth_does_not_end_the_process():
