@@ -21,6 +21,7 @@ from pipeline.analytic.soft_nodes import (
     narrow,
     nodes,
     scratch,
+    seen_areas,
     shade,
     view_lines,
     waves,
@@ -119,15 +120,20 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
 }  # fmt: skip
 
 
+_ERROR_FUNCTION: Final = (0.3275911, 0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429)
+
 _OF_RAYS: Final[dict[ModuleType, dict[str, str]]] = {
-    narrow: {"FROM_ABOVE": "_FROM_ABOVE", "LINE_BETWEEN": "_BETWEEN"},
+    narrow: {"FROM_ABOVE": "_FROM_ABOVE", "LINE_BETWEEN": "_BETWEEN", "JUST_HALF": "_JUST"},
+    shade: {"AWAY": "_AWAY", "WHOLE_BOX": "_WHOLE"},
+    seen_areas: {"SEEN_ANGLES": "SEEN_ANGLES", "AREA_STEPS": "_STEPS", "AREA_TURN": "_TURN"},
     view_lines: {
         "VIEW_BETWEEN": "_BETWEEN", "VIEW_COARSEST": "_COARSEST", "VIEW_LENGTH": "_LENGTH", "VIEW_NEAREST": "_NEAREST",
+        "VIEW_HALVINGS": "_HALVINGS",
         **{
             name: f"_{name}"
             for name in (
                 "FOOTPRINT_ENDS", "DEVIATIONS", "CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS",
-                "NEVER", "FARTHEST", "STEEP", "SMEARED",
+                "NEVER", "FARTHEST", "STEEP", "SMEARED", "THIRDS",
             )
         },
     },
@@ -140,7 +146,8 @@ def ray_constants() -> dict[str, float | int]:
     """Return the constants that footprints of view rays add."""
     values: dict[str, float | int] = {name: column for column, name in enumerate(FLOAT)}
     values |= {"FLOAT_COLUMNS": len(FLOAT), "MOST_ON_LINES": scratch.MOST_ON_LINES, "RAYS": coverage.RAYS}
-    values |= {"CLEARLY": 1e6, "VERTICAL_SLOPE": 1e-6, "BORDER": 1.0 - 4e-6}
+    values |= {"VERTICAL_SLOPE": 1e-6, "BORDER": 1.0 - 4e-6, "TURNS": 1e-6, "ROOT_HALF": math.sqrt(0.5)}
+    values |= {"ROOT_RIGHT": math.sqrt(0.5 * math.pi), **{f"ERF_{n}": value for n, value in enumerate(_ERROR_FUNCTION)}}
     for module, renamed in _OF_RAYS.items():
         values |= {name: vars(module)[own] for name, own in renamed.items()}
     return {name: value if isinstance(value, int) else float(np.float32(value)) for name, value in values.items()}

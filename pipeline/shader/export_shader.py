@@ -47,7 +47,7 @@ def write_shader(
     language : sequence of str
         Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
     kind : sequence of str
-        Kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY; and PARALLAX.
+        Kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY; PARALLAX, and WALLS.
 
     Raises
     ------

@@ -2,7 +2,8 @@
 
 Cells of grids and numbers of nodes are integers: a query may lie so near a step that the last digit of its place
 decides. No implementation can be right or wrong on such a query, so it is not golden: the answer may change by at most
-STEADY, as a share of the range of its column, if the last digits of its footprint change.
+STEADY, as a share of the range of its column, if the last digits of its footprint change. Nor is it golden if its view
+rays turn over curved cloth: their places there are square roots of small numbers, which lose half of their digits.
 """
 
 from __future__ import annotations
@@ -109,15 +110,22 @@ def golden(sides: Sides, read: Answering | None = None) -> Golden:
     }
     ends, picks = sides.front.repeat
     digits = _DIGITS_OF_LINES if sides.front.parallax else 1
-    return golden_of(groups, (int(ends), int(picks)), read or partial(read_sides, sides), digits=digits)
+    depth = sides.front.plane - sides.front.lowest  # 0 without view rays
+    return golden_of(groups, (int(ends), int(picks)), read or partial(read_sides, sides), digits=digits, depth=depth)
 
 
 def golden_of(
-    groups: Mapping[str, Group], repeat: tuple[int, int], read: Answering, stretched: bool = True, digits: int = 1
+    groups: Mapping[str, Group],
+    repeat: tuple[int, int],
+    read: Answering,
+    stretched: bool = True,
+    digits: int = 1,
+    depth: float = 0.0,
 ) -> Golden:
     """Return golden queries over a repeat (ends, picks), footprints all round if not `stretched`.
 
-    Steady are those whose answers stay if the last digits of their footprints change by `digits`.
+    Steady are those whose answers stay if the last digits of their footprints change by `digits`, and whose rays do not
+    turn down to a `depth` below the reference plane.
     """
     rng = np.random.default_rng(_SEED)
     rows, answers, places, share, stop = [], [], {}, [], 0
@@ -126,6 +134,7 @@ def golden_of(
         if not stretched:
             queries = queries._replace(sigma_minor=queries.sigma)
         steady, answer = _steady(read, queries, rng, digits)
+        steady &= ~turning(queries, depth)
         chosen = np.flatnonzero(steady)[: group.rows]
         rows.append(rows_of(queries.take(chosen)))
         answers.append(answer[chosen])
@@ -225,6 +234,12 @@ def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits:
         )  # fmt: skip
         change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
+
+
+def turning(queries: Queries, depth: float) -> Mask:
+    """Return which view rays over curved cloth turn down to a depth below the reference plane, (N,)."""
+    square = np.square(queries.wo.astype(np.float64))
+    return np.asarray(square[:, 2] < 2.0 * queries.curvature * (square[:, 0] + square[:, 1]) * depth)
 
 
 def _next(values: Float32, rng: np.random.Generator, digits: int) -> Float32:

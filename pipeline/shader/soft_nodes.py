@@ -29,7 +29,9 @@ SOFT_NODES_SOURCES: Final = (
 )  # fmt: skip
 """Files of the source."""
 
-PARALLAX_SOURCES: Final = ("view_rays.slang", "displaced_nodes.slang", "view_lines.slang", "coverage.slang")
+PARALLAX_SOURCES: Final = (
+    "seen_areas.slang", "view_rays.slang", "displaced_nodes.slang", "view_lines.slang", "coverage.slang",
+)  # fmt: skip
 """Files that footprints of view rays add."""
 
 

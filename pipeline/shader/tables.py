@@ -4,7 +4,8 @@
     numbers    float32: scalars, then colours, yarns, extents of pieces, the rules along both axes and those of Gauss
     nodes      float32 (rows, 4), `stride` rows a node: normal and 1 / n_z; tangent and share of the area; change of the
                tangent along; across; mean and sharpness of horizons, two azimuths a row; cosine and sine of waves, two
-               a row; the horizons of the other side, if known; falls over curved cloth, if known, four azimuths a row
+               a row; the horizons of the other side, if known; falls over curved cloth, if known, four azimuths a row;
+               with parallax areas that a viewer sees, four azimuths a row, angle by angle
     grid       uint8: horizons of the pieces, 255 straight above; those of the other side; falls; the same of the back
 
 `layout.slang` holds the constants and a function that reads the scalars and places.
@@ -27,6 +28,7 @@ from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes import footprint_nodes
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable, tabulate
+from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES
 from pipeline.analytic.soft_nodes.waves import TOGETHER
 from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
@@ -43,6 +45,9 @@ QUERY_KINDS: Final = (BEHIND, CURVATURE)
 
 PARALLAX: Final = "parallax"
 """Kind of all queries whose footprints are patches of view rays; it needs a program of its own."""
+
+WALLS: Final = "walls"
+"""Kind of PARALLAX whose rays that meet a wall see the yarn's rim above it; the program is the same."""
 
 EVERY: Final = "all"
 """All of QUERY_KINDS."""
@@ -113,18 +118,20 @@ _MEANINGS: Final = {
 def wanted_kinds(names: Collection[str]) -> frozenset[str]:
     """Return the kinds that names choose; BadInput if one is none."""
     for name in names:
-        if name not in (known := (*QUERY_KINDS, EVERY, PARALLAX)):
+        if name not in (known := (*QUERY_KINDS, EVERY, PARALLAX, WALLS)):
             raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join(known)}")
+    if WALLS in names and PARALLAX not in names:
+        raise BadInput("export", "kind", WALLS, f"only view rays meet walls; name {PARALLAX} too")
     return frozenset((*names, *QUERY_KINDS) if EVERY in names else names) - {EVERY}
 
 
 def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str]) -> Sides:
     """Return the tables of a fabric at a level of detail, for kinds of queries."""
     behind, curved, parallax = BEHIND in kinds, CURVATURE in kinds, PARALLAX in kinds
-    reflected, transmitted = colours(fabric), colours(fabric, transmitted=True)
+    reflected, transmitted, rims = colours(fabric), colours(fabric, transmitted=True), WALLS in kinds
     return Sides(
-        tabulate(fabric, behind=behind, level=level, curved=curved, parallax=parallax),
-        tabulate(fabric.back(), behind=True, level=level, parallax=parallax) if behind else None,
+        tabulate(fabric, behind=behind, level=level, curved=curved, parallax=parallax, rims=rims),
+        tabulate(fabric.back(), behind=True, level=level, parallax=parallax, rims=rims) if behind else None,
         np.concatenate([reflected, transmitted[2:]]).astype(np.float32),
     )
 
@@ -243,6 +250,8 @@ def _side(table: SoftNodeTable) -> _Side:
         least, greatest = map(float, table.shown)
         numbers |= {"highest": table.highest, "lowest": table.lowest, "plane": table.plane}
         numbers |= {"shown_least": least, "shown_greatest": greatest, "view_lines": table.view_lines}
+        numbers |= {"spacing": table.spacing}
+        integers |= {"rims": int(table.rims), "areas_row": rows.shape[1] - SEEN_ANGLES * FALL_ROWS}
         floats = np.column_stack([table.floats[:, [BEND_RADIUS, HALF_LENGTH, AXIS_DROP]], table.crowns])
         of_numbers |= {"floats": floats.astype(np.float32), "spots": table.spots, "ray_points": ray_points()}
     grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
@@ -301,7 +310,8 @@ def _node_rows(table: SoftNodeTable) -> Float32:
     count, waves = table.evenly.size, len(table.waves)
     surface = table.nodes.transpose(0, 2, 1).reshape(count, -1)
     behind, curvatures = len(table.behind_grid) > 0, len(table.falls)
-    parts = [WAVE_ROW, waves // 2, AZIMUTHS // 2 if behind else 0, curvatures * FALL_ROWS]
+    angles = table.areas.shape[1]
+    parts = [WAVE_ROW, waves // 2, AZIMUTHS // 2 if behind else 0, curvatures * FALL_ROWS, angles * FALL_ROWS]
     rows = np.zeros((count, sum(parts), 4), np.float32)
     ends = np.cumsum(parts)
     rows[:, 0] = surface[:, :4]
@@ -314,7 +324,9 @@ def _node_rows(table: SoftNodeTable) -> Float32:
     if behind:
         rows[:, ends[1] : ends[2]] = _horizon_rows(table.behind_mean, table.behind_sharpness)
     falls = table.falls.reshape(curvatures * AZIMUTHS, count)
-    rows[:, ends[2] :] = falls.T.reshape(count, -1, 4)
+    rows[:, ends[2] : ends[3]] = falls.T.reshape(count, -1, 4)
+    areas = table.areas.swapaxes(0, 1).reshape(angles * table.areas.shape[0], count)
+    rows[:, ends[3] :] = areas.T.reshape(count, -1, 4)
     return rows
 
 
