@@ -37,6 +37,7 @@ _HALVINGS = 48
 _CLOSE = 1e-13  # in yarn spacings: a step that ends the search
 _LEVEL = 1e-9  # height above the ray that counts as on it: neighbouring cells round their common border differently
 _INSIDE = 1e-12  # distance of a point from the border of its cell
+_PAST_WALL = 1e-10  # distance of a rim from the wall below it, along a view ray
 
 
 class Hit(NamedTuple):
@@ -162,7 +163,9 @@ def _ends_in(
 def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) -> Hit:
     """Return what a ray meets first that starts at (x, y, z), not below the surface.
 
-    The ray sinks at first (towards.z < 0), or runs straight down; (x, y) may lie anywhere on the endless cloth.
+    The ray sinks at first (towards.z < 0), or runs straight down; (x, y) may lie anywhere on the endless cloth. The
+    point of a ray that ends on a wall is just inside the piece above it: the border itself would belong to either side,
+    as numbers are rounded.
     """
     picks, ends = field.top.shape
     x, y = wrap(x, ends), wrap(y, picks)
@@ -170,7 +173,12 @@ def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) ->
         cell = first_cell(x, y, towards)
         family, _, _, _, _, _, _, _, _ = surface_at(field, x, y, cell.end, cell.pick)
         return Hit(MISSED if family == GAP else ON_YARN, x, y, cell.end, cell.pick, 0.0)
-    return _end_of(field, x, y, z, UNDER, towards)
+    hit = _end_of(field, x, y, z, UNDER, towards)
+    if hit.what != ON_WALL:
+        return hit
+    x = min(max(hit.x + _PAST_WALL * towards.dx, hit.end + _INSIDE), hit.end + 1.0 - _INSIDE)
+    y = min(max(hit.y + _PAST_WALL * towards.dy, hit.pick + _INSIDE), hit.pick + 1.0 - _INSIDE)
+    return Hit(ON_WALL, x, y, hit.end, hit.pick, hit.distance)
 
 
 @kernel
