@@ -39,6 +39,7 @@ NOT_REFINED: Final = (1.0, np.inf)
 _FEW: Final = 8
 _COARSE, _COARSEST, _COARSE_CELL = 24, 12, 44  # most and fewest nodes of a coarse table; their number for one cell
 _COARSE_RAYS: Final = 1.8  # below it, errors of the coarse table are larger than stated
+_NARROWEST_RIMS: Final = 0.3  # radius, in yarn spacings
 _KEPT: Final = 24  # tables of 1 to 5 MB: those of a benchmark with about a dozen cloths in turn
 
 ALLOWED: Final = (
@@ -81,6 +82,8 @@ class NodeTable:
         """Return which queries a table answers, (N,)."""
         other = cloth.choices.macro or not cloth.choices.shadows
         other |= cloth.parallax and cloth.shape != GAUSSIAN
+        # Walls of very open cloth are wrong by more than stated: rays go on below its gaps.
+        other |= cloth.choices.rims and bool(cloth.front.yarn[:, RADIUS].min() < _NARROWEST_RIMS)
         if other or different_cells(cloth.front) > TABLE_CELLS:
             return np.zeros(len(columns.u), np.bool_)
         narrow = np.minimum(columns.sigma, columns.sigma_minor)
