@@ -6,12 +6,22 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+import numpy as np
+
 from jobs.recipe.recipe import Recipe
 from pipeline.models.domain import PHYSICS
 from pipeline.shader.limits import MOST_REPEAT_CELLS
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.queries import QueryOptions
-from pipeline.truth.options import TABLE_CELLS, TABLE_SIGMA, TruthOptions
+from pipeline.truth.options import (
+    FEWEST_NODES,
+    RAYS_RESOLVED,
+    TABLE_CELLS,
+    TABLE_SIGMA,
+    TruthOptions,
+    seen_distance,
+    steepness,
+)
 from pipeline.truth.query import LOWEST_VIEWER
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
@@ -55,13 +65,25 @@ def table_refusal(truth: TruthOptions, queries: QueryOptions, fabrics: Sequence[
         return "it knows the default frame and shadows only"
     if queries.sigma[0] < TABLE_SIGMA:
         return f"it knows footprints from {TABLE_SIGMA:.3g} yarn spacings on, the queries begin at {queries.sigma[0]:g}"
+    if truth.parallax and truth.footprint != "gaussian":
+        return "with parallax it knows Gaussian footprints only"
     if queries.stretch > 1.0 or queries.curvature[1] > 0.0:
         return "it knows round footprints of flat cloth only"
     for fabric in fabrics:
+        if truth.parallax and queries.sigma[0] < (least := _ray_sigma(truth, fabric, queries.max_angle)):
+            allowed = f"with parallax it knows footprints from {least:.2g} yarn spacings on for views of {fabric.name}"
+            return f"{allowed} to {queries.max_angle:g} degrees, the queries begin at {queries.sigma[0]:g}"
         ends, picks = fabric.weave.repeat
         if ends * picks > TABLE_CELLS and (cells := fabric.weave.different_cells()) > TABLE_CELLS:
             return f"it knows at most {TABLE_CELLS} different cells, {fabric.name} has {cells}"
     return ""
+
+
+def _ray_sigma(truth: TruthOptions, fabric: Fabric, degrees: float) -> float:
+    """Return the smallest deviation of footprints of view rays that `node_table` knows for any view up to an angle."""
+    steepest = max(steepness(yarn.relief, yarn.width, math.radians(yarn.bend)) for yarn in (fabric.warp, fabric.weft))
+    cosine = np.array([math.cos(math.radians(degrees))])
+    return RAYS_RESOLVED[truth.walls] * float(seen_distance(steepest, cosine, FEWEST_NODES)[0])
 
 
 def _check_number(recipe: Recipe, where: str) -> None:

@@ -6,9 +6,10 @@ over nodes with horizons; `auto` takes it where its error is small enough, and s
 `auto` evaluates wide footprints by a coarse table. All others, and those whose standard error exceeds the requested
 one, go to a fine table, which costs ten to forty microseconds a query. Where its error is too large, the nodes that may
 be most wrong are integrated with exact visibility (node_table.refine). Queries whose error is still too large are
-sampled as a whole. So are all queries that no table can answer: tiny and very thin footprints, curved cloth, cloths of
-many different cells, and options of the truth other than the default. Each stage stops at the calibrated standard
-error, not at the error that it reports (pipeline.truth.calibration): the requested error has one meaning for all.
+sampled as a whole. So are all queries that no table can answer: tiny and very thin footprints, with parallax narrow
+ones seen at low angles, curved cloth, cloths of many different cells, and options of the truth that tables do not know.
+Each stage stops at the calibrated standard error, not at the error that it reports (pipeline.truth.calibration): the
+requested error has one meaning for all.
 """
 
 from __future__ import annotations
@@ -41,10 +42,10 @@ samples, so that three of them cover as much as three of a normal distribution."
 def auto_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer each query by the first whose standard error is small enough: a coarse table, a fine one, sampling."""
     answers = Raw.empty(len(index))
-    known, wide = FINE.knows(cloth, columns), _wide(columns)
+    known = FINE.knows(cloth, columns)
     requested = options.relative_error, options.absolute_error
     left = np.ones(len(index), np.bool_)
-    for table, chosen, bound in ((COARSE, known & wide, NOT_REFINED), (FINE, known, requested)):
+    for table, chosen, bound in ((COARSE, _wide(cloth, columns), NOT_REFINED), (FINE, known, requested)):
         here = np.flatnonzero(chosen & left)
         if not here.size:
             continue
@@ -68,7 +69,7 @@ def node_table_rows(cloth: ClothSide, columns: WideQueries, index: Index, option
 
     BadInput if the table does not know a query.
     """
-    known, wide = FINE.knows(cloth, columns), _wide(columns)
+    known, wide = FINE.knows(cloth, columns), _wide(cloth, columns)
     if not known.all():
         row = int(np.flatnonzero(~known)[0])
         raise BadInput("options", "estimator", f"node_table (row {index[row]})", ALLOWED)
@@ -80,9 +81,9 @@ def node_table_rows(cloth: ClothSide, columns: WideQueries, index: Index, option
     return answers
 
 
-def _wide(columns: WideQueries) -> Mask:
+def _wide(cloth: ClothSide, columns: WideQueries) -> Mask:
     """Return for which queries the coarse table is accurate enough."""
-    return np.asarray(np.minimum(columns.sigma, columns.sigma_minor) >= WIDE)
+    return np.asarray(COARSE.knows(cloth, columns) & (np.minimum(columns.sigma, columns.sigma_minor) >= WIDE))
 
 
 def _sampled(

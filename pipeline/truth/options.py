@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from pipeline.compiled.arrays import Float64
 from weaves.validation import Frozen
 
 EstimatorName = Literal["mc", "r2", "owen", "quadrature", "node_table", "auto"]
@@ -19,6 +22,26 @@ TABLE_CELLS: Final = 96
 
 TABLE_SIGMA: Final = 1.25 / 32
 """Smallest standard deviation of a footprint, in yarn spacings, that the estimator `node_table` resolves."""
+
+FEWEST_NODES: Final = 24
+"""Nodes on a yarn spacing of the truth's fine table, at least."""
+
+RAYS_RESOLVED: Final[dict[Walls, float]] = {"left_out": 0.7, "rim": 2.5}
+"""Smallest standard deviation of a footprint of view rays that `node_table` resolves, over `seen_distance`."""
+
+
+def steepness(relief: float, width: float, bend: float) -> float:
+    """Return how much a yarn rises from one node to the next, over the distance of nodes; the bend in radians."""
+    return relief * max(0.5 * math.pi * width, math.tan(bend))
+
+
+def seen_distance(steepest: float, cosine: Float64, nodes: int) -> Float64:
+    """Return how far apart, at most, view rays cross the reference plane that meet neighbouring nodes, (N,).
+
+    `steepest` is the largest `steepness` of the yarns, `cosine` wo.n_s (N,), and there are so many `nodes` on a yarn
+    spacing: (1 + steepness tan(theta)) / nodes.
+    """
+    return np.asarray((1.0 + steepest * np.sqrt(1.0 / cosine**2 - 1.0)) / nodes)
 
 
 class Limits(NamedTuple):
@@ -55,7 +78,7 @@ class TruthOptions(Frozen):
     parallax: bool = False
     """True if a footprint is a patch of view rays: its density belongs to the points where they cross the reference
     plane (`pipeline.truth.geometry.pieces`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
-    which heights displace nothing [Chen2024Woven]. Known to the estimators `mc`, `r2`, `owen` and `auto`."""
+    which heights displace nothing [Chen2024Woven]. Known to all estimators but `quadrature`."""
     walls: Walls = "left_out"
     """Meaning of a view ray that meets the step between two floats: it does not count, or it sees the rim of the yarn
     above, so that the mean over all places does not depend on the footprint."""
@@ -91,8 +114,8 @@ class TruthOptions(Frozen):
     def _rays_have_one_model(self) -> TruthOptions:
         if self.parallax and (self.frame == "macro" or not self.shadows):
             raise ValueError("parallax needs frame 'ply' and shadows: a view ray ends at the first point that it meets")
-        if self.parallax and self.estimator in ("quadrature", "node_table"):
-            raise ValueError(f"{self.estimator} integrates over the fabric plane, without parallax: take auto or owen")
+        if self.parallax and self.estimator == "quadrature":
+            raise ValueError("quadrature integrates over the fabric plane, without parallax: take auto or owen")
         if self.walls != "left_out" and not self.parallax:
             raise ValueError("walls are met by view rays alone: parallax is needed")
         return self

@@ -64,7 +64,7 @@ from pipeline.analytic.soft_nodes.nodes import (
 )
 from pipeline.analytic.soft_nodes.scratch import DRAFT_ROWS, Scratch, SoftQuery
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
 from pipeline.compiled.float32 import arcsine
 from pipeline.truth.geometry.heightfield import (
     AXIS_DROP,
@@ -148,7 +148,7 @@ class YarnCurve(NamedTuple):
     side: float
 
 
-@kernel
+@fast_kernel
 def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
     """Return how far before the plane a ray has a height, and its slope there, as a share of that at the plane."""
     if ray.bend == 0.0:
@@ -160,7 +160,7 @@ def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
     return 2.0 * (height - ray.plane) * ray.run / (1.0 + root), root
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
     """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the yarn's border.
 
@@ -182,7 +182,7 @@ def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
     return curve.beta * (curve.side * (root - curve.drop) + beyond), curve.beta * slope, cosine * root
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
     """Return to where the point at s is displaced, and a number with the sign of n.o."""
     height, slope, upright = _height_and_slope(curve, s)
@@ -190,7 +190,7 @@ def _seen(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
     return s - distance, upright * steep + ray.run * slope
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _seen_rising(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
     """Return the same for rays that rise: its place, and a number that is positive where they meet the flank."""
     height, slope, upright = _height_and_slope(curve, s)
@@ -198,7 +198,7 @@ def _seen_rising(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float
     return s + (1.0 + steep) / (ray.bend * ray.run), ray.run * slope - upright * steep
 
 
-@kernel
+@fast_kernel
 def _reached(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> tuple[float, float]:
     """Return between which places of a piece rays reach it that rise at `ViewRay.least`; none: the second is first."""
     # The highest place, by thirds.
@@ -216,7 +216,7 @@ def _reached(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> tuple[f
     return first, high if _height_and_slope(curve, high)[0] > ray.least else _halve(curve, ray, top, high)
 
 
-@kernel
+@fast_kernel
 def _halve(curve: YarnCurve, ray: ViewRay, inside: float, outside: float) -> float:
     """Return the place between two at which rays just reach a piece."""
     for _ in range(_HALVINGS):
@@ -228,7 +228,7 @@ def _halve(curve: YarnCurve, ray: ViewRay, inside: float, outside: float) -> flo
     return inside
 
 
-@kernel
+@fast_kernel
 def _rising_crest(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> float:
     """Return the crest of a piece that rising rays clear; they meet the flank between it and `high`."""
     if _seen_rising(curve, ray, high)[1] <= 0.0:
@@ -244,7 +244,7 @@ def _rising_crest(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> fl
     return crest
 
 
-@kernel
+@fast_kernel
 def _rising_interval(
     curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_from: float, q_to: float
 ) -> tuple[float, float]:
@@ -259,7 +259,7 @@ def _rising_interval(
     return start, stop
 
 
-@kernel
+@fast_kernel
 def _place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: float, rising: bool) -> float:
     """Return the place between two that rays through `target` meet."""
     for _ in range(_HALVINGS):
@@ -272,7 +272,7 @@ def _place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: f
     return 0.5 * (low + high)
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _crest(
     curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, q_high: float
 ) -> tuple[float, float]:  # fmt: skip
@@ -297,7 +297,7 @@ def _crest(
     return s, q
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _at_place(
     curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_crest: float, q_high: float, target: float, near: float
 ) -> float:  # fmt: skip
@@ -318,7 +318,7 @@ def _at_place(
     return s
 
 
-@kernel
+@fast_kernel
 def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float, spacing: float) -> float:
     """Return a bound of the nodes that a footprint places on lines, given its least deviation of any direction."""
     widest = math.sqrt(max(deviation_x**2 + deviation_y**2 - narrowest**2, narrowest**2))
@@ -328,7 +328,7 @@ def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float, spa
     return lines * nodes
 
 
-@kernel
+@fast_kernel
 def _lines_across(
     ray: ViewRay, x: float, y: float, sigma: float, radii: tuple[float, float], reach: float, spacing: float,
     lines: Float64,
@@ -381,7 +381,7 @@ class ViewLine(NamedTuple):
     apart: float
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _curve_of(table: SoftNodeTable, p: int, ray: ViewRay, x: float, y: float) -> YarnCurve:
     """Return the curve of a piece along a line that has s = 0 at (x, y) from the corner of the cell."""
     family, box, own = table.pieces[p, FAMILY], table.bounds[p], table.floats[p]
@@ -396,7 +396,7 @@ def _curve_of(table: SoftNodeTable, p: int, ray: ViewRay, x: float, y: float) ->
     )  # fmt: skip
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _interval(
     curve: YarnCurve, ray: ViewRay, low: float, high: float, sigma: float, covered: float
 ) -> tuple[float, float, float, float, float]:
@@ -426,7 +426,7 @@ def _interval(
     return start, stop, q_to - q_from, min(covered, q_crest), q_high
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _write_draft(
     draft: Float32, k: int, start: float, stop: float, count: int, curve: YarnCurve, of_line: ViewLine, bounds: Float32,
     family: int, size: int, line: Float32,
@@ -473,7 +473,7 @@ class Piece(NamedTuple):
     size: int
 
 
-@kernel
+@fast_kernel
 def _write_meetings(
     scratch: Scratch, kind: int, k: int, ray: ViewRay, of_line: ViewLine, piece: Piece, start: float, stop: float,
     rising: bool,
@@ -503,7 +503,7 @@ def _write_meetings(
     return k + count
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _fill_block(draft: Float32, firsts: npt.NDArray[np.uint32], stop: int) -> int:
     """Fill the last block of nodes with such that weigh nothing; return the number of nodes."""
     for k in (stop, stop + 8):
@@ -515,7 +515,7 @@ def _fill_block(draft: Float32, firsts: npt.NDArray[np.uint32], stop: int) -> in
     return -(-stop // BLOCK_NODES) * BLOCK_NODES
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _gap_seen(scratch: Scratch, look: SoftQuery, at: int, per_azimuth: int) -> np.float32:
     """Return the share of a cell of a gap's grid through which the viewer sees; what hides it is a step."""
     low, high = scratch.grid[at + look.low_o * per_azimuth], scratch.grid[at + look.high_o * per_azimuth]
@@ -523,13 +523,13 @@ def _gap_seen(scratch: Scratch, look: SoftQuery, at: int, per_azimuth: int) -> n
     return ramp(above(look.oz * _LEVELS, np.float32(low), np.float32(high), look.turn_o, sharp))
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _under_bell(low: float, high: float) -> float:
     """Return the integral of exp(-x^2 / 2)."""
     return math.sqrt(0.5 * math.pi) * (math.erf(high * math.sqrt(0.5)) - math.erf(low * math.sqrt(0.5)))
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def _place_line(
     table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay, view_line: ViewLine
 ) -> float:  # fmt: skip
@@ -577,7 +577,7 @@ def _place_line(
                 gaps += share * through
                 stopped += share * (1.0 - through)
             continue
-        if low - sunk(ray, table.crowns[p])[0] >= covered:
+        if low - sunk(ray, table.crowns[p])[0] >= min(covered, right):
             continue
         curve = _curve_of(table, p, ray, x0 - column, y0 - row)
         wall_to, reached_to, before = min(covered, right), high, covered
@@ -629,7 +629,7 @@ def _place_line(
     return gaps
 
 
-@inlined_kernel
+@inlined_fast_kernel
 def place_on_view_lines(
     table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay
 ) -> tuple[np.float32, np.float32]:

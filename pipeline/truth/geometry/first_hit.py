@@ -163,7 +163,9 @@ def _ends_in(
 def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) -> Hit:
     """Return what a ray meets first that starts at (x, y, z), not below the surface.
 
-    The ray sinks at first (towards.z < 0), or runs straight down; (x, y) may lie anywhere on the endless cloth.
+    The ray sinks at first (towards.z < 0), or runs straight down; (x, y) may lie anywhere on the endless cloth. The
+    point of a ray that ends on a wall is just inside the piece above it: the border itself would belong to either side,
+    as numbers are rounded.
     """
     picks, ends = field.top.shape
     x, y = wrap(x, ends), wrap(y, picks)

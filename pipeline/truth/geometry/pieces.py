@@ -158,6 +158,18 @@ def first_cells(field: HeightField) -> Mask:
     return first
 
 
+def lattice(field: HeightField) -> tuple[int, int, int]:
+    """Return the translations as those of rectangles in rows: length and height of one, and a row's shift to the next.
+
+    In ends and picks: the cloth at (x, y) is that at (x + length, y) and that at (x + shift, y + height).
+    """
+    picks, ends = field.top.shape
+    shifts = translations(field)
+    length = min([e for p, e in shifts if p == 0 and e > 0], default=ends)
+    height, shift = min([(p, e % length) for p, e in shifts if p > 0], default=(picks, 0))
+    return length, height, shift
+
+
 def longest_period(field: HeightField) -> float:
     """Return the longest wavelength of a function with the cloth's translations, in yarn spacings."""
     picks, ends = field.top.shape

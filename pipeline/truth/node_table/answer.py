@@ -32,6 +32,7 @@ from pipeline.truth.node_table.build import (
     PIECE_FAMILY,
     ExactNodes,
 )
+from pipeline.truth.node_table.displaced import DensityRoom, density_room, fill_displaced
 from pipeline.truth.node_table.doubts import doubtful_from
 from pipeline.truth.node_table.kernels import (
     FlakeLayer,
@@ -49,6 +50,7 @@ from pipeline.truth.node_table.kernels import (
     weigh,
 )
 from pipeline.truth.node_table.refine import UNSEEN, RefineRoom, refine, refine_room
+from pipeline.truth.node_table.seen_walls import WallRoom, sum_walls, wall_room
 from pipeline.truth.node_table.weights import WeightRoom, any_weight, fill_weights, weight_room
 
 _ROWS: Final = (2, 4, 8)
@@ -83,6 +85,8 @@ class _Room(NamedTuple):
     own: NodeShares
     everywhere: NodeShares
     weights: WeightRoom
+    density: DensityRoom
+    walls: WallRoom
     moved: Float64
     mean: Float64
     error: Float64
@@ -106,7 +110,8 @@ def sum_rows(
     nodes = table.normal.shape[1]
     own = no_shares(nodes)
     everywhere, sums = own._replace(weight=table.evenly), np.zeros((3, 5))
-    room = _Room(own, everywhere, weight_room(table, line), sums[0], sums[1], sums[2], refine_room(nodes))
+    rooms = weight_room(table, line), density_room(table, line), wall_room(table)
+    room = _Room(own, everywhere, *rooms, sums[0], sums[1], sums[2], refine_room(nodes))
     answers = Raw.empty(len(columns.u))
     _answer_rows(cloth, table, columns, index, requested, seed, line, room, answers)
     return answers
@@ -127,10 +132,13 @@ def _answer_rows(
     """Answer every row."""
     for row in range(len(columns.u)):
         even = cloth.shape == GAUSSIAN and min(columns.sigma[row], columns.sigma_minor[row]) >= table.uniform
-        if not even:
+        points = 0
+        if not even and cloth.parallax:
+            points = fill_displaced(table, cloth.plane, columns, row, line, room.density, room.own.weight)
+        elif not even:
             fill_weights(table, cloth.shape, columns, row, line, room.weights, room.own.weight)
         shares = room.everywhere if even else room.own
-        _answer_row(cloth, table, columns, row, derive(seed, index[row]), requested, shares, room, answers)
+        _answer_row(cloth, table, columns, row, derive(seed, index[row]), requested, shares, points, room, answers)
 
 
 @kernel
@@ -142,14 +150,21 @@ def _answer_row(
     key: np.uint64,
     requested: Requested,
     shares: NodeShares,
+    points: int,
     room: _Room,
     answers: Raw,
 ) -> None:
-    """Answer a row whose footprint is spread over the nodes; `key` names its random numbers."""
+    """Answer a row whose footprint is spread over the nodes; `key` names its random numbers.
+
+    `points` are those of the grid of the footprint's density, which walls read; 0 if it is even.
+    """
     mean, error = answers.mean[row], answers.error[row]
     towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
     area, area_error, moved_area, undecided, nodes = sum_pieces(cloth, table, towards, shares, mean, room.moved, error)
     answers.count[row] += nodes
+    if cloth.choices.rims:
+        of_walls, doubt = sum_walls(cloth, table, towards, points, room.density, room.walls, mean, error)
+        area, area_error = area + of_walls, area_error + doubt
     cosine = columns.wo[row, 2]
     if area <= 0.0:
         mean[:], error[:] = 0.0, 0.0

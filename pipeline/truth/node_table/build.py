@@ -30,7 +30,8 @@ from pipeline.truth.geometry.heightfield import (
     surface_at,
 )
 from pipeline.truth.geometry.horizon import horizons
-from pipeline.truth.geometry.pieces import cell_pieces, longest_period, orbits
+from pipeline.truth.geometry.pieces import cell_pieces, lattice, longest_period, orbits
+from pipeline.truth.node_table.walls import WallNodes, no_walls, wall_nodes
 
 _RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
 _FINEST = 16
@@ -67,6 +68,12 @@ class ExactNodes(NamedTuple):
         The same at the back of the cloth; no rows if there is no need for them.
     uniform : float
         Standard deviation from which on a Gaussian covers the cloth evenly.
+    lattice : (length, height, shift)
+        Translations of the cloth (`pipeline.truth.geometry.pieces.lattice`).
+    places : float32 (3, N)
+        Where each node is in the repeat, and its height; that of a gap is 0.
+    walls : WallNodes
+        Walls below the borders of yarns, if view rays see rims.
     """
 
     repeat: Index
@@ -79,12 +86,18 @@ class ExactNodes(NamedTuple):
     slope: Float32
     slope_behind: Float32
     uniform: float
+    lattice: tuple[int, int, int]
+    places: Float32
+    walls: WallNodes
 
 
-def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int, azimuths: int) -> ExactNodes:
+def tabulate(
+    front: HeightField, back: HeightField, behind: bool, nodes: int, azimuths: int, rims: bool = False
+) -> ExactNodes:
     """Build the table of one side of a cloth, with so many `nodes` per yarn spacing, across and along.
 
-    `behind` says whether there may be light from behind; cloth with gaps has horizons at its back in any case.
+    `behind` says whether there may be light from behind; cloth with gaps has horizons at its back in any case. With
+    `rims` it has walls.
     """
     picks, ends = front.top.shape
     alike = orbits(front)
@@ -115,18 +128,21 @@ def tabulate(front: HeightField, back: HeightField, behind: bool, nodes: int, az
     slope = horizons(front, x, y, azimuths, False)
     behind = behind or any(family == GAP for _, _, family, *_ in grids)
     slope_behind = horizons(back, x, y, azimuths, True) if behind else np.zeros((0, len(x)), np.float32)
-    pieces = np.array(rows, np.int64)
+    pieces, surface = np.array(rows, np.int64), _surface(front, x, y)
     return ExactNodes(
         repeat=np.array([ends, picks], np.int64),
         pieces=pieces,
         copies=np.array(copies, np.int64),
         edges=np.array([edges + (edges[-1],) * (size - len(edges)) for edges in kinds], np.float32),
         evenly=(np.concatenate(areas) / (ends * picks)).astype(np.float32),
-        normal=_surface(front, x, y)[:4],
-        fine=_surface(front, fine_x, fine_y),
+        normal=surface[:4],
+        fine=_surface(front, fine_x, fine_y)[:7],
         slope=slope,
         slope_behind=slope_behind,
         uniform=_FADED * longest_period(front),
+        lattice=lattice(front),
+        places=np.array([x, y, surface[7]], np.float32),
+        walls=wall_nodes(front, back, [g[:5] for g in grids], len(alike[0]), behind, azimuths) if rims else no_walls(),
     )
 
 
@@ -206,13 +222,13 @@ def _positions(
 
 @allocating_kernel
 def _surface(field: HeightField, x: Float64, y: Float64) -> Float32:
-    """Return normal, 1 / n_z and tangent at points, (7, N); a gap's normal is +z."""
-    found = np.zeros((7, len(x)), np.float32)
+    """Return normal, 1 / n_z, tangent and height at points, (8, N); a gap's normal is +z."""
+    found = np.zeros((8, len(x)), np.float32)
     for k in range(len(x)):
-        family, _, _, nx, ny, nz, tx, ty, tz = surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
+        family, _, height, nx, ny, nz, tx, ty, tz = surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
         if family == GAP:
             nx, ny, nz = 0.0, 0.0, 1.0
-        values = (nx, ny, nz, 1.0 / nz, tx, ty, tz)
-        for c in range(7):
+        values = (nx, ny, nz, 1.0 / nz, tx, ty, tz, height)
+        for c in range(8):
             found[c, k] = values[c]
     return found

@@ -9,9 +9,12 @@ import math
 import numpy as np
 import pytest
 
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import GAP, height_field, surface_at
 from pipeline.truth.geometry.pieces import reference_plane
+from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices, directions_of, point_share
@@ -121,13 +124,31 @@ def test_with_rims_no_place_weighs_less(walls):
 
 @pytest.mark.parametrize("options", [
     {"parallax": True, "frame": "macro"}, {"parallax": True, "shadows": False}, {"walls": "rim"},
-    {"parallax": True, "estimator": "quadrature"}, {"parallax": True, "estimator": "node_table"},
+    {"parallax": True, "estimator": "quadrature"},
 ])  # fmt: skip
 def test_rays_need_the_ply_model_estimators_of_rays_and_a_viewer_not_too_low(options):
     with pytest.raises(BadInput, match="parallax"):
         validated(TruthOptions, options, "recipe.toml")
     with pytest.raises(BadInput, match="89 degrees"):
         _answers(LOPSIDED, equal_queries(direction(20.0, 0.0), direction(89.5, 50.0)))
+
+
+@pytest.mark.parametrize("walls", ["left_out", "rim"])
+@pytest.mark.parametrize("fabric", [slow(woven("denim")), slow(woven("satin_8")), LOPSIDED, slow(woven("voile"))])
+def test_tables_answer_footprints_of_rays(fabric, walls):
+    """Round, elliptic and rotated ones, views to 80 degrees, the light of every third query behind the cloth."""
+    options = QueryOptions(sigma=(0.8, 4.0), stretch=3.0, max_angle=75.0, behind=0.3)
+    queries = draw_queries(options, fabric.weave.repeat, 6, 0, 120)
+    physics = TruthOptions(parallax=True, walls=walls)
+    queries = queries.take(FINE.knows(cloth_side(fabric, physics), columns_of(queries)))
+    assert len(queries.u) > 60
+    exact = _answers(fabric, queries, walls=walls, relative_error=0.002, max_count=1 << 15)
+    found = estimate(fabric, queries, physics.model_copy(update={"estimator": "node_table"}), 1)
+    size = np.linalg.norm(exact.mean, axis=1)
+    wrong = np.linalg.norm(found.mean - exact.mean, axis=1)
+    assert np.median(wrong / size) < 0.01
+    assert (np.abs(found.mean - exact.mean) < found.bound + 3 * exact.standard_error + 1e-6).mean() > 0.99
+    assert np.abs(found.transparency - exact.transparency).max() < 0.02
 
 
 def test_a_crest_has_its_own_colour_where_the_viewer_sees_it():

@@ -74,20 +74,6 @@ def test_rays_meet_walls_where_floats_end():
     assert 0.02 < shares[0] < 0.5 and shares[1] == 0.0
 
 
-@pytest.mark.parametrize("name", ["denim", "voile"])
-def test_a_wall_is_that_of_the_yarn_above_it(name):
-    """The surface at the hit is above the ray there; on the other side of the border it would be below."""
-    field = height_field(load_fabric(name))
-    towards, _, _ = sinking(ray(*direction(60.0, 33.0), 0.0), field.highest, field.highest)
-    above = []
-    for k in range(3000):
-        hit = first_hit(field, 0.21 * k, 0.137 * k, field.highest, towards)
-        if hit.what == ON_WALL:
-            height = surface_at(field, hit.x, hit.y, hit.end, hit.pick)[2]
-            above.append(height - field.highest - hit.distance * towards.rise)
-    assert len(above) > 30 and min(above) > 0.0
-
-
 @pytest.mark.parametrize("fabric", [LOPSIDED, woven("denim"), woven("voile")], ids=["narrow", "closed", "open"])
 def test_the_reference_plane_is_the_mean_height(fabric):
     ends, picks = fabric.weave.repeat
@@ -122,3 +108,21 @@ def test_rays_from_yarn_to_yarn_are_those_of_a_march(fabric):
         wrong += not -1e-6 <= marched - distance <= STEP + 1e-6
         met, rising = met + (hit.what != MISSED), rising + (hit.what != MISSED and w[2] > 0.0)
     assert wrong <= 4 and met > 30 and rising > 10
+
+
+@pytest.mark.parametrize("fabric", [LOPSIDED, woven("voile"), woven("satin_8")], ids=["narrow", "open", "closed"])
+def test_a_ray_that_ends_on_a_wall_names_the_yarn_whose_wall_it_is(fabric):
+    """Its rim lies above the ray; the piece on the other side of the border lies below."""
+    field = height_field(fabric)
+    random = np.random.default_rng(4)
+    walls = 0
+    for x, y, azimuth in random.random((900, 3)) * np.array([*fabric.weave.repeat, 2.0 * math.pi]):
+        viewer = ray(*direction(65.0, math.degrees(azimuth)), 0.0)
+        towards, _, _ = sinking(viewer, field.highest, field.highest)
+        hit = first_hit(field, x, y, field.highest, towards)
+        if hit.what == ON_WALL:
+            walls += 1
+            family, _, height, *_ = surface_at(field, hit.x, hit.y, hit.end, hit.pick)
+            assert family != GAP
+            assert height > field.highest + hit.distance * towards.rise
+    assert walls > 10

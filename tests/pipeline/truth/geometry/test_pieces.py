@@ -5,7 +5,15 @@ import pytest
 
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import height_field, surface_at
-from pipeline.truth.geometry.pieces import cell_pieces, different_cells, first_cells, longest_period, orbits
+from pipeline.truth.geometry.pieces import (
+    cell_pieces,
+    different_cells,
+    first_cells,
+    lattice,
+    longest_period,
+    orbits,
+    translations,
+)
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
@@ -47,3 +55,14 @@ def test_each_orbit_holds_every_translation_of_its_first_cell(name, cells):
 def test_longest_period_of_a_plain_weave_is_its_diagonal():
     """A checkerboard has no wave slower than (1/2, 1/2) periods a yarn."""
     assert longest_period(_front("polyester_lining")) == pytest.approx(math.sqrt(2.0))
+
+
+@pytest.mark.parametrize("name", ["satin_8", "denim", "polyester_lining", "silk_shantung", "herringbone"])
+def test_a_lattice_has_all_translations_and_no_others(name):
+    field = height_field(load_fabric(name))
+    (picks, ends), (length, height, shift) = field.top.shape, lattice(field)
+    found = {
+        (row * height % picks, (row * shift + column * length) % ends) for row in range(picks) for column in range(ends)
+    }
+    assert found == set(translations(field))
+    assert length * height * len(found) == picks * ends

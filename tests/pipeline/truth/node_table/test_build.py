@@ -105,9 +105,9 @@ def field(side):
 for name in ("denim", "voile"):
     cloth = cloth_side(load_fabric(name), TruthOptions())
     front, back = field(cloth.front), field(cloth.back)
-    plain = tabulate(cloth.front, cloth.back, True, 6, 8)
+    plain = tabulate(cloth.front, cloth.back, True, 6, 8, rims=True)
     horizon._LAST.clear()  # equal arrays would not be read again
-    tables = plain, tabulate(front, back, True, 6, 8)
+    tables = ((*table[:-1], *table.walls) for table in (plain, tabulate(front, back, True, 6, 8, rims=True)))
     assert all(np.array_equal(a, b) for a, b in zip(*tables))
     picks, ends = front.top.shape
     corners = np.array([(x, y) for x in (0.0, np.nextafter(ends, 0.0)) for y in (0.0, np.nextafter(picks, 0.0))])
