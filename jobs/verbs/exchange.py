@@ -79,7 +79,7 @@ def export_fabric(
         list[str],
         Parameter(
             help="Of a shader: behind, curvature or all, beside lights and viewers in front of flat cloth; "
-            "parallax: footprints are patches of view rays."
+            "parallax: view rays do not see walls; flat: footprints are patches of the fabric plane."
         ),
     ] = NOTHING,
 ) -> None:

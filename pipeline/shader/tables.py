@@ -49,6 +49,12 @@ PARALLAX: Final = "parallax"
 WALLS: Final = "walls"
 """Kind of PARALLAX whose rays that meet a wall see the yarn's rim above it; the program is the same."""
 
+PLANE_FOOTPRINTS: Final = "flat"
+"""Kind of all queries whose footprints are patches of the fabric plane, in place of USUAL_FOOTPRINTS."""
+
+USUAL_FOOTPRINTS: Final = (PARALLAX, WALLS)
+"""Kinds of the footprints of soft nodes if no kind says which."""
+
 EVERY: Final = "all"
 """All of QUERY_KINDS."""
 
@@ -115,14 +121,21 @@ _MEANINGS: Final = {
 }
 
 
-def wanted_kinds(names: Collection[str]) -> frozenset[str]:
-    """Return the kinds that names choose; BadInput if one is none."""
+def wanted_kinds(names: Collection[str], usual: Collection[str] = USUAL_FOOTPRINTS) -> frozenset[str]:
+    """Return the kinds that names choose, with the `usual` ones of footprints; BadInput if one is none."""
     for name in names:
-        if name not in (known := (*QUERY_KINDS, EVERY, PARALLAX, WALLS)):
+        if name not in (known := (*QUERY_KINDS, EVERY, PARALLAX, WALLS, PLANE_FOOTPRINTS)):
             raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join(known)}")
-    if WALLS in names and PARALLAX not in names:
+    kinds = {
+        *names,
+        *(QUERY_KINDS if EVERY in names else ()),
+        *(() if {PARALLAX, PLANE_FOOTPRINTS} & {*names} else usual),
+    }
+    if WALLS in kinds and PARALLAX not in kinds:
         raise BadInput("export", "kind", WALLS, f"only view rays meet walls; name {PARALLAX} too")
-    return frozenset((*names, *QUERY_KINDS) if EVERY in names else names) - {EVERY}
+    if {PARALLAX, PLANE_FOOTPRINTS} <= kinds:
+        raise BadInput("export", "kind", PLANE_FOOTPRINTS, f"names other footprints than {PARALLAX}; choose one")
+    return frozenset(kinds) - {EVERY, PLANE_FOOTPRINTS}
 
 
 def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str]) -> Sides:

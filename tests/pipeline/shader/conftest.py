@@ -23,7 +23,7 @@ from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import NeumipNetwork
 from pipeline.shader.export_shader import write_shader
 from pipeline.shader.languages import Program, compile_program, slangc
-from pipeline.shader.tables import PARALLAX
+from pipeline.shader.tables import PARALLAX, PLANE_FOOTPRINTS
 from tests.browser import opened
 from weaves.fabric import load_fabric
 
@@ -48,7 +48,10 @@ def bytes_of(folder):
 
 @pytest.fixture(scope="session")
 def exported(tmp_path_factory):
-    """A function that exports a fabric once, and returns its folder; models take no level."""
+    """A function that exports a fabric once, and returns its folder; models take no level.
+
+    Footprints are those of the fabric plane unless kinds say otherwise.
+    """
     home = tmp_path_factory.mktemp("shaders")
 
     @cache
@@ -56,7 +59,8 @@ def exported(tmp_path_factory):
         if {*languages} - {"onnx"} and slangc() is None:
             pytest.skip("slangc is not installed")
         folder = home / "-".join((name, str(level), *languages, "of", *kinds, Path(model or "soft_nodes").name))
-        write_shader(load_fabric(name), folder, model, None if model else level, languages, kinds)
+        of_plane = () if PARALLAX in kinds else (PLANE_FOOTPRINTS,)
+        write_shader(load_fabric(name), folder, model, None if model else level, languages, (*kinds, *of_plane))
         return folder
 
     return export

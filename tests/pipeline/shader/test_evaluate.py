@@ -76,7 +76,7 @@ def test_queries_that_are_not_golden_are_answered(cpp, exported, name, kinds, ex
     Densities at extreme footprints are left out.
     """
     cloth, rng = read(exported(name, kinds=kinds)), np.random.default_rng(12)
-    sides, columns = tabulate_sides(load_fabric(name), 2, wanted_kinds(kinds)), 8 if extreme else 10
+    sides, columns = tabulate_sides(load_fabric(name), 2, wanted_kinds(kinds, ())), 8 if extreme else 10
     for group in cloth.groups:
         queries = drawn(rng, 600 if kinds else 2000, GROUPS[group], extreme)
         rows, expected = rows_of(queries), read_sides(sides, queries)[:, :columns]
@@ -91,7 +91,7 @@ def test_rays_that_turn_meet_what_they_meet_in_python(cpp_for, exported, kinds):
     """A place where they turn is a root of a small number: half of the digits are lost, and one ray in 100 may miss."""
     cloth, sides = (
         read(exported("gingham", kinds=kinds)),
-        tabulate_sides(load_fabric("gingham"), 2, wanted_kinds(kinds)),
+        tabulate_sides(load_fabric("gingham"), 2, wanted_kinds(kinds, ())),
     )
     queries = drawn(np.random.default_rng(12), 4000, GROUPS["curved"], False)
     turned = turning(queries, sides.front.plane - sides.front.lowest)

@@ -29,7 +29,7 @@ def components(page, method, state="viewer.state"):
 
 def expected(fabric, camera, level):
     """Return the components of soft nodes in Python, (SIZE, SIZE, 4), as the page draws them; the level may be FLAT."""
-    detail = {"level": USUAL} if level == FLAT else {"level": level, "parallax": True}
+    detail = {"level": USUAL} if level == FLAT else {"level": level, "parallax": True, "rims": True}
     return squared(camera, lambda queries: read_queries(tabulate(fabric, **detail), queries).components)
 
 
@@ -122,7 +122,7 @@ def test_one_point_is_the_truth_at_a_point_without_shadows(fresh):
     camera = VIEWS["One yarn"]._replace(tilt=88.0, distance=4.0, light_tilt=80.0)
     picture = seen(camera, SIZE, ENDS)
     small = picture.queries._replace(sigma=0 * picture.queries.u + 2e-3, sigma_minor=0 * picture.queries.u + 2e-3)
-    truth = estimate(CLOTH, small, TruthOptions(relative_error=0.005), 0).mean
+    truth = estimate(CLOTH, small, TruthOptions(relative_error=0.005, parallax=False, walls="left_out"), 0).mean
     found = components(fresh, "point")[picture.lit]
     apart = np.abs(found - truth).sum(axis=1) / truth.sum(axis=1).mean()
     assert np.median(apart) < 0.01 and (apart < 0.05).mean() > 0.9
@@ -155,7 +155,9 @@ def pixels_of(page):
 def encoded(page, picture, side):
     """Return the sRGB values of Python for a square picture."""
     values = np.zeros((side, side, 3))
-    values[picture.lit] = read_queries(tabulate(CLOTH, parallax=True), picture.queries).components @ colours(CLOTH)
+    values[picture.lit] = read_queries(tabulate(CLOTH, parallax=True, rims=True), picture.queries).components @ colours(
+        CLOTH
+    )
     colour = np.minimum(page.run("viewer.content.irradiance") * values, 1.0)
     return np.where(colour <= 0.0031308, 12.92 * colour, 1.055 * np.maximum(colour, 1e-6) ** (1 / 2.4) - 0.055)
 
@@ -251,10 +253,10 @@ def test_the_truth_is_shown_and_errors_are_those_of_python(fresh, whole):
     fresh.run("viewer.go(3), viewer.set({ left: 'truth', right: '2' })")
     camera = VIEWS["Sphere"]
     picture = seen(camera, SIZE, ENDS)
-    truth = estimate(CLOTH, picture.queries, TruthOptions(relative_error=0.01, parallax=True), 0).mean
+    truth = estimate(CLOTH, picture.queries, TruthOptions(relative_error=0.01, parallax=True, walls="rim"), 0).mean
     shown = components(fresh, "truth")[picture.lit]
     assert np.abs(shown - truth).max() < 1e-3 * truth.max()  # half floats
-    model = read_queries(tabulate(CLOTH, parallax=True), picture.queries).components
+    model = read_queries(tabulate(CLOTH, parallax=True, rims=True), picture.queries).components
     values, reference = model @ colours(CLOTH), truth @ colours(CLOTH)
     share = np.sqrt(np.square(values - reference).sum() / picture.cloth.sum() / 3) / (
         reference.sum() / picture.cloth.sum() / 3

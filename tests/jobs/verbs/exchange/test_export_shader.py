@@ -24,7 +24,7 @@ def test_the_source_needs_no_compiler(twillight, refusal, monkeypatch, tmp_path)
     monkeypatch.setattr(languages, "find_spec", lambda name: None)
     monkeypatch.setattr(shutil, "which", lambda name: None)
     code, said, _ = twillight("export", "gingham", "--shader", "out", "--level", "1")
-    assert code == 0 and "slang; level 1" in said
+    assert code == 0 and "slang, parallax, walls; level 1" in said
     assert json.loads((tmp_path / "out" / "soft_nodes.json").read_text())["languages"] == {}
     complaint = refusal("gingham", "--shader", "out", "--language", "wgsl")
     assert "slangc is needed: pip install --no-deps slangtorch" in complaint
