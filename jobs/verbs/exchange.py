@@ -77,7 +77,10 @@ def export_fabric(
     ] = NOTHING,
     kind: Annotated[
         list[str],
-        Parameter(help="Of a shader: behind, curvature or all, beside lights and viewers in front of flat cloth."),
+        Parameter(
+            help="Of a shader: behind, curvature or all, beside lights and viewers in front of flat cloth; "
+            "parallax: view rays do not see walls; flat: footprints are patches of the fabric plane."
+        ),
     ] = NOTHING,
 ) -> None:
     """Write a fabric for other programs, and print what was written.

@@ -22,6 +22,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.compiled.normal import normal_quantile
 from pipeline.truth.cloth import WideQueries, cloth_side, columns_of
 from pipeline.truth.footprint.place import EVENLY, GAUSSIAN
 from pipeline.truth.footprint.sequences import owen_pair
@@ -73,6 +74,16 @@ def quick_coverage(fabric: Fabric, looks: Queries) -> Float32:
     if curved.size:
         table = tabulate_coverage(fabric)
         result[curved] = _coverage_rows(table.field, table.shares, columns_of(looks.take(curved)))
+    return result
+
+
+@allocating_kernel
+def ray_points() -> Float32:
+    """Return the places of the rays, in deviations along both axes of a narrow footprint, float32 (RAYS, 2)."""
+    result = np.empty((RAYS, 2), np.float32)
+    for k in range(RAYS):
+        first, second = owen_pair(_KEY, k)
+        result[k, 0], result[k, 1] = normal_quantile(first), normal_quantile(second)
     return result
 
 

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.analytic import soft_horizons
+from pipeline.analytic import coverage, soft_horizons
 from pipeline.analytic.importance import lobes
 from pipeline.analytic.importance import mixture as importance_mixture
 from pipeline.analytic.soft_nodes import (
@@ -17,9 +17,13 @@ from pipeline.analytic.soft_nodes import (
     ellipse_nodes,
     footprint_nodes,
     groups,
+    line_nodes,
     narrow,
     nodes,
+    scratch,
+    seen_areas,
     shade,
+    view_lines,
     waves,
     wide,
 )
@@ -27,7 +31,7 @@ from pipeline.compiled import float32
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.truth import query
 from pipeline.truth.footprint import mixture
-from pipeline.truth.geometry import heightfield
+from pipeline.truth.geometry import heightfield, visibility
 from pipeline.truth.scattering import slab_float32
 from weaves.colour import LUMINANCE
 
@@ -38,6 +42,9 @@ ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
     "BOUNDS": (nodes, ("X_LOW", "X_HIGH", "Y_LOW", "Y_HIGH", "SHIFT", "CURVE", "BOUND")),
 }
 """Columns of the arrays of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, by the name of the array."""
+
+FLOAT: Final = ("FLOAT_BEND", "FLOAT_HALF", "FLOAT_DROP", "CROWN")
+"""Columns of a piece that only view rays need."""
 
 CELLS_OF_GROUP: Final = ("FIRST_CELL", "CELLS")
 """Two more columns of a group: the shader sums over the cells of a node, so that they are listed by group."""
@@ -111,6 +118,39 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     },
     mixture: {"LITTLE": "_LITTLE", "WIDEST": "_WIDEST"},
 }  # fmt: skip
+
+
+_ERROR_FUNCTION: Final = (0.3275911, 0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429)
+
+_OF_RAYS: Final[dict[ModuleType, dict[str, str]]] = {
+    narrow: {"FROM_ABOVE": "_FROM_ABOVE", "LINE_BETWEEN": "_BETWEEN", "JUST_HALF": "_JUST"},
+    shade: {"AWAY": "_AWAY", "WHOLE_BOX": "_WHOLE"},
+    seen_areas: {"SEEN_ANGLES": "SEEN_ANGLES", "AREA_STEPS": "_STEPS", "AREA_TURN": "_TURN"},
+    view_lines: {
+        "VIEW_BETWEEN": "_BETWEEN", "VIEW_COARSEST": "_COARSEST", "VIEW_LENGTH": "_LENGTH", "VIEW_NEAREST": "_NEAREST",
+        "VIEW_HALVINGS": "_HALVINGS",
+        **{
+            name: f"_{name}"
+            for name in (
+                "FOOTPRINT_ENDS", "DEVIATIONS", "CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS",
+                "NEVER", "FARTHEST", "STEEP", "SMEARED", "THIRDS",
+            )
+        },
+    },
+    visibility: {"NARROWINGS": "_NARROWINGS", "STRIP_POINTS": "_STRIP_POINTS"},
+    line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING"},
+}  # fmt: skip
+
+
+def ray_constants() -> dict[str, float | int]:
+    """Return the constants that footprints of view rays add."""
+    values: dict[str, float | int] = {name: column for column, name in enumerate(FLOAT)}
+    values |= {"FLOAT_COLUMNS": len(FLOAT), "MOST_ON_LINES": scratch.MOST_ON_LINES, "RAYS": coverage.RAYS}
+    values |= {"VERTICAL_SLOPE": 1e-6, "BORDER": 1.0 - 4e-6, "TURNS": 1e-6, "ROOT_HALF": math.sqrt(0.5)}
+    values |= {"ROOT_RIGHT": math.sqrt(0.5 * math.pi), **{f"ERF_{n}": value for n, value in enumerate(_ERROR_FUNCTION)}}
+    for module, renamed in _OF_RAYS.items():
+        values |= {name: vars(module)[own] for name, own in renamed.items()}
+    return {name: value if isinstance(value, int) else float(np.float32(value)) for name, value in values.items()}
 
 
 def constants() -> dict[str, float | int]:

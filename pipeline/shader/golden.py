@@ -2,7 +2,8 @@
 
 Cells of grids and numbers of nodes are integers: a query may lie so near a step that the last digit of its place
 decides. No implementation can be right or wrong on such a query, so it is not golden: the answer may change by at most
-STEADY, as a share of the range of its column, if the last digits of its footprint change.
+STEADY, as a share of the range of its column, if the last digits of its footprint change. Nor is it golden if its view
+rays turn over curved cloth: their places there are square roots of small numbers, which lose half of their digits.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ TRANSPARENCY_COLUMN, DENSITY_COLUMN, ANSWER_COLUMNS = 8, 9, 10
 
 _SEED = 20
 _TRIALS = 4
+_DIGITS_OF_LINES = 32  # what is seen on a view line is found by steps: it loses digits in single precision
 _LEAST_RISE = 0.05  # of light and viewer
 _LEAST_CURVATURE = 0.01
 # Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow, wide,
@@ -107,18 +109,32 @@ def golden(sides: Sides, read: Answering | None = None) -> Golden:
         if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
     }
     ends, picks = sides.front.repeat
-    return golden_of(groups, (int(ends), int(picks)), read or partial(read_sides, sides))
+    digits = _DIGITS_OF_LINES if sides.front.parallax else 1
+    depth = sides.front.plane - sides.front.lowest  # 0 without view rays
+    return golden_of(groups, (int(ends), int(picks)), read or partial(read_sides, sides), digits=digits, depth=depth)
 
 
-def golden_of(groups: Mapping[str, Group], repeat: tuple[int, int], read: Answering, stretched: bool = True) -> Golden:
-    """Return golden queries over a repeat (ends, picks), footprints all round if not `stretched`."""
+def golden_of(
+    groups: Mapping[str, Group],
+    repeat: tuple[int, int],
+    read: Answering,
+    stretched: bool = True,
+    digits: int = 1,
+    depth: float = 0.0,
+) -> Golden:
+    """Return golden queries over a repeat (ends, picks), footprints all round if not `stretched`.
+
+    Steady are those whose answers stay if the last digits of their footprints change by `digits`, and whose rays do not
+    turn down to a `depth` below the reference plane.
+    """
     rng = np.random.default_rng(_SEED)
     rows, answers, places, share, stop = [], [], {}, [], 0
     for name, group in groups.items():
         queries = _candidates(repeat, group, rng)
         if not stretched:
             queries = queries._replace(sigma_minor=queries.sigma)
-        steady, answer = _steady(read, queries, rng)
+        steady, answer = _steady(read, queries, rng, digits)
+        steady &= ~turning(queries, depth)
         chosen = np.flatnonzero(steady)[: group.rows]
         rows.append(rows_of(queries.take(chosen)))
         answers.append(answer[chosen])
@@ -206,21 +222,29 @@ def _front(rng: np.random.Generator, count: int) -> Float32:
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), z]).astype(np.float32)
 
 
-def _steady(read: Answering, queries: Queries, rng: np.random.Generator) -> tuple[Mask, Float32]:
+def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits: int) -> tuple[Mask, Float32]:
     """Return which queries are steady, and the answers of all, (N, ANSWER_COLUMNS)."""
     answer = read(queries)
     span = np.maximum(np.ptp(answer, axis=0), np.float32(1e-30))
     change = np.zeros(len(answer))
     for _ in range(_TRIALS):
         moved = queries._replace(
-            u=_next(queries.u, rng), v=_next(queries.v, rng), sigma=_next(queries.sigma, rng),
-            sigma_minor=_next(queries.sigma_minor, rng),
+            u=_next(queries.u, rng, digits), v=_next(queries.v, rng, digits), sigma=_next(queries.sigma, rng, digits),
+            sigma_minor=_next(queries.sigma_minor, rng, digits),
         )  # fmt: skip
         change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
 
 
-def _next(values: Float32, rng: np.random.Generator) -> Float32:
-    """Return the numbers above or below, at random."""
+def turning(queries: Queries, depth: float) -> Mask:
+    """Return which view rays over curved cloth turn down to a depth below the reference plane, (N,)."""
+    square = np.square(queries.wo.astype(np.float64))
+    return np.asarray(square[:, 2] < 2.0 * queries.curvature * (square[:, 0] + square[:, 1]) * depth)
+
+
+def _next(values: Float32, rng: np.random.Generator, digits: int) -> Float32:
+    """Return numbers so many digits above or below, at random."""
     towards = np.where(rng.random(len(values)) < 0.5, np.float32(-np.inf), np.float32(np.inf))
-    return np.nextafter(values, towards, dtype=np.float32)
+    for _ in range(digits):
+        values = np.nextafter(values, towards, dtype=np.float32)
+    return values

@@ -8,7 +8,15 @@ from typing import Final
 from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL
 from pipeline.shader.descriptor import Shader, descriptor
 from pipeline.shader.golden import golden
-from pipeline.shader.tables import Sides, layout_slang, refuse_large_repeat, table_files, tables, tabulate_sides
+from pipeline.shader.tables import (
+    PARALLAX,
+    Sides,
+    layout_slang,
+    refuse_large_repeat,
+    table_files,
+    tables,
+    tabulate_sides,
+)
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -21,6 +29,11 @@ SOFT_NODES_SOURCES: Final = (
 )  # fmt: skip
 """Files of the source."""
 
+PARALLAX_SOURCES: Final = (
+    "seen_areas.slang", "view_rays.slang", "displaced_nodes.slang", "view_lines.slang", "coverage.slang",
+)  # fmt: skip
+"""Files that footprints of view rays add."""
+
 
 def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
     """Return the soft nodes of a fabric; BadInput if the level is none of DETAILS, or the cloth is too large."""
@@ -32,7 +45,7 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
     cloth = tables(sides)
     return Shader(
         SOFT_NODES,
-        SOFT_NODES_SOURCES,
+        (*SOFT_NODES_SOURCES, *(PARALLAX_SOURCES if PARALLAX in kinds else ())),
         {"layout.slang": layout_slang(cloth)},
         table_files(cloth),
         descriptor(fabric, level, cloth, kinds),

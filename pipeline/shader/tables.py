@@ -4,7 +4,8 @@
     numbers    float32: scalars, then colours, yarns, extents of pieces, the rules along both axes and those of Gauss
     nodes      float32 (rows, 4), `stride` rows a node: normal and 1 / n_z; tangent and share of the area; change of the
                tangent along; across; mean and sharpness of horizons, two azimuths a row; cosine and sine of waves, two
-               a row; the horizons of the other side, if known; falls over curved cloth, if known, four azimuths a row
+               a row; the horizons of the other side, if known; falls over curved cloth, if known, four azimuths a row;
+               with parallax areas that a viewer sees, four azimuths a row, angle by angle
     grid       uint8: horizons of the pieces, 255 straight above; those of the other side; falls; the same of the back
 
 `layout.slang` holds the constants and a function that reads the scalars and places.
@@ -21,16 +22,19 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from pipeline.analytic.coverage import ray_points
 from pipeline.analytic.importance.lobes import point_places
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes import footprint_nodes
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable, tabulate
+from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES
 from pipeline.analytic.soft_nodes.waves import TOGETHER
 from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
-from pipeline.shader.constants import FALL_ROWS, POINTS, TEXTURE_WIDTH, WAVE_ROW, constants
+from pipeline.shader.constants import FALL_ROWS, POINTS, TEXTURE_WIDTH, WAVE_ROW, constants, ray_constants
 from pipeline.shader.limits import MOST_HEIGHT, MOST_NODES, MOST_REPEAT_CELLS
+from pipeline.truth.geometry.heightfield import AXIS_DROP, BEND_RADIUS, HALF_LENGTH
 from weaves.errors import BadInput, one_line
 from weaves.fabric import Fabric
 
@@ -39,8 +43,20 @@ CURVATURE: Final = "curvature"
 QUERY_KINDS: Final = (BEHIND, CURVATURE)
 """Kinds of queries beside light and viewer in front of flat cloth, as `pipeline.models` names them."""
 
+PARALLAX: Final = "parallax"
+"""Kind of all queries whose footprints are patches of view rays; it needs a program of its own."""
+
+WALLS: Final = "walls"
+"""Kind of PARALLAX whose rays that meet a wall see the yarn's rim above it; the program is the same."""
+
+PLANE_FOOTPRINTS: Final = "flat"
+"""Kind of all queries whose footprints are patches of the fabric plane, in place of USUAL_FOOTPRINTS."""
+
+USUAL_FOOTPRINTS: Final = (PARALLAX, WALLS)
+"""Kinds of the footprints of soft nodes if no kind says which."""
+
 EVERY: Final = "all"
-"""All kinds."""
+"""All of QUERY_KINDS."""
 
 
 class Sides(NamedTuple):
@@ -87,6 +103,9 @@ _MEANINGS: Final = {
     "pieces": "family (0 warp, 1 weft, 2 gap) and grid of every piece",
     "wave_periods": "periods of every wave in a repeat, along x and y",
     "colours": "linear Rec. 709: k_s, k_d and k_dt, each of warp and weft",
+    "floats": "with parallax, of every piece: bend radius, half length, drop of its float; greatest height of its cell",
+    "spots": "with parallax, of every line of nodes: places in x and y in the cell, shares of it, heights",
+    "ray_points": "with parallax, rays of the coverage: deviations along both axes of a footprint",
     "point_places": "points of the lobes: in deviations of a footprint; in repeats, where it covers the cloth evenly",
     "yarn": "warp, weft: radius, 1/radius, sine and cosine of the twist, roughness, relief, blend, largest bend",
     "bounds": "extent of every piece in x and y within its cell; offset, curve, largest sine of its inclination",
@@ -102,21 +121,30 @@ _MEANINGS: Final = {
 }
 
 
-def wanted_kinds(names: Collection[str]) -> frozenset[str]:
-    """Return the kinds that names choose; BadInput if one is none."""
+def wanted_kinds(names: Collection[str], usual: Collection[str] = USUAL_FOOTPRINTS) -> frozenset[str]:
+    """Return the kinds that names choose, with the `usual` ones of footprints; BadInput if one is none."""
     for name in names:
-        if name not in (*QUERY_KINDS, EVERY):
-            raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join((*QUERY_KINDS, EVERY))}")
-    return frozenset(QUERY_KINDS if EVERY in names else names)
+        if name not in (known := (*QUERY_KINDS, EVERY, PARALLAX, WALLS, PLANE_FOOTPRINTS)):
+            raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join(known)}")
+    kinds = {
+        *names,
+        *(QUERY_KINDS if EVERY in names else ()),
+        *(() if {PARALLAX, PLANE_FOOTPRINTS} & {*names} else usual),
+    }
+    if WALLS in kinds and PARALLAX not in kinds:
+        raise BadInput("export", "kind", WALLS, f"only view rays meet walls; name {PARALLAX} too")
+    if {PARALLAX, PLANE_FOOTPRINTS} <= kinds:
+        raise BadInput("export", "kind", PLANE_FOOTPRINTS, f"names other footprints than {PARALLAX}; choose one")
+    return frozenset(kinds) - {EVERY, PLANE_FOOTPRINTS}
 
 
 def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str]) -> Sides:
-    """Return the tables of a fabric at a level of detail, for QUERY_KINDS of queries."""
-    behind, curved = BEHIND in kinds, CURVATURE in kinds
-    reflected, transmitted = colours(fabric), colours(fabric, transmitted=True)
+    """Return the tables of a fabric at a level of detail, for kinds of queries."""
+    behind, curved, parallax = BEHIND in kinds, CURVATURE in kinds, PARALLAX in kinds
+    reflected, transmitted, rims = colours(fabric), colours(fabric, transmitted=True), WALLS in kinds
     return Sides(
-        tabulate(fabric, behind=behind, level=level, curved=curved),
-        tabulate(fabric.back(), behind=True, level=level) if behind else None,
+        tabulate(fabric, behind=behind, level=level, curved=curved, parallax=parallax, rims=rims),
+        tabulate(fabric.back(), behind=True, level=level, parallax=parallax, rims=rims) if behind else None,
         np.concatenate([reflected, transmitted[2:]]).astype(np.float32),
     )
 
@@ -231,6 +259,14 @@ def _side(table: SoftNodeTable) -> _Side:
     }
     names = ("yarn", "bounds", "places_x", "weights_x", "places_y", "weights_y", "wave_size")
     of_numbers = {name: getattr(table, name) for name in names} | _rules()
+    if table.parallax:
+        least, greatest = map(float, table.shown)
+        numbers |= {"highest": table.highest, "lowest": table.lowest, "plane": table.plane}
+        numbers |= {"shown_least": least, "shown_greatest": greatest, "view_lines": table.view_lines}
+        numbers |= {"spacing": table.spacing}
+        integers |= {"rims": int(table.rims), "areas_row": rows.shape[1] - SEEN_ANGLES * FALL_ROWS}
+        floats = np.column_stack([table.floats[:, [BEND_RADIUS, HALF_LENGTH, AXIS_DROP]], table.crowns])
+        of_numbers |= {"floats": floats.astype(np.float32), "spots": table.spots, "ray_points": ray_points()}
     grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
     return _Side(integers, numbers, of_integers, of_numbers, rows, grid)
 
@@ -263,7 +299,8 @@ def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> st
 
 def layout_slang(cloth: ClothTables) -> str:
     """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the functions that read it."""
-    lines = [constants_slang(constants(), "pipeline.analytic").rstrip()]
+    values = constants() | (ray_constants() if "view_lines" in cloth.scalars else {})
+    lines = [constants_slang(values, "pipeline.analytic").rstrip()]
     kinds = {name: "int" if isinstance(value, int) else "float" for name, value in cloth.scalars.items()}
     lines += ["", "struct Table {", *(f"    {kind} {name};" for name, kind in kinds.items()), "};", ""]
     lines += ["int integer(int i);", "float number(int i);", ""]
@@ -286,7 +323,8 @@ def _node_rows(table: SoftNodeTable) -> Float32:
     count, waves = table.evenly.size, len(table.waves)
     surface = table.nodes.transpose(0, 2, 1).reshape(count, -1)
     behind, curvatures = len(table.behind_grid) > 0, len(table.falls)
-    parts = [WAVE_ROW, waves // 2, AZIMUTHS // 2 if behind else 0, curvatures * FALL_ROWS]
+    angles = table.areas.shape[1]
+    parts = [WAVE_ROW, waves // 2, AZIMUTHS // 2 if behind else 0, curvatures * FALL_ROWS, angles * FALL_ROWS]
     rows = np.zeros((count, sum(parts), 4), np.float32)
     ends = np.cumsum(parts)
     rows[:, 0] = surface[:, :4]
@@ -299,7 +337,9 @@ def _node_rows(table: SoftNodeTable) -> Float32:
     if behind:
         rows[:, ends[1] : ends[2]] = _horizon_rows(table.behind_mean, table.behind_sharpness)
     falls = table.falls.reshape(curvatures * AZIMUTHS, count)
-    rows[:, ends[2] :] = falls.T.reshape(count, -1, 4)
+    rows[:, ends[2] : ends[3]] = falls.T.reshape(count, -1, 4)
+    areas = table.areas.swapaxes(0, 1).reshape(angles * table.areas.shape[0], count)
+    rows[:, ends[3] :] = areas.T.reshape(count, -1, 4)
     return rows
 
 

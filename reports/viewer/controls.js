@@ -89,13 +89,14 @@ class Viewer {
     if (name in TILES && this.tiled) {
       return { kind: TILE, view: state.view, tile: name, level: this.usual, label: TILES[name] };
     }
-    if (name === "selvage" && this.own && this.picture.knowsSelvage) {
+    if (name === "selvage" && this.own && this.picture.knows(SELVAGE)) {
       return { kind: SELVAGE, level: this.content.selvage.level, label: "Selvage" };
     }
     if (name === "point") return { kind: POINT, level: this.usual, label: "One point" };
     const wished = name === "truth" ? Math.max(...this.levels) : Number(name) || this.usual;
     const level = this.picture.indexOf(state, wished) === undefined ? this.usual : wished;
-    return { kind: NODES, level, label: `Soft nodes, k = ${level}` };
+    const flat = name === "flat" || !this.picture.knows(NODES);
+    return { kind: flat ? FLAT : NODES, level, label: `${flat ? "Flat footprints" : "Soft nodes"}, k = ${level}` };
   }
 
   get methods() { return [this.method(this.state.left), this.method(this.state.right)]; }
@@ -199,7 +200,7 @@ class Viewer {
     const said = names ? [`${names}: known at the five views alone, of the yarns as they are.`] : [];
     if ([state.left, state.right].includes("selvage")) {
       if (!this.own) said.push("Selvage: known of the yarns as they are.");
-      else if (!this.picture.knowsSelvage) said.push("Selvage: its shader does not compile here.");
+      else if (!this.picture.knows(SELVAGE)) said.push("Selvage: its shader does not compile here.");
     }
     byId("notice").textContent = said.length ? `${said.join(" ")} Soft nodes are shown instead.` : "";
     byId("line").style.left = `${100 * state.wipe}%`;
@@ -356,6 +357,7 @@ function makeChoices(viewer, bind) {
     bind.updates.push((state) => { input.checked = state.shape === input.value; });
   }
   const names = [["point", "One point"], ...viewer.levels.map((level) => [String(level), `Soft nodes, k = ${level}`])];
+  names.push(["flat", `Flat footprints, k = ${viewer.usual}`]);
   if (viewer.content.selvage) names.push(["selvage", "Selvage"]);
   names.push(...viewer.content.tiles.map((name) => [name, TILES[name]]));
   for (const side of ["left", "right"]) {
@@ -455,7 +457,7 @@ function listen(viewer) {
 
 async function start() {
   try {
-    const sources = { nodes: byId("shader").textContent, selvage: byId("selvage").textContent };
+    const sources = { flat: byId("shader").textContent, seen: byId("seen").textContent, selvage: byId("selvage").textContent };
     const viewer = new Viewer(JSON.parse(byId("content").textContent), sources);
     const updates = [];
     const input = (element, changes) => element.addEventListener("input", () => viewer.set(changes(), true));

@@ -7,6 +7,7 @@ const NODES = 0;
 const POINT = 1;
 const TILE = 2;
 const SELVAGE = 3;
+const FLAT = 4;
 
 function direction(turn, tilt) {
   const [a, b] = [radians(turn), radians(tilt)];
@@ -14,7 +15,8 @@ function direction(turn, tilt) {
 }
 
 class Picture {
-  // `sources`: a shader that draws nodes, points and tiles, and one that draws `selvage`.
+  // `sources`: a shader that draws points, tiles and nodes in footprints of the fabric plane, one that draws nodes in
+  // those of view rays, and one that draws `selvage`.
   constructor(canvas, sources, content) {
     this.content = content;
     this.sources = sources;
@@ -29,27 +31,28 @@ class Picture {
     gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
     this.target = gl.createFramebuffer();
     this.empty = this.texture("tile", new Uint16Array(4), 1);
-    this.use(NODES);
+    this.known = new Map();
+    this.use(FLAT);
   }
 
   // Draw by the program of a kind of method; it is compiled when it is first needed.
   use(kind) {
-    const name = kind === SELVAGE ? "selvage" : "nodes";
+    const name = { [NODES]: "seen", [SELVAGE]: "selvage" }[kind] ?? "flat";
     if (!this.programs.has(name)) this.programs.set(name, this.compiled(this.sources[name]));
     this.gl.useProgram(this.programs.get(name));
   }
 
-  // Whether the shader of `selvage` compiles on this device, found once.
-  get knowsSelvage() {
-    if (this.selvageKnown === undefined) {
+  // Whether the shader of a kind of method compiles on this device, found once.
+  knows(kind) {
+    if (!this.known.has(kind)) {
       try {
-        this.use(SELVAGE);
-        this.selvageKnown = true;
+        this.use(kind);
+        this.known.set(kind, true);
       } catch {
-        this.selvageKnown = false;
+        this.known.set(kind, false);
       }
     }
-    return this.selvageKnown;
+    return this.known.get(kind);
   }
 
   compiled(source) {
@@ -193,7 +196,7 @@ class Picture {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(gl.TEXTURE_2D, texture);
       });
-      const drawn = kind === SELVAGE ? NODES : kind; // its program has no other
+      const drawn = [SELVAGE, FLAT].includes(kind) ? NODES : kind; // their programs have no other nodes
       gl.bufferData(gl.UNIFORM_BUFFER, this.view(state, drawn, width, height, components), gl.DYNAMIC_DRAW);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     });

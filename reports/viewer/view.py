@@ -30,10 +30,11 @@ from pipeline.scenes.shade import colours
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.networks import correction
-from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
+from pipeline.shader.tables import PARALLAX, WALLS, ClothTables, Sides, tables, tabulate_sides
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
 from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import LOWEST_VIEWER, Answers, Queries
 from reports.images.texture import png_bytes
 from reports.options import LEAST_TILE, MOST_TILE
 from reports.viewer.generate import network, shipped
@@ -77,7 +78,8 @@ TWISTED: Final = 30.0
 """Twist of the nodes of yarns without twist, in degrees: the page turns all nodes to the twist that it shows, and finds
 their extent across the yarn from how their fibres turn, which they do not without twist."""
 
-_PRECISION = TruthOptions(relative_error=0.01)
+_PRECISION = TruthOptions(relative_error=0.01, parallax=True, walls="rim")
+_OF_PLANE = TruthOptions(relative_error=0.01, parallax=False, walls="left_out")
 _BRIGHT = 0.8  # linear value that few pixels of the still picture exceed
 
 
@@ -111,6 +113,7 @@ def whole_page(shown: dict[str, object]) -> str:
         "STILL": str(shown["still"]),
         "STYLE": _text("page.css"),
         "SHADER": shipped("cloth"),
+        "SEEN": shipped("seen"),
         "SELVAGE": shipped("selvage"),
         # No content can end the element.
         "CONTENT": json.dumps({key: value for key, value in shown.items() if key != "still"}).replace("<", "\\u003c"),
@@ -202,7 +205,7 @@ def _nodes(fabric: Fabric, level: int) -> Sides:
     """Return the front of a fabric, of yarns without twist as if they had TWISTED."""
     yarns = {"warp": fabric.warp, "weft": fabric.weft}
     turned = {name: yarn.model_copy(update={"twist": _twist(yarn)}) for name, yarn in yarns.items()}
-    return tabulate_sides(fabric.model_copy(update=turned), level, ())
+    return tabulate_sides(fabric.model_copy(update=turned), level, (PARALLAX, WALLS))
 
 
 def _twist(yarn: Yarn) -> float:
@@ -269,7 +272,7 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
     if size:
         ends = fabric.weave.repeat[0]
         picture = seen(camera, size, ends)
-        answers = estimate(fabric, picture.queries, _PRECISION, 0)
+        answers = _truth(fabric, picture.queries)
         shown = colours(fabric)
         deviation = np.sqrt(np.square(answers.standard_error.astype(np.float64)) @ np.square(shown))
         tiles = {key: method.predict(fabric, picture.queries) for key, method in methods.items()}
@@ -277,6 +280,15 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
         view["tiles"] = {key: packed(_components(picture, tile).astype(np.float16)) for key, tile in tiles.items()}
         view["standard_error"] = float(np.sqrt(np.square(deviation).mean()) / (answers.mean @ shown).mean())
     return view
+
+
+def _truth(fabric: Fabric, queries: Queries) -> Answers:
+    """Return what a camera sees; footprints of the fabric plane where the viewer is too low for view rays."""
+    low = queries.wo[:, 2] < LOWEST_VIEWER
+    rays = estimate(fabric, queries.take(~low), _PRECISION, 0)
+    answers = estimate(fabric, queries.take(low), _OF_PLANE, 0)
+    place = np.argsort(np.concatenate([np.flatnonzero(~low), np.flatnonzero(low)]))
+    return Answers(*(np.concatenate(columns)[place] for columns in zip(rays, answers, strict=True)))
 
 
 def _components(picture: Seen, values: npt.NDArray[np.floating]) -> Float64:
@@ -289,7 +301,7 @@ def _components(picture: Seen, values: npt.NDArray[np.floating]) -> Float64:
 def _still(fabric: Fabric) -> tuple[bytes, float]:
     """Return a picture by soft nodes as PNG, and the irradiance at which it is neither dark nor glaring."""
     picture = seen(VIEWS[STILL], STILL_SIZE, fabric.weave.repeat[0])
-    values = read_queries(tabulate(fabric), picture.queries).components @ colours(fabric)
+    values = read_queries(tabulate(fabric, parallax=True, rims=True), picture.queries).components @ colours(fabric)
     irradiance = float(_BRIGHT / max(np.percentile(values.max(axis=1), 97.0), 1e-6))
     pixels = np.zeros((*picture.cloth.shape, 4))
     pixels[picture.cloth, 3] = 1.0

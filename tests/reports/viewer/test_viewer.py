@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.groups import USUAL
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.named import named_method, own_method
 from pipeline.scenes.shade import colours
@@ -16,7 +17,7 @@ from weaves.fabric import load_fabric
 
 pytestmark = pytest.mark.slow
 
-CLOTH = load_fabric(FABRIC)
+CLOTH, FLAT = load_fabric(FABRIC), "flat"
 ENDS = CLOTH.weave.repeat[0]
 
 
@@ -27,8 +28,9 @@ def components(page, method, state="viewer.state"):
 
 
 def expected(fabric, camera, level):
-    """Return the components of soft nodes in Python, (SIZE, SIZE, 4), as the page draws them."""
-    return squared(camera, lambda queries: read_queries(tabulate(fabric, level=level), queries).components)
+    """Return the components of soft nodes in Python, (SIZE, SIZE, 4), as the page draws them; the level may be FLAT."""
+    detail = {"level": USUAL} if level == FLAT else {"level": level, "parallax": True, "rims": True}
+    return squared(camera, lambda queries: read_queries(tabulate(fabric, **detail), queries).components)
 
 
 def expected_of(name, fabric, camera):
@@ -54,6 +56,7 @@ def assert_equal(found, wanted):
 
 PICTURES = [
     ("One yarn", 2, (12, 12)),
+    ("One yarn", FLAT, (12, 12)),
     ("Cloth", 8, (7, 14)),
     ("Horizon", 1, (10, 8)),
     ("Sphere", 2, (12, 12)),
@@ -89,6 +92,14 @@ def test_a_shader_of_selvage_that_does_not_compile_is_named(whole, tmp_path):
         assert said == "Selvage: its shader does not compile here. Soft nodes are shown instead."
 
 
+def test_without_the_shader_of_view_rays_footprints_are_flat(whole, tmp_path):
+    with viewer(whole, tmp_path) as own:
+        own.run("viewer.picture.programs.clear(), viewer.picture.known.clear(), viewer.picture.sources.seen = 'broken'")
+        own.run("viewer.set({ right: '2' }).then(() => viewer.drawn)")
+        assert own.run("viewer.methods[1].label") == "Flat footprints, k = 2"
+        assert_equal(components(own, 2), expected(CLOTH, VIEWS["Drape"], FLAT))
+
+
 @pytest.mark.parametrize("family", ["warp", "weft"])
 def test_edited_yarns_equal_tables_made_anew(fresh, family):
     yarn = getattr(CLOTH, family).model_copy(update={"roughness": 0.3, "twist": 25.0, "blend": 0.9})
@@ -111,7 +122,7 @@ def test_one_point_is_the_truth_at_a_point_without_shadows(fresh):
     camera = VIEWS["One yarn"]._replace(tilt=88.0, distance=4.0, light_tilt=80.0)
     picture = seen(camera, SIZE, ENDS)
     small = picture.queries._replace(sigma=0 * picture.queries.u + 2e-3, sigma_minor=0 * picture.queries.u + 2e-3)
-    truth = estimate(CLOTH, small, TruthOptions(relative_error=0.005), 0).mean
+    truth = estimate(CLOTH, small, TruthOptions(relative_error=0.005, parallax=False, walls="left_out"), 0).mean
     found = components(fresh, "point")[picture.lit]
     apart = np.abs(found - truth).sum(axis=1) / truth.sum(axis=1).mean()
     assert np.median(apart) < 0.01 and (apart < 0.05).mean() > 0.9
@@ -144,7 +155,9 @@ def pixels_of(page):
 def encoded(page, picture, side):
     """Return the sRGB values of Python for a square picture."""
     values = np.zeros((side, side, 3))
-    values[picture.lit] = read_queries(tabulate(CLOTH), picture.queries).components @ colours(CLOTH)
+    values[picture.lit] = read_queries(tabulate(CLOTH, parallax=True, rims=True), picture.queries).components @ colours(
+        CLOTH
+    )
     colour = np.minimum(page.run("viewer.content.irradiance") * values, 1.0)
     return np.where(colour <= 0.0031308, 12.92 * colour, 1.055 * np.maximum(colour, 1e-6) ** (1 / 2.4) - 0.055)
 
@@ -240,10 +253,10 @@ def test_the_truth_is_shown_and_errors_are_those_of_python(fresh, whole):
     fresh.run("viewer.go(3), viewer.set({ left: 'truth', right: '2' })")
     camera = VIEWS["Sphere"]
     picture = seen(camera, SIZE, ENDS)
-    truth = estimate(CLOTH, picture.queries, TruthOptions(relative_error=0.01), 0).mean
+    truth = estimate(CLOTH, picture.queries, TruthOptions(relative_error=0.01, parallax=True, walls="rim"), 0).mean
     shown = components(fresh, "truth")[picture.lit]
     assert np.abs(shown - truth).max() < 1e-3 * truth.max()  # half floats
-    model = read_queries(tabulate(CLOTH), picture.queries).components
+    model = read_queries(tabulate(CLOTH, parallax=True, rims=True), picture.queries).components
     values, reference = model @ colours(CLOTH), truth @ colours(CLOTH)
     share = np.sqrt(np.square(values - reference).sum() / picture.cloth.sum() / 3) / (
         reference.sum() / picture.cloth.sum() / 3
