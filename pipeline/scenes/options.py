@@ -14,7 +14,7 @@ View = Literal["sphere", "plane"]
 Bounces = Literal[1, "all"]
 """Bounces of light: one, as the components have it, or all bounces between diffuse yarns."""
 
-BOUNCES: Final[Bounces] = 1
+BOUNCES: Final[Bounces] = "all"
 """Bounces of light unless others are chosen."""
 
 

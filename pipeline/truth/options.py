@@ -26,8 +26,18 @@ TABLE_SIGMA: Final = 1.25 / 32
 FEWEST_NODES: Final = 24
 """Nodes on a yarn spacing of the truth's fine table, at least."""
 
+USUAL_WALLS: Final[dict[bool, Walls]] = {True: "rim", False: "left_out"}
+"""What `walls` means unless it is given, with and without parallax."""
+
 RAYS_RESOLVED: Final[dict[Walls, float]] = {"left_out": 0.7, "rim": 2.5}
 """Smallest standard deviation of a footprint of view rays that `node_table` resolves, over `seen_distance`."""
+
+
+def with_usual_walls(options: Any) -> Any:
+    """Return options in which `walls` is that of the fabric plane if they have no parallax and do not say."""
+    if isinstance(options, dict) and options.get("parallax") is False and "walls" not in options:
+        return options | {"walls": USUAL_WALLS[False]}
+    return options
 
 
 def steepness(relief: float, width: float, bend: float) -> float:
@@ -75,15 +85,20 @@ class TruthOptions(Frozen):
     normaliser: Literal["visible", "projected"] = "visible"
     """The denominator: `visible` is the projected area that the viewer sees, A_P; `projected` is |wo.n_s| times the
     area of the footprint, which restores reciprocity."""
-    parallax: bool = False
+    parallax: bool = True
     """True if a footprint is a patch of view rays: its density belongs to the points where they cross the reference
     plane (`pipeline.truth.geometry.pieces`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
     which heights displace nothing [Chen2024Woven]. Known to all estimators but `quadrature`."""
-    walls: Walls = "left_out"
-    """Meaning of a view ray that meets the step between two floats: it does not count, or it sees the rim of the yarn
-    above, so that the mean over all places does not depend on the footprint."""
+    walls: Walls = "rim"
+    """Meaning of a view ray that meets the step between two floats: it sees the rim of the yarn above, so that the mean
+    over all places does not depend on the footprint, or it does not count. Without parallax it is `left_out`."""
     shadows: bool = True
     """True if points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _usual_walls(cls, options: Any) -> Any:
+        return with_usual_walls(options)
 
     @model_validator(mode="before")
     @classmethod

@@ -216,8 +216,8 @@ def tabulate(
     behind: bool = False,
     level: int = USUAL,
     curved: bool = False,
-    parallax: bool = False,
-    rims: bool = False,
+    parallax: bool = True,
+    rims: bool = True,
 ) -> SoftNodeTable:
     """Build the table of a fabric's front, as the default model of the truth sees it.
 

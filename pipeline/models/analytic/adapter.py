@@ -21,7 +21,7 @@ class AnalyticOptions(Options):
     learns: ClassVar[bool] = False
 
     footprint: Gaussian = "gaussian"
-    parallax: bool = False
+    parallax: bool = True
     """True if footprints are patches of view rays, or points view rays; must be that of the truth. A method that knows
     the fabric plane alone declares `Literal[False]`."""
 

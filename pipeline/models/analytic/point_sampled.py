@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -20,7 +20,7 @@ from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
 from pipeline.models.method import Method
 from pipeline.per_fabric import PerFabric
-from pipeline.truth.options import TruthOptions, Walls
+from pipeline.truth.options import TruthOptions, Walls, with_usual_walls
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -50,13 +50,18 @@ class PointSampledOptions(AnalyticOptions):
     """A march through the cloth in double precision, or a look-up of tabulated horizons in single precision, as steps
     or as ramps."""
 
-    walls: Walls = "left_out"
+    walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
 
     horizon_nodes: ClassVar[int] = 32
     """Nodes of the horizon map on each piece of yarn in a cell, across and along; the nearest is taken."""
     azimuths: ClassVar[int] = 64
     """Directions of the horizon map; linear between them."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _usual_walls(cls, options: Any) -> Any:
+        return with_usual_walls(options)
 
     @model_validator(mode="after")
     def _horizons_of_gaussians(self) -> PointSampledOptions:

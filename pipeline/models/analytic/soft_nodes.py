@@ -32,7 +32,7 @@ _SHARED: Final[WeakValueDictionary[tuple[object, ...], PerFabric[SoftNodeTable]]
 
 
 def soft_tables(
-    level: int, behind: bool = False, curved: bool = False, parallax: bool = False, rims: bool = False
+    level: int, behind: bool = False, curved: bool = False, parallax: bool = True, rims: bool = True
 ) -> PerFabric[SoftNodeTable]:
     """Return the tables of fabrics at a level of detail, which all methods at hand share."""
     from pipeline.analytic.soft_nodes.nodes import tabulate
@@ -52,7 +52,7 @@ class SoftNodesOptions(AnalyticOptions):
     model: Literal["soft_nodes"] = "soft_nodes"
     levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
     """Levels of detail k, from few nodes to many; each is a row of the tables."""
-    walls: Walls = "left_out"
+    walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
 
     @property
@@ -83,7 +83,7 @@ class SoftNodes(Analytic["SoftNodeTable"]):
     turns: ClassVar[bool] = SoftNodesOptions.turns
 
     def __init__(
-        self, level: int = 2, name: str = "soft_nodes", parallax: bool = False, walls: Walls = "left_out"
+        self, level: int = 2, name: str = "soft_nodes", parallax: bool = True, walls: Walls = "rim"
     ) -> None:
         from pipeline.analytic.soft_nodes.features import read_queries
 

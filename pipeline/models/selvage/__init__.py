@@ -23,7 +23,6 @@ class SelvageOptions(Options):
         "diffuse_colour",
         "colour_weight",
     )
-    newer: ClassVar[tuple[str, ...]] = ("parallax", "walls")
     seconds: ClassVar[tuple[float, float]] = (2e-5, 2.5e-6)
     prepare_seconds: ClassVar[float] = 1.2
     without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
@@ -45,9 +44,9 @@ class SelvageOptions(Options):
     bound: bool = True
     """Bound each component by the answer of the soft nodes without shadows: no diffuse light is then gained."""
     footprint: Gaussian = "gaussian"
-    parallax: bool = False
+    parallax: bool = True
     """True if the footprints of its soft nodes are patches of view rays; must be that of the truth."""
-    walls: Walls = "left_out"
+    walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
 
     layers: ClassVar[int] = 2
