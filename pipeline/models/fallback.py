@@ -43,7 +43,7 @@ _AZIMUTHS: Final = 96
 TABLE: Final = NodeTable(lambda cells: _NODES, _AZIMUTHS, COARSE_LINE)
 """The table of the fallback."""
 
-QUADRATURE: Final = TruthOptions(estimator="quadrature", relative_error=0.1)
+QUADRATURE: Final = TruthOptions(estimator="owen", relative_error=0.1)
 """Options of the estimator for queries that the table cannot answer: typically 2 % off, at .1 ms a query."""
 
 FLAT_TURN: Final = 0.1
