@@ -115,15 +115,14 @@ def test_light_from_behind_is_answered_by_the_soft_nodes(finest):
 
 
 def test_footprints_of_view_rays_are_those_of_its_soft_nodes():
-    """In training and in rendering; also of the finest ones, in place of a fallback without parallax."""
-    fabric, options = LINING, SELVAGE.model_copy(update={"parallax": True})
+    """In training and in rendering; also of the finest ones."""
+    fabric, options = LINING, SELVAGE
     asked = drawn(fabric, 1, 64, sigma=(0.1, 0.5))
-    network, nodes = SelvageNetwork(options, [fabric]), SoftNodes(parallax=True)
+    network, nodes = SelvageNetwork(options, [fabric]), SoftNodes()
     method, expected = Selvage(network), nodes.predict(fabric, asked)
     np.testing.assert_allclose(method.predict(fabric, asked), expected, rtol=1e-5, atol=1e-7)
     np.testing.assert_array_equal(network._read(batch_of(asked, expected)).components, expected)
-    assert np.abs(expected - SoftNodes().predict(fabric, asked)).max() > 0.1 * expected.max()
-    finest = SoftNodes(8, parallax=True).predict(fabric, asked)
+    finest = SoftNodes(8).predict(fabric, asked)
     np.testing.assert_array_equal(method.within(1e-6).predict(fabric, asked), finest)
 
 
