@@ -166,8 +166,9 @@ class SelvageNetwork(Trainable):
         for index, fabric in enumerate(batch.fabric.tolist()):
             queries = Queries(*(getattr(batch, name)[index].numpy(force=True) for name in Queries._fields))
             found.append(self._of_nodes(fabric, queries, batch.row[index].numpy(force=True)))
-        parts = torch.from_numpy(np.concatenate(found)).to(batch.u.device).split(_WIDTHS, dim=1)
-        return _Read(*(part.contiguous() for part in parts), batch.target.flatten(0, 1))
+        parts = np.split(np.concatenate(found), np.cumsum(_WIDTHS)[:-1], axis=1)
+        columns = (torch.from_numpy(np.ascontiguousarray(part)) for part in parts)
+        return _Read(*(part.to(batch.u.device) for part in (*columns, batch.target.flatten(0, 1))))
 
     def _of_nodes(self, fabric: int, queries: Queries, row: npt.NDArray[np.int64]) -> Float32:
         """Return what the nodes give of queries (n, sum of _WIDTHS), computed unless kept from an earlier step."""
