@@ -76,11 +76,7 @@ def export_fabric(
         Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),
     ] = NOTHING,
     kind: Annotated[
-        list[str],
-        Parameter(
-            help="Of a shader: behind, curvature or all, beside lights and viewers in front of flat cloth; "
-            "parallax: view rays do not see walls; flat: footprints are patches of the fabric plane."
-        ),
+        list[str], Parameter(help="Of a shader: behind, curvature or all, beside light and viewer in front of flat cloth.")
     ] = NOTHING,
 ) -> None:
     """Write a fabric for other programs, and print what was written.

@@ -109,9 +109,8 @@ def golden(sides: Sides, read: Answering | None = None) -> Golden:
         if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
     }
     ends, picks = sides.front.repeat
-    digits = _DIGITS_OF_LINES if sides.front.parallax else 1
-    depth = sides.front.plane - sides.front.lowest  # 0 without view rays
-    return golden_of(groups, (int(ends), int(picks)), read or partial(read_sides, sides), digits=digits, depth=depth)
+    own, depth = read or partial(read_sides, sides), sides.front.plane - sides.front.lowest
+    return golden_of(groups, (int(ends), int(picks)), own, digits=_DIGITS_OF_LINES, depth=depth)
 
 
 def golden_of(

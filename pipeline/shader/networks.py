@@ -39,7 +39,6 @@ from pipeline.shader.golden import GROUPS, golden, golden_of, read_sides
 from pipeline.shader.limits import MOST_HEIGHT
 from pipeline.shader.soft_nodes import SOFT_NODES_SOURCES, nodes_of
 from pipeline.shader.tables import (
-    PARALLAX,
     Place,
     Sides,
     constants_slang,
@@ -166,10 +165,8 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Co
     trained = method.options.level
     if level not in (None, trained):
         raise BadInput("export", "level", level, f"leave it out: {method.name} was trained with level {trained}")
-    if PARALLAX in kinds:
-        raise BadInput("export", "kind", PARALLAX, f"{method.name} was trained on footprints of the fabric plane")
     refuse_large_repeat(fabric)
-    sides = tabulate_sides(fabric, trained, kinds)
+    sides = tabulate_sides(fabric, trained, kinds, method.options.walls == "rim")
     cloth, (weights, described, network) = tables(sides), correction(method, fabric)
     about_tables = descriptor(fabric, trained, cloth, kinds)
     about = Networks(
