@@ -15,9 +15,11 @@ from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import (
     FEWEST_NODES,
+    NARROWEST_RIMS,
     RAYS_RESOLVED,
     TABLE_CELLS,
     TABLE_SIGMA,
+    USUAL_WALLS,
     TruthOptions,
     seen_distance,
     steepness,
@@ -73,6 +75,9 @@ def table_refusal(truth: TruthOptions, queries: QueryOptions, fabrics: Sequence[
         if truth.parallax and queries.sigma[0] < (least := _ray_sigma(truth, fabric, queries.max_angle)):
             allowed = f"with parallax it knows footprints from {least:.2g} yarn spacings on for views of {fabric.name}"
             return f"{allowed} to {queries.max_angle:g} degrees, the queries begin at {queries.sigma[0]:g}"
+        radius = 0.5 * min(fabric.warp.width, fabric.weft.width)
+        if truth.walls == "rim" and radius < NARROWEST_RIMS:
+            return f"it knows rims of yarns at least {2 * NARROWEST_RIMS:g} wide, {fabric.name} has {2 * radius:g}"
         ends, picks = fabric.weave.repeat
         if ends * picks > TABLE_CELLS and (cells := fabric.weave.different_cells()) > TABLE_CELLS:
             return f"it knows at most {TABLE_CELLS} different cells, {fabric.name} has {cells}"
@@ -194,7 +199,8 @@ def _check_models(recipe: Recipe, where: str) -> None:
             allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
             raise BadInput(where, f"models.{index}.name", options.name, allowed)
         for name in () if options.any_physics else (name for name in _LEARNT if not hasattr(options, name)):
-            if (value := getattr(truth, name)) != (own := getattr(_PLAIN, name)):
+            own = USUAL_WALLS[truth.parallax] if name == "walls" else getattr(_PLAIN, name)
+            if (value := getattr(truth, name)) != own:
                 allowed = f"{options.name} (models.{index}) knows {name} = {own!r} only"
                 raise BadInput(where, f"dataset.truth.{name}", value, allowed)
         for name in ("footprint", "parallax", "walls"):

@@ -33,6 +33,11 @@ RAYS_RESOLVED: Final[dict[Walls, float]] = {"left_out": 0.7, "rim": 2.5}
 """Smallest standard deviation of a footprint of view rays that `node_table` resolves, over `seen_distance`."""
 
 
+NARROWEST_RIMS: Final = 0.3
+"""Least radius of yarns, in yarn spacings, whose rims `node_table` knows: of more open cloth its errors exceed those
+that it states, because rays go on below the gaps."""
+
+
 def with_usual_walls(options: Any) -> Any:
     """Return options in which `walls` is that of the fabric plane if they have no parallax and do not say."""
     if isinstance(options, dict) and options.get("parallax") is False and "walls" not in options:

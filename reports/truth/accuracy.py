@@ -82,8 +82,7 @@ def fixed(estimator: EstimatorName, count: int) -> TruthOptions:
 _SAMPLED: Final[tuple[EstimatorName, ...]] = ("mc", "r2", "owen")
 SETTINGS: Final[dict[str, TruthOptions]] = {
     **{f"{name}, {count} points": fixed(name, count) for name in _SAMPLED for count in COUNTS},
-    "quadrature at 2 %": TruthOptions(estimator="quadrature", relative_error=0.02),
-    "node_table": TruthOptions(estimator="node_table"),
+    "auto at 5 %": TruthOptions(relative_error=0.05, max_count=1 << 14),
     "auto at 2 %": TruthOptions(relative_error=0.02, max_count=1 << 14),
     "auto at 1 %": TruthOptions(relative_error=0.01, max_count=1 << 14),
 }

@@ -34,8 +34,6 @@ class AtExtremes(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a model and seed, on the first fabric of each role that it answers for."""
         physics = {name: getattr(subjects.recipe.dataset.truth, name) for name in PHYSICS}
-        # `quadrature` knows no view rays.
-        physics |= {"estimator": "owen"} if physics["parallax"] else {}
         for model in subjects.models:
             known: dict[Role, Fabric] = {}
             for fabric, role in subjects.fabrics:

@@ -82,9 +82,7 @@ class SoftNodes(Analytic["SoftNodeTable"]):
 
     turns: ClassVar[bool] = SoftNodesOptions.turns
 
-    def __init__(
-        self, level: int = 2, name: str = "soft_nodes", parallax: bool = True, walls: Walls = "rim"
-    ) -> None:
+    def __init__(self, level: int = 2, name: str = "soft_nodes", parallax: bool = True, walls: Walls = "rim") -> None:
         from pipeline.analytic.soft_nodes.features import read_queries
 
         def read(table: SoftNodeTable, queries: Queries, seed: int) -> Float32:

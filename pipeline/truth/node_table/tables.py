@@ -24,7 +24,15 @@ from pipeline.truth.geometry.heightfield import BEND, BETA, RADIUS, HeightField
 from pipeline.truth.geometry.pieces import different_cells
 from pipeline.truth.node_table.answer import Requested, sum_rows
 from pipeline.truth.node_table.build import ExactNodes, tabulate
-from pipeline.truth.options import FEWEST_NODES, RAYS_RESOLVED, TABLE_CELLS, TABLE_SIGMA, seen_distance, steepness
+from pipeline.truth.options import (
+    FEWEST_NODES,
+    NARROWEST_RIMS,
+    RAYS_RESOLVED,
+    TABLE_CELLS,
+    TABLE_SIGMA,
+    seen_distance,
+    steepness,
+)
 
 FINE_NODES: Final = 32
 """Nodes per yarn spacing of the fine table, across and along; for a cloth of more than `_FEW` different cells, down to
@@ -39,7 +47,6 @@ NOT_REFINED: Final = (1.0, np.inf)
 _FEW: Final = 8
 _COARSE, _COARSEST, _COARSE_CELL = 24, 12, 44  # most and fewest nodes of a coarse table; their number for one cell
 _COARSE_RAYS: Final = 1.8  # below it, errors of the coarse table are larger than stated
-_NARROWEST_RIMS: Final = 0.3  # radius, in yarn spacings
 _KEPT: Final = 24  # tables of 1 to 5 MB: those of a benchmark with about a dozen cloths in turn
 
 ALLOWED: Final = (
@@ -82,8 +89,7 @@ class NodeTable:
         """Return which queries a table answers, (N,)."""
         other = cloth.choices.macro or not cloth.choices.shadows
         other |= cloth.parallax and cloth.shape != GAUSSIAN
-        # Walls of very open cloth are wrong by more than stated: rays go on below its gaps.
-        other |= cloth.choices.rims and bool(cloth.front.yarn[:, RADIUS].min() < _NARROWEST_RIMS)
+        other |= cloth.choices.rims and bool(cloth.front.yarn[:, RADIUS].min() < NARROWEST_RIMS)
         if other or different_cells(cloth.front) > TABLE_CELLS:
             return np.zeros(len(columns.u), np.bool_)
         narrow = np.minimum(columns.sigma, columns.sigma_minor)

@@ -40,13 +40,14 @@ def refused(files, words):
         ("sigma = [0.05, 8.0]\n\n[dataset.truth]", 'sigma = [0.03, 8.0]\n\n[dataset.truth]\nestimator = "node_table"',
          ["dataset.truth.estimator = 'node_table'", "footprints from 0.0391 yarn spacings on"]),
         ("frames = 4", 'truth = { estimator = "node_table" }', ["bench.truth.estimator", "pictures", "'auto'"]),
-        ("frames = 4", "frame_truth = { shadows = false }", ["bench.frame_truth.shadows", "dataset.truth, True"]),
-        ('model = "neumip"', 'model = "unified_btf"\ntruth = { frame = "macro" }',
-         ["models.1.truth.frame = 'macro'", "must be that of dataset.truth, 'ply'"]),
+        ("frames = 4", 'frame_truth = { normaliser = "projected" }',
+         ["bench.frame_truth.normaliser", "dataset.truth, 'visible'"]),
+        ('model = "neumip"', 'model = "unified_btf"\ntruth = { normaliser = "projected" }',
+         ["models.1.truth.normaliser = 'projected'", "must be that of dataset.truth, 'visible'"]),
         ('model = "neumip"', 'model = "unified_btf"\ntexels_per_yarn = 16\ntruth = { estimator = "node_table" }',
          ["models.1.truth.estimator = 'node_table'", "footprints from 0.0391 yarn spacings on"]),
         ("relative_error = 0.05", 'footprint = "box"', ["models.2.footprint = 'gaussian'", "'box'"]),
-        ("relative_error = 0.05", "parallax = true", ["models.2.parallax = False", "of dataset.truth, True"]),
+        ("relative_error = 0.05", "parallax = false", ["models.2.parallax = True", "of dataset.truth, False"]),
         ('model = "woven"', 'model = "wovn"', ["models.0.model = 'wovn'", "did you mean 'woven'"]),
         ('model = "woven"', 'model = "gauss_nodes"', ["models.0.model = 'gauss_nodes'", "gone: take 'soft_nodes'"]),
         ("relative_error = 0.05", 'estimator = "jittered"', ["truth.estimator = 'jittered'", "gone: take 'r2'"]),
@@ -57,12 +58,15 @@ def refused(files, words):
         ('model = "neumip"', 'model = "neumip"\nname = "woven"', ["models = 'woven'", "names must differ"]),
         ('model = "neumip"', 'model = "neumip"\nname = "truth"', ["models.1.name = 'truth'", "must be another name"]),
         ("sigma = [0.05, 8.0]", "behind = 0.5", ["models.0.name = 'woven'", "does not know queries with behind"]),
-        ("relative_error = 0.05", 'frame = "macro"', ["dataset.truth.frame = 'macro'", "point_sampled", "'ply' only"]),
+        ("relative_error = 0.05", 'parallax = false\nframe = "macro"',
+         ["dataset.truth.frame = 'macro'", "point_sampled", "'ply' only"]),
         ("frames = 4", 'runtimes = ["onx"]', ["bench.runtimes.0 = 'onx'", "'eager-bf16'", "'onnx' or 'onnx-int8'"]),
         ("frames = 4", 'live = { fabrics = ["satin_8"] }', ["bench.live.fabrics = 'satin_8'", "of the recipe"]),
         ('\n[dataset.truth]\nrelative_error = 0.05\n\n[[models]]\nmodel = "woven"\nhidden = 32',
          'curvature = [0.1, 0.8]\n\n[[models]]\nmodel = "curved"',
          ["models.0.largest_curvature = 0.5: must not be below", "0.8"]),  # the model would refuse the rows
+        ("sigma = [0.05, 8.0]", "max_angle = 89.5",
+         ["dataset.truth.parallax = True", "within 89 degrees", "max_angle is 89.5"]),
         ("population = 800", "", ["dataset.rows.population = 0", "must be > 0"]),
         ('exclude = ["twill 4/4"]', 'exclude = ["twill 4/5"]', ["dataset.population.exclude = 'twill 4/5'"]),
         ("move = 2", "move = 0", ["own.toml", "draft"]),
@@ -72,40 +76,41 @@ def test_bad_input_is_one_sentence(files, old, new, words):
     refused(files.exchange(old, new), words)
 
 
-def of_view_rays(files, network="", queries=""):
-    """Return the recipe with parallax in each table of truth options, another network and other queries."""
-    files.exchange("[0.05, 8.0]", f"[0.05, 8.0]\n{queries}").exchange("relative_error = 0.05", "parallax = true")
-    files.exchange("counts = [1, 2]", "counts = [1, 2]\nparallax = true")
-    files.exchange("frames = 4", "\n".join(f"{key}.parallax = true" for key in ("truth", "frame_truth", "edge.truth")))
-    return files.exchange('model = "neumip"', network or 'model = "neumip"')
-
-
 @pytest.mark.parametrize(
     "network",
     [
         'model = "neumip"\noffset = false',
-        'model = "curved"',
-        'model = "selvage"\nparallax = true',
-        'model = "unified_btf"\ntruth = { parallax = true }',
-        'model = "btf_autoencoder"\ntruth = { parallax = true }',
+        *(f'model = "{name}"' for name in ("selvage", "unified_btf", "btf_autoencoder")),
     ],
 )
 def test_every_network_may_learn_view_rays(files, network):
     """Beside `woven`; and all that is planned, the truth at extremes too, is of these rays."""
-    extremes = [task for task in of_view_rays(files, network).plan() if isinstance(task, AtExtremes)]
+    files.exchange('model = "neumip"', network)
+    extremes = [task for task in files.plan() if isinstance(task, AtExtremes)]
     assert len(extremes) == 3 and {(task.truth.parallax, task.truth.estimator) for task in extremes} == {(True, "owen")}
 
 
+def of_the_plane(files):
+    """Return the recipe with footprints in the fabric plane, said in each table of truth options."""
+    files.exchange("relative_error = 0.05", "parallax = false").exchange("counts = [1, 2]", "parallax = false")
+    return files.exchange("frames = 4", "\n".join(f"{key}.parallax = false" for key in ("truth", "frame_truth")))
+
+
+def test_a_recipe_may_be_of_the_fabric_plane(files):
+    """Also methods that have no option for walls, which nothing meets there."""
+    recipe = load_recipe(of_the_plane(files).exchange('"neumip"', '"prefiltered"\nparallax = false').write())
+    assert (recipe.dataset.truth.parallax, recipe.dataset.truth.walls) == (False, "left_out")
+
+
 @pytest.mark.parametrize(
-    ("network", "queries", "words"),
+    ("network", "words"),
     [
-        ('model = "selvage"', "", ["models.1.parallax = False", "of dataset.truth, True"]),
-        ('model = "unified_btf"', "", ["models.1.truth.parallax = False", "of dataset.truth, True"]),
-        ("", "max_angle = 89.5", ["dataset.truth.parallax = True", "within 89 degrees", "max_angle is 89.5"]),
+        ('model = "selvage"', ["models.1.parallax = True", "of dataset.truth, False"]),
+        ('model = "unified_btf"', ["models.1.truth.parallax = True", "of dataset.truth, False"]),
     ],
 )
-def test_what_cannot_be_of_view_rays_is_one_sentence(files, network, queries, words):
-    refused(of_view_rays(files, network, queries), words)
+def test_what_is_of_view_rays_is_refused_in_the_plane(files, network, words):
+    refused(of_the_plane(files).exchange('model = "neumip"', network), words)
 
 
 def test_the_bound_knows_light_from_behind_but_no_curved_cloth(files):
@@ -118,6 +123,7 @@ def test_a_table_is_refused_for_cloth_of_too_many_cells(files):
     """A stripe that shifts by one pick an end in 9 of 10 picks: no translation carries it onto itself."""
     rows = ["#" + "." * 9, *["#." * 5] * 9]
     files.exchange('family = "satin", ends = 5, move = 2', f'family = "matrix", rows = {json.dumps(rows)}')
+    files.exchange("sigma = [0.05, 8.0]", "sigma = [4.0, 8.0]\nmax_angle = 60")
     load_recipe(files.write())
     files.exchange("relative_error = 0.05", 'estimator = "node_table"')
     words = "at most 96 different cells, own has 100; take 'auto'"

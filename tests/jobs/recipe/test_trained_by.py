@@ -194,7 +194,8 @@ def test_bad_input_is_one_sentence(asks, entry, words):
     assert all(word in sentence for word in words)
 
 
-SHADOWLESS = "shadows = false }\n[bench]\ntruth = { shadows = false }\nframe_truth = { shadows = false }\n"
+PROJECTED = 'normaliser = "projected" }\n'
+PROJECTED += f"[bench]\ntruth = {{ {PROJECTED}frame_truth = {{ {PROJECTED}"
 
 
 @pytest.mark.parametrize(
@@ -202,8 +203,8 @@ SHADOWLESS = "shadows = false }\n[bench]\ntruth = { shadows = false }\nframe_tru
     [
         (TRAINER + '\n[[models]]\nmodel = "woven"\nrecipe = "tiny.toml"\n', "for one another: tiny → bent → tiny"),
         (TRAINER.replace('"own.toml"', '"other/own.toml"'), "another cloth is called own there"),
-        (GENERAL.replace("relative_error = 0.1 }\n", SHADOWLESS),
-         "shadows = True: must be that of the recipe sheer, False"),
+        (GENERAL.replace("relative_error = 0.1 }\n", PROJECTED),
+         "normaliser = 'visible': must be that of the recipe sheer, 'projected'"),
         (GENERAL.replace('"own.toml", ', ""), "trained there on own, which is seen here"),
         (GENERAL.replace('"organza"]', '"twill_4_4"]'), "on twill_4_4, of the draft of twill_4_4, unseen here"),
     ],
