@@ -14,15 +14,15 @@ from pipeline.analytic.importance import lobes
 from pipeline.analytic.importance import mixture as importance_mixture
 from pipeline.analytic.soft_nodes import (
     answer,
-    footprint_nodes,
+    cuts,
     groups,
     line_nodes,
-    narrow,
     nodes,
     scratch,
     seen_areas,
     shade,
     view_lines,
+    view_rays,
     wide,
 )
 from pipeline.compiled import float32
@@ -35,17 +35,18 @@ from weaves.colour import LUMINANCE
 
 ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
     "YARN": (heightfield, ("RADIUS", "INVERSE_RADIUS", "SIN_TWIST", "COS_TWIST", "ALPHA", "BETA", "BLEND", "BEND")),
+    "GROUP": (nodes, ("START", "LINES", "GROUP_FAMILY")),
     "PIECE": (nodes, ("FAMILY", "BLOCK")),
     "BOUNDS": (nodes, ("X_LOW", "X_HIGH", "Y_LOW", "Y_HIGH", "SHIFT", "CURVE", "BOUND")),
 }
 """Columns of the arrays of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, by the name of the array."""
 
-OWN_ARRAYS: Final[dict[str, tuple[str, ...]]] = {
+ADDED: Final[dict[str, tuple[str, ...]]] = {
     # The shader sums over the cells of a node, so that they are listed by group.
-    "GROUP": ("START", "LINES", "GROUP_FAMILY", "FIRST_CELL", "CELLS"),
+    "GROUP": ("FIRST_CELL", "CELLS"),
     "FLOAT": ("FLOAT_BEND", "FLOAT_HALF", "FLOAT_DROP", "CROWN"),
 }
-"""Columns of the arrays that the shader has in its own form."""
+"""Columns that the shader has beside them."""
 
 TEXTURE_WIDTH: Final = 1024
 """Texels of a row of every texture."""
@@ -72,7 +73,9 @@ _SAME: Final[tuple[tuple[ModuleType, tuple[str, ...]], ...]] = (
     (nodes, ("LEVELS", "UPPER")),
     (shade, ("LEAST_SEEN", "FADED", "TINY")),
     (answer, ("SMALLEST",)),
-    (footprint_nodes, ("REACH", "MOST_ACROSS")),
+    (view_lines, ("MOST_GAUSS",)),
+    (view_rays, ("FOOTPRINT_ENDS", "NEVER")),
+    (cuts, ("NEAREST",)),
     (wide, ("RESOLVED",)),
     (scratch, ("MOST_ON_LINES",)),
     (seen_areas, ("SEEN_ANGLES",)),
@@ -97,17 +100,18 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     shade: {
         "SHORTEST": "_SHORTEST", "FLAKES": "_FLAKES", "GAUSS": "_GAUSS", "AWAY": "_AWAY", "WHOLE_BOX": "_WHOLE"
     },
-    narrow: {"FROM_ABOVE": "_FROM_ABOVE", "LINE_BETWEEN": "_BETWEEN", "JUST_HALF": "_JUST"},
+    wide: {"REACH": "_REACH"},
     seen_areas: {"AREA_STEPS": "_STEPS", "AREA_TURN": "_TURN"},
     view_lines: {
-        "VIEW_BETWEEN": "_BETWEEN", "VIEW_COARSEST": "_COARSEST", "VIEW_LENGTH": "_LENGTH", "VIEW_NEAREST": "_NEAREST",
+        "VIEW_BETWEEN": "_BETWEEN", "VIEW_COARSEST": "_COARSEST", "VIEW_LENGTH": "_LENGTH", "LINE_BOX": "_BOX",
+        "FROM_ABOVE": "_FROM_ABOVE", "JUST_HALF": "_JUST",
+        **{name: f"_{name}" for name in ("DEVIATIONS", "FARTHEST", "STEEP", "SMEARED")},
+    },
+    view_rays: {
         "VIEW_HALVINGS": "_HALVINGS",
         **{
             name: f"_{name}"
-            for name in (
-                "FOOTPRINT_ENDS", "DEVIATIONS", "CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS",
-                "NEVER", "FARTHEST", "STEEP", "SMEARED", "THIRDS",
-            )
+            for name in ("CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS", "THIRDS")
         },
     },
     visibility: {"NARROWINGS": "_NARROWINGS", "STRIP_POINTS": "_STRIP_POINTS"},
@@ -134,7 +138,7 @@ def constants() -> dict[str, float | int]:
         "VERTICAL_SLOPE": 1e-6,
         "BORDER": 1.0 - 4e-6,
         "TURNS": 1e-6,
-        "GAUSS_COLUMNS": footprint_nodes.GAUSS_PLACES.shape[1],
+        "GAUSS_COLUMNS": view_lines.GAUSS_PLACES.shape[1],
         "STRONGEST": mixture.COARSE_LINE.most,
         **{f"NODE_{name}": row for row, name in enumerate(("NORMAL", "TANGENT", "ALONG", "ACROSS", "HORIZONS"))},
         "FALL_ROWS": FALL_ROWS,
@@ -151,12 +155,12 @@ def constants() -> dict[str, float | int]:
         "LUMINANCE_GREEN": green,
         "LUMINANCE_BLUE": blue,
     }
-    for name, (module, columns) in ARRAYS.items():
+    for name in {**ARRAYS, **ADDED}:
+        module, columns = ARRAYS.get(name, (nodes, ()))
         values |= {column: vars(module)[column] for column in columns}
-        values[f"{name}_COLUMNS"] = len(columns)
-    for name, columns in OWN_ARRAYS.items():
-        values |= {column: index for index, column in enumerate(columns)}
-        values[f"{name}_COLUMNS"] = len(columns)
+        added = ADDED.get(name, ())
+        values |= {column: len(columns) + index for index, column in enumerate(added)}
+        values[f"{name}_COLUMNS"] = len(columns) + len(added)
     for module, names in _SAME:
         values |= {name: vars(module)[name] for name in names}
     for module, renamed in _RENAMED.items():

@@ -135,11 +135,11 @@ class Weights:
 
 _SELVAGE_BY_FAMILY: Final = (
     "share of the area seen, 0 to 1",
-    "area seen over that with nothing hidden",
-    "diffuse light with shadows over that without hiding",
-    "specular light with shadows over that without hiding",
-    "twice the share of the diffuse light within ramps of horizons",
-    "twice the share of the specular light within ramps of horizons",
+    "area seen over that with nothing hidden, at most 2",
+    "diffuse light with shadows over that without hiding, at most 2",
+    "specular light with shadows over that without hiding, at most 2",
+    "twice the share of the diffuse light within ramps of horizons, 0 to 1",
+    "twice the share of the specular light within ramps of horizons, 0 to 1",
     "s / (s + 0.05) of the specular component s, 1/sr",
     "c / (c + 0.05) of the diffuse component c, 1/sr",
 )
@@ -152,7 +152,7 @@ _SELVAGE_INPUTS: Final = (
     ),
     *(f"slope of the half vector along {axis}, at most 3" for axis in "xy"),
     "wi . wo",
-    "seen share q of the bare area",
+    "seen share q of the bare area, at most 2",
     "s / (s + 0.1) of the footprint s, the geometric mean of its deviations in yarn spacings",
     "r / (r + 0.02) of r = sqrt(q)",
     "twist of the warp, radians; its sign changes with each mirror",
@@ -217,7 +217,7 @@ def correction(method: Selvage, fabric: Fabric) -> tuple[Weights, list[PlacedLay
         "SLOPE": SLOPE,
         "LARGEST": LARGEST_FACTOR,
         "BOUNDED": method.bound,
-        **{name: float(own[f"_{name}"]) for name in ("DARK", "SMALL", "STEEPEST")},
+        **{name: float(own[f"_{name}"]) for name in ("DARK", "SMALL", "STEEPEST", "MOST_SEEN")},
         "ALMOST_HIDDEN": float(own["_HIDDEN"]),
     }
     return weights, described, constants_slang(constants, "pipeline.models.selvage")

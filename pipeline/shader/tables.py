@@ -25,9 +25,9 @@ from PIL import Image
 from pipeline.analytic.coverage import ray_points
 from pipeline.analytic.importance.lobes import point_places
 from pipeline.analytic.soft_horizons import AZIMUTHS
-from pipeline.analytic.soft_nodes import footprint_nodes
-from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
 from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES
+from pipeline.analytic.soft_nodes.view_lines import GAUSS_PLACES, GAUSS_WEIGHTS
 from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
 from pipeline.shader.constants import FALL_ROWS, OTHER_ROW, POINTS, TEXTURE_WIDTH, constants
@@ -234,8 +234,8 @@ def _side(table: SoftNodeTable) -> _Side:
         "floats": floats.astype(np.float32),
         "spots": table.spots,
         "ray_points": ray_points(),
-        "gauss_places": footprint_nodes.GAUSS_PLACES,
-        "gauss_weights": footprint_nodes.GAUSS_WEIGHTS,
+        "gauss_places": GAUSS_PLACES,
+        "gauss_weights": GAUSS_WEIGHTS,
     }
     grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
     return _Side(integers, numbers, of_integers, of_numbers, rows, grid)
@@ -318,8 +318,7 @@ def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np
     counts = np.bincount(table.cell_groups, minlength=len(table.groups))
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     cells = np.stack([of_cell[order] % ends, of_cell[order] // ends], axis=1)
-    own = table.groups[:, [START, LINES, GROUP_FAMILY]]
-    return np.column_stack([own, first, counts]).astype(np.int32), cells.astype(np.int32)
+    return np.column_stack([table.groups, first, counts]).astype(np.int32), cells.astype(np.int32)
 
 
 def table_files(cloth: ClothTables) -> dict[str, bytes]:
