@@ -76,7 +76,8 @@ def export_fabric(
         Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),
     ] = NOTHING,
     kind: Annotated[
-        list[str], Parameter(help="Of a shader: behind, curvature or all, beside light and viewer in front of flat cloth.")
+        list[str],
+        Parameter(help="Of a shader: behind, curvature or all, beside light and viewer in front of flat cloth."),
     ] = NOTHING,
 ) -> None:
     """Write a fabric for other programs, and print what was written.

@@ -27,7 +27,6 @@ from pipeline.analytic.soft_nodes import (
 )
 from pipeline.compiled import float32
 from pipeline.models.patch_bsdf import PatchBSDF
-from pipeline.truth import query
 from pipeline.truth.footprint import mixture
 from pipeline.truth.geometry import heightfield, visibility
 from pipeline.truth.scattering import slab_float32
@@ -121,6 +120,7 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
 
 
 _ERROR_FUNCTION: Final = (0.3275911, 0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429)
+
 
 def constants() -> dict[str, float | int]:
     """Return the constants of the shader, by name; those of type int are integers there."""

@@ -14,7 +14,7 @@ from pipeline.shader import languages
 from pipeline.shader.descriptor import Buffer, Descriptor, Networks, PlacedLayer
 from pipeline.shader.languages import LANGUAGES
 from pipeline.truth.conventions import COMPONENTS
-from tests.pipeline.shader.conftest import CLOTH, FORMAT_PAGE, bytes_of, read
+from tests.pipeline.shader.conftest import FORMAT_PAGE, bytes_of, read
 from tests.presets import KINDS
 from weaves.fabric import load_fabric
 

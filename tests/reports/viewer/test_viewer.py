@@ -91,7 +91,9 @@ def test_a_shader_of_selvage_that_does_not_compile_is_named(whole, tmp_path):
 
 def test_without_the_shader_of_soft_nodes_points_are_shown(whole, tmp_path):
     with viewer(whole, tmp_path) as own:
-        own.run("viewer.picture.programs.clear(), viewer.picture.known.clear(), viewer.picture.sources.nodes = 'broken'")
+        own.run(
+            "viewer.picture.programs.clear(), viewer.picture.known.clear(), viewer.picture.sources.nodes = 'broken'"
+        )
         own.run("viewer.set({ right: '2' }).then(() => viewer.drawn)")
         assert own.run("viewer.methods[1].label") == "One point"
         said = own.run("document.getElementById('notice').textContent")
