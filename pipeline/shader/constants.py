@@ -27,6 +27,7 @@ from pipeline.analytic.soft_nodes import (
 )
 from pipeline.compiled import float32
 from pipeline.models.patch_bsdf import PatchBSDF
+from pipeline.truth import query
 from pipeline.truth.footprint import mixture
 from pipeline.truth.geometry import heightfield, visibility
 from pipeline.truth.scattering import slab_float32
@@ -71,12 +72,13 @@ _SAME: Final[tuple[tuple[ModuleType, tuple[str, ...]], ...]] = (
     (groups, ("COLUMNS",)),
     (nodes, ("LEVELS", "UPPER")),
     (shade, ("LEAST_SEEN", "FADED", "TINY")),
-    (answer, ("SMALLEST",)),
+    (answer, ("LONGEST", "SMALLEST")),
     (view_lines, ("MOST_GAUSS",)),
     (view_rays, ("FOOTPRINT_ENDS", "NEVER")),
     (cuts, ("NEAREST",)),
     (wide, ("RESOLVED",)),
     (scratch, ("MOST_ON_LINES",)),
+    (query, ("LOWEST_VIEWER",)),
     (seen_areas, ("SEEN_ANGLES",)),
     (coverage, ("RAYS",)),
     (soft_horizons, ("FALL",)),
@@ -115,6 +117,7 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     },
     visibility: {"NARROWINGS": "_NARROWINGS", "STRIP_POINTS": "_STRIP_POINTS"},
     line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING"},
+    query: {"RAISED": "_RAISED"},
     mixture: {"LITTLE": "_LITTLE", "WIDEST": "_WIDEST"},
 }  # fmt: skip
 
@@ -136,7 +139,7 @@ def constants() -> dict[str, float | int]:
         "ROOT_RIGHT": math.sqrt(0.5 * math.pi),
         **{f"ERF_{n}": value for n, value in enumerate(_ERROR_FUNCTION)},
         "VERTICAL_SLOPE": 1e-6,
-        "BORDER": 1.0 - 4e-6,
+        "ROUNDING": 2.0**-22,
         "TURNS": 1e-6,
         "GAUSS_COLUMNS": view_lines.GAUSS_PLACES.shape[1],
         "STRONGEST": mixture.COARSE_LINE.most,
