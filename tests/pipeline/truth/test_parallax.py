@@ -64,7 +64,7 @@ def _from_displaced_points(fabric, query, count=60_000):
 def test_rays_and_displaced_points_have_the_same_mean(fabric, degrees, light):
     """z-tests of five numbers in nine cases, Šidák-corrected to 1e-3; the light of 150 degrees is behind the cloth."""
     query = equal_queries(direction(light, 100.0), direction(degrees, 25.0), sigma=0.25, centre=(0.8, 1.3))
-    answers = _answers(fabric, query)
+    answers = _answers(fabric, query, walls="left_out")
     expected, doubt = _from_displaced_points(fabric, query)
     found = np.append(answers.mean[0], answers.transparency[0])
     own = np.append(answers.standard_error[0], answers.transparency_standard_error[0])
@@ -80,7 +80,7 @@ def test_rays_and_displaced_points_have_the_same_mean(fabric, degrees, light):
 @pytest.mark.parametrize("degrees", [slow(0.0), slow(50.0), 80.0])
 def test_a_footprint_of_a_repeat_sees_no_parallax(estimator, degrees):
     query = equal_queries(direction(35.0, 200.0), direction(degrees, 70.0), sigma=4.0)
-    rays, flat = (_answers(LOPSIDED, query, parallax, estimator) for parallax in (True, False))
+    rays, flat = (_answers(LOPSIDED, query, parallax, estimator, walls="left_out") for parallax in (True, False))
     assert (np.abs(rays.mean - flat.mean) < 4 * np.hypot(rays.standard_error, flat.standard_error) + 1e-6).all()
     doubt = np.hypot(rays.transparency_standard_error, flat.transparency_standard_error)
     assert (np.abs(rays.transparency - flat.transparency) < 4 * doubt + 1e-6).all()
@@ -123,8 +123,7 @@ def test_with_rims_no_place_weighs_less(walls):
 
 
 @pytest.mark.parametrize("options", [
-    {"parallax": True, "frame": "macro"}, {"parallax": True, "shadows": False}, {"walls": "rim"},
-    {"parallax": True, "estimator": "quadrature"},
+    {"frame": "macro"}, {"shadows": False}, {"parallax": False, "walls": "rim"}, {"estimator": "quadrature"},
 ])  # fmt: skip
 def test_rays_need_the_ply_model_estimators_of_rays_and_a_viewer_not_too_low(options):
     with pytest.raises(BadInput, match="parallax"):
@@ -139,7 +138,7 @@ def test_tables_answer_footprints_of_rays(fabric, walls):
     """Round, elliptic and rotated ones, views to 80 degrees, the light of every third query behind the cloth."""
     options = QueryOptions(sigma=(0.8, 4.0), stretch=3.0, max_angle=75.0, behind=0.3)
     queries = draw_queries(options, fabric.weave.repeat, 6, 0, 120)
-    physics = TruthOptions(parallax=True, walls=walls)
+    physics = TruthOptions(walls=walls)
     queries = queries.take(FINE.knows(cloth_side(fabric, physics), columns_of(queries)))
     assert len(queries.u) > 60
     exact = _answers(fabric, queries, walls=walls, relative_error=0.002, max_count=1 << 15)
@@ -160,6 +159,6 @@ def test_a_crest_has_its_own_colour_where_the_viewer_sees_it():
     shift = (crest[2] - reference_plane(field)) * wo[0] / wo[2]
     assert 0.5 < shift < 1.5
     query = equal_queries(direction(50.0, 0.0), wo, sigma=0.002, centre=((0.5 - shift) % 3, 0.5))
-    options = TruthOptions(parallax=True, relative_error=0.01)
+    options = TruthOptions(relative_error=0.01)
     found = component_colours(cloth, query, options, 1).mean[0, 2]
     np.testing.assert_allclose(found, PALETTE["red"]["diffuse"], atol=1e-6)
