@@ -63,7 +63,7 @@ class PrefilteredMaps(NamedTuple):
     heights: HeightMaps
 
 
-def tabulate(fabric: Fabric, texels_per_yarn: int, parallax: bool = False) -> PrefilteredMaps:
+def tabulate(fabric: Fabric, texels_per_yarn: int, parallax: bool = True) -> PrefilteredMaps:
     """Average the maps of a fabric's surface, down to one texel; sides are powers of two.
 
     The finest level has at least `texels_per_yarn` texels along a yarn spacing.

@@ -43,7 +43,7 @@ _AZIMUTHS: Final = 96
 TABLE: Final = NodeTable(lambda cells: _NODES, _AZIMUTHS, COARSE_LINE)
 """The table of the fallback."""
 
-QUADRATURE: Final = TruthOptions(estimator="owen", relative_error=0.1)
+SAMPLING: Final = TruthOptions(estimator="owen", relative_error=0.1)
 """Options of the estimator for queries that the table cannot answer: typically 2 % off, at .1 ms a query."""
 
 FLAT_TURN: Final = 0.1
@@ -59,20 +59,20 @@ def fallback_answers(fabric: Fabric, queries: Queries, seed: int) -> Float32:
 def fallback_rows(fabric: Fabric, queries: Queries, seed: int) -> Float32:
     """Return the components and the transparency of N queries of any kind, float32 (N, 5)."""
     turned = queries.curvature * np.sqrt(queries.sigma * queries.sigma_minor)
-    flat = queries._replace(curvature=np.where(turned <= FLAT_TURN, np.float32(0.0), queries.curvature))
+    flat = queries.raised()._replace(curvature=np.where(turned <= FLAT_TURN, np.float32(0.0), queries.curvature))
     result, left = np.empty((len(queries.u), 5), np.float32), np.ones(len(queries.u), np.bool_)
     for behind in (False, True):
         rows = np.flatnonzero((queries.wo[:, 2] < 0.0) == behind)
         if not rows.size:
             continue
-        cloth, columns = cloth_side(fabric, QUADRATURE, behind), columns_of(flat.take(rows), behind)
+        cloth, columns = cloth_side(fabric, SAMPLING, behind), columns_of(flat.take(rows), behind)
         known = TABLE.knows(cloth, columns)
         if known.any():
             rows = rows[known]
             answers = TABLE.answer(cloth, columns.take(known), rows, *NOT_REFINED, seed)
             result[rows], left[rows] = np.maximum(answers.mean, 0.0), False
     if left.any():
-        estimated = estimate(fabric, flat.take(left), QUADRATURE, seed)
+        estimated = estimate(fabric, flat.take(left), SAMPLING, seed)
         result[left] = np.concatenate([estimated.mean, estimated.transparency[:, None]], axis=1)
     return result
 

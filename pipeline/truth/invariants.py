@@ -358,7 +358,7 @@ def agreement(fabric: Fabric) -> list[CheckResult]:
     """Test that all estimators give the same answers, each compared with one of them that takes more points.
 
     Only errors of samples follow Student's t. Rules and tables have heavier tails, which their bounds know: an answer
-    has the error of a sampled one with the same bound. `quadrature` is compared where it answers, in the fabric plane.
+    has the error of a sampled one with the same bound. `quadrature` is compared with walls left out, as it answers.
     An estimator that cannot answer for the cloth is left out: `node_table` has a limit of different cells, and of the
     distance of nodes as viewers see them.
     """
@@ -366,13 +366,13 @@ def agreement(fabric: Fabric) -> list[CheckResult]:
     rows = 24
     sizes = np.exp(rng.uniform(np.log(0.8), np.log(8.0), rows))
     queries = _queries(fabric, _directions(rng, rows, 75.0), _directions(rng, rows, 70.0), sizes, rng)
-    rays, plane = (estimate(fabric, queries, _fixed(32_768, parallax=parallax), 8) for parallax in (True, False))
+    references = {walls: estimate(fabric, queries, _fixed(32_768, walls=walls), 8) for walls in ("rim", "left_out")}
     found = []
     for name in ESTIMATORS:
-        flat = name == "quadrature"
-        best = plane if flat else rays
+        walls = "left_out" if name == "quadrature" else "rim"
+        best = references[walls]
         try:
-            answers = estimate(fabric, queries, _fixed(8192, estimator=name, parallax=not flat), 9)
+            answers = estimate(fabric, queries, _fixed(8192, estimator=name, walls=walls), 9)
         except BadInput:
             continue
         seen = best.mean > 1e-2 * best.mean.max(axis=1, keepdims=True)

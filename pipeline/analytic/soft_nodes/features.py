@@ -6,6 +6,9 @@ exchanges warp and weft: that is a permutation of the features and of the compon
 
 The components of a patch hidden almost wholly fade to 0: the truth of most such patches is that nothing at all is seen.
 
+Where walls are most of what is seen, sums are many times the bare ones, which know no walls: shares of these are cut
+off, so that no feature is far from those that a network was trained on.
+
 Each component comes with its value without shadows of the light. That value is a mean of the point model over nodes
 whose weights do not depend on wi; int (w_d <i.n_p> + (1 - w_d) i_z) / pi d(wi) over the viewer's side is at most 1 for
 every node, so the diffuse components without shadows integrate to at most 1, and nothing below them makes light. The
@@ -66,6 +69,7 @@ EXCHANGED_SIGN: Final = np.array([-1.0 if k in (28, 29) else 1.0 for k in range(
 
 _0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 _STEEPEST = np.float32(3.0)  # slope of a half vector
+_MOST_SEEN = np.float32(2.0)  # of the bare sums
 _INVERSE_PI = np.float32(1.0 / math.pi)
 _DARK, _SMALL, _HIDDEN = np.float32(0.05), np.float32(0.1), np.float32(0.02)  # where bounded numbers reach a half
 
@@ -122,17 +126,18 @@ def _assemble(
             per_diffuse, per_specular = _1 / (own[BARE_DIFFUSE] + TINY), _1 / (own[BARE_SPECULAR] + TINY)
             k = 8 * f
             row[k] = own[AREA] * inverse
-            row[k + 1] = own[AREA] / (own[BARE_AREA] + TINY)
-            row[k + 2] = own[DIFFUSE] * per_diffuse
-            row[k + 3] = own[SPECULAR] * per_specular
-            row[k + 4] = own[DIFFUSE_DOUBT] * per_diffuse * _2
-            row[k + 5] = own[SPECULAR_DOUBT] * per_specular * _2
+            row[k + 1] = min(own[AREA] / (own[BARE_AREA] + TINY), _MOST_SEEN)
+            row[k + 2] = min(own[DIFFUSE] * per_diffuse, _MOST_SEEN)
+            row[k + 3] = min(own[SPECULAR] * per_specular, _MOST_SEEN)
+            # A node that shows walls beside its whole box takes from the sum of doubts.
+            row[k + 4] = min(max(own[DIFFUSE_DOUBT] * per_diffuse * _2, _0), _1)
+            row[k + 5] = min(max(own[SPECULAR_DOUBT] * per_specular * _2, _0), _1)
             row[k + 6] = specular / (specular + _DARK)
             row[k + 7] = diffuse / (diffuse + _DARK)
         row[16], row[17], row[18], row[19], row[20], row[21] = ix, iy, iz, ox, oy, oz
         row[22], row[23] = min(hx * slope, _STEEPEST), min(hy * slope, _STEEPEST)
         row[24] = ix * ox + iy * oy + iz * oz
-        row[25] = area / (bare + TINY)
+        row[25] = min(area / (bare + TINY), _MOST_SEEN)
         row[26] = size[n] / (size[n] + _SMALL)
         root = np.sqrt(area / (bare + TINY))
         row[27] = root / (root + _HIDDEN)

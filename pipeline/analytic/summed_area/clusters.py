@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.analytic import soft_horizons
 from pipeline.analytic.gauss_rules import grid_edges, grid_middles
-from pipeline.analytic.horizon_points.horizon_map import HorizonMap, slot_of
+from pipeline.analytic.summed_area.horizon_map import HorizonMap, slot_of
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.truth.geometry.heightfield import BETA, GAP, RADIUS, WARP, HeightField
 from pipeline.truth.geometry.pieces import CellPiece, cell_pieces

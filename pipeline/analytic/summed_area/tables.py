@@ -23,8 +23,8 @@ from scipy.special import ndtr
 
 from pipeline.analytic import soft_horizons
 from pipeline.analytic.gauss_rules import grid_edges
-from pipeline.analytic.horizon_points.horizon_map import horizon_map
 from pipeline.analytic.summed_area.clusters import LANES, Patch, PlacedPatch, blocks_of, sources
+from pipeline.analytic.summed_area.horizon_map import horizon_map
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP, WEFT
@@ -233,7 +233,7 @@ class ClusterTables(NamedTuple):
     extent: Float32
 
 
-def tabulate(fabric: Fabric, clusters: int, parallax: bool = False) -> ClusterTables:
+def tabulate(fabric: Fabric, clusters: int, parallax: bool = True) -> ClusterTables:
     """Build the tables of a fabric's front, of `clusters` clusters in all."""
     model = cloth_side(fabric, TruthOptions())
     field = model.front

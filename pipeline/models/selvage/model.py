@@ -11,7 +11,7 @@ Within a wished error (`Adaptive`) each query gets the cheapest of three answers
 
     1  soft nodes corrected by the network        estimated by the network
     2  the finest soft nodes                      estimated by the network
-    3  the fallback, sums over a node table       not estimated: the answer of what is left, without parallax
+    3  the fallback, sums over a node table       not estimated: the answer of what is left, with rims
 
 Errors are root mean squares over many queries, relative to a grey cloth's colour: single errors may be larger. Light
 from behind has no estimate; the finest soft nodes answer it, and all that the network is not trained for.
@@ -31,6 +31,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -66,6 +67,8 @@ _STREAM = 0x5E1F  # of the queries whose features are normalised to 0 and 1
 _LEAST_SPREAD = 1e-3  # of a feature; one that never varies must not blow up
 _ANY = Queries.round(u=[0.5], v=[0.5], sigma=[1.0], wi=[[0.6, 0.0, 0.8]], wo=[[0.0, 0.0, 1.0]])
 _COMPONENTS = (1, 0, 3, 2)  # where components come from when x and y are exchanged
+_WIDTHS = (FEATURES, 4, 4, 4)  # of what the nodes give of a row
+_MOST_KEPT = 2**23  # rows whose sums over nodes a training keeps, 1.7 GB; it computes others anew at every epoch
 
 
 class _Read(NamedTuple):
@@ -110,10 +113,16 @@ class SelvageNetwork(Trainable):
         self.errors = ErrorNetwork(options, FEATURES)
         levels = (options.level, options.finest)
         self._tables, self._finest = (
-            [tabulate(fabric, False, False, level, False, *options.rays) for fabric in fabrics] for level in levels
+            [tabulate(fabric, False, False, level, False, options.rims) for fabric in fabrics] for level in levels
         )
+        self.expect(0)
         if fabrics:
             self._measure(fabrics)
+
+    def expect(self, rows: int) -> None:
+        """Expect batches out of so many rows. Sums over nodes take longer than the rest of a step: they are kept."""
+        rows = min(rows, _MOST_KEPT)
+        self._kept, self._known = np.empty((rows, sum(_WIDTHS)), np.float32), np.zeros(rows, np.bool_)
 
     def forward(self, features: Tensor, components: Tensor, bounds: Tensor) -> Tensor:
         """Return components (n, 4) from features (n, FEATURES), and components and bounds (n, 4) of the soft nodes."""
@@ -154,12 +163,26 @@ class SelvageNetwork(Trainable):
     def _read(self, batch: Batch) -> _Read:
         """Return what the nodes of all rows of a batch give, computed on the CPU."""
         found = []
-        for row, fabric in enumerate(batch.fabric.tolist()):
-            queries = Queries(*(getattr(batch, name)[row].numpy(force=True) for name in Queries._fields))
-            finest = read_queries(self._finest[fabric], queries).components
-            found.append((*read_queries(self._tables[fabric], queries), finest))
-        parts = (torch.from_numpy(np.concatenate(columns)) for columns in zip(*found, strict=True))
-        return _Read(*(part.to(batch.u.device) for part in (*parts, batch.target.flatten(0, 1))))
+        for index, fabric in enumerate(batch.fabric.tolist()):
+            queries = Queries(*(getattr(batch, name)[index].numpy(force=True) for name in Queries._fields))
+            found.append(self._of_nodes(fabric, queries, batch.row[index].numpy(force=True)))
+        parts = np.split(np.concatenate(found), np.cumsum(_WIDTHS)[:-1], axis=1)
+        columns = (torch.from_numpy(np.ascontiguousarray(part)) for part in parts)
+        return _Read(*(part.to(batch.u.device) for part in (*columns, batch.target.flatten(0, 1))))
+
+    def _of_nodes(self, fabric: int, queries: Queries, row: npt.NDArray[np.int64]) -> Float32:
+        """Return what the nodes give of queries (n, sum of _WIDTHS), computed unless kept from an earlier step."""
+        kept = (row >= 0) & (row < len(self._known))
+        old = kept.copy()
+        old[kept] = self._known[row[kept]]
+        found = np.empty((len(row), sum(_WIDTHS)), np.float32)
+        found[old] = self._kept[row[old]]
+        if not old.all():
+            asked = queries.take(~old)
+            finest = read_queries(self._finest[fabric], asked).components
+            found[~old] = np.concatenate([*read_queries(self._tables[fabric], asked), finest], axis=1)
+            self._kept[row[kept]], self._known[row[kept]] = found[kept], True
+        return found
 
     def _measure(self, fabrics: Sequence[Fabric]) -> None:
         """Measure mean and spread of the features over queries of all fabrics, before and after the exchange."""
@@ -249,8 +272,8 @@ class Selvage(_OverNodes):
         self.bound = network.options.bound
         self._network = network.eval()
         self._cloths = PerFabric(self._tabulate)
-        self.nodes = SoftNodes(network.options.level, self.name, network.options.parallax, network.options.walls)
-        self._tables = soft_tables(network.options.level, False, False, *network.options.rays)
+        self.nodes = SoftNodes(network.options.level, self.name, network.options.walls)
+        self._tables = soft_tables(network.options.level, False, False, network.options.rims)
         self._correction = _Folded([*network.hidden, network.last], network)
         self._estimate = _Folded([network.errors.hidden, network.errors.last], network)
         self._answering = Answering(self._network, self._components)
@@ -376,7 +399,7 @@ class Adaptive(_OverNodes, Around):
         super().__init__(selvage, f"error {100 * error:g} %")
         self.domain, self.error = selvage.domain, error
         self._selvage = selvage
-        self.nodes = SoftNodes(selvage.options.finest, selvage.name, selvage.options.parallax, selvage.options.walls)
+        self.nodes = SoftNodes(selvage.options.finest, selvage.name, selvage.options.walls)
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric for both levels of soft nodes and for the fallback, once."""
@@ -401,8 +424,8 @@ class Adaptive(_OverNodes, Around):
         """Answer queries with the light in front."""
         result, errors = self._selvage.with_errors(fabric, queries)
         too_far = errors[:, OWN] > self.error
-        # The fallback knows no view rays: what is left to it stays with the finest nodes.
-        finer = too_far & ((errors[:, FINEST] <= self.error) | self._selvage.options.parallax)
+        # The fallback sees rims: what is left of another meaning of walls stays with the finest nodes.
+        finer = too_far & ((errors[:, FINEST] <= self.error) | (not all(self._selvage.options.rays)))
         left = too_far & ~finer
         if finer.any():
             result[finer] = self.nodes.predict(fabric, queries.take(finer))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from pipeline.analytic import exact_points, prefiltered
-from pipeline.analytic.horizon_points import sampler
 from pipeline.analytic.soft_nodes import features, nodes
 from pipeline.analytic.summed_area import answer, tables
 from pipeline.truth.cloth import cloth_side
@@ -15,9 +14,9 @@ from pipeline.truth.options import TruthOptions
 
 @lru_cache(maxsize=64)
 def soft_table(fabric, level=2, behind=False):
-    """Return a table with grids of an eighth of the usual size: as exact in all that is compared here, and cheaper."""
+    """Return a table with grids of a quarter of the usual size: as exact in all that is compared here, and cheaper."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nodes, "_GRID_BYTES", 1 << 17)
+        patch.setattr(nodes, "_GRID_BYTES", 1 << 18)
         return nodes.tabulate(fabric, level=level, behind=behind)
 
 
@@ -29,7 +28,7 @@ def _clusters(fabric, clusters):
         return tables.tabulate(fabric, clusters)
 
 
-_horizons, _maps = (lru_cache(maxsize=32)(module.tabulate) for module in (sampler, prefiltered))
+_maps = lru_cache(maxsize=32)(prefiltered.tabulate)
 
 
 def soft_nodes(fabric, queries, level=2):
@@ -47,10 +46,6 @@ def summed_area(fabric, queries):
     return answer.answer(_clusters(fabric, 64), queries)
 
 
-def horizon_points(fabric, queries, count=256, grid=16):
-    return sampler.sample_horizons(_horizons(fabric, grid, 2 * grid), queries, count, True, 3)
-
-
 def points(fabric, queries, count=256):
     return exact_points.sample_points(cloth_side(fabric, TruthOptions()), queries, count, 3, True)
 
@@ -62,5 +57,5 @@ def averaged_normals(fabric, queries):
 PLACED = [soft_nodes, soft_nodes_behind, summed_area, averaged_normals]
 """Methods without random numbers."""
 
-ALL = [soft_nodes, summed_area, horizon_points, points, averaged_normals]
+ALL = [soft_nodes, summed_area, points, averaged_normals]
 """Methods that return the four components with the light in front."""

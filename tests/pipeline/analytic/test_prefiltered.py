@@ -26,7 +26,7 @@ def test_a_texel_is_a_point(point_shares, wi, wo):
     x, y = (axis.ravel()[::7].astype(np.float32) for axis in (x, y))
     wi, wo = (np.tile(unit(*w), (len(x), 1)) for w in (wi, wo))
     queries = Queries.round(x, y, np.full(len(x), 1e-4, np.float32), wi, wo)
-    tables = tabulate(fabric, PER_YARN)
+    tables = tabulate(fabric, PER_YARN, parallax=False)
     found = answer(tables, queries, NONE)
     # One tangent has no variance.
     for widening in (TOKSVIG, LEAN):

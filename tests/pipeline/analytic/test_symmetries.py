@@ -54,9 +54,7 @@ def test_a_footprint_far_larger_than_the_repeat_has_no_place(method):
     np.testing.assert_allclose(found, found[:1].repeat(5, axis=0), rtol=0.0 if method is methods.summed_area else 1e-5)
 
 
-@pytest.mark.parametrize(
-    "method", [methods.soft_nodes, methods.soft_nodes_behind, methods.summed_area, methods.horizon_points]
-)
+@pytest.mark.parametrize("method", [methods.soft_nodes, methods.soft_nodes_behind, methods.summed_area])
 def test_an_ellipse_is_the_same_after_half_a_turn_and_with_its_axes_exchanged(method):
     own = method(LOPSIDED, QUERIES)
     right = np.float32(np.pi / 2)

@@ -83,7 +83,8 @@ REAL = """
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.analytic.horizon_points.sampler import sample_horizons, tabulate
+from pipeline.analytic.summed_area.answer import answer
+from pipeline.analytic.summed_area.tables import tabulate
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
@@ -92,7 +93,7 @@ queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
 asked = {
     "node_table": lambda: np.hstack(estimate(fabric, queries, TruthOptions(estimator="node_table"), 1)[:2]),
     "soft_nodes": lambda: SoftNodes().predict(fabric, queries),
-    "points": lambda: sample_horizons(tabulate(fabric, 16, 32), queries, 16, True, 1),
+    "summed_area": lambda: answer(tabulate(fabric, 16), queries),
 }
 """
 
@@ -275,7 +276,7 @@ def test_kernels_that_borrow_arrays_call_none_that_returns_them():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "order"),
-    [(SMALL, ("fast", "plain", "twice", "smooth", "shared")), (REAL, ("node_table", "soft_nodes", "points"))],
+    [(SMALL, ("fast", "plain", "twice", "smooth", "shared")), (REAL, ("node_table", "soft_nodes", "summed_area"))],
     ids=["small", "real"],
 )
 def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies, asked, order):

@@ -28,7 +28,6 @@ def test_identities_state_all_choices_of_the_design(model):
         {"model": "woven", "spatial_fusion": False},
         {"model": "woven", "name": "../woven"},
         {"model": "point_sampled", "counts": [2, 0]},
-        {"model": "point_sampled", "footprint": "box", "visibility": "horizon"},
         {"model": "map_material", "size": 100},
         {"model": "unified_btf", "samples": 3, "fewest_samples": 4},
     ],

@@ -15,10 +15,9 @@ from weaves.fabric import load_fabric
     [
         (SoftNodesOptions(levels=[2]), 0.04),
         (SummedAreaOptions(clusters=[64]), 0.05),
-        (PointSampledOptions(counts=[4096], sequence="r2", visibility="horizon"), 0.03),
         (PointSampledOptions(counts=[4096], sequence="r2"), 0.03),
     ],
-    ids=["soft nodes", "clusters", "points, horizons", "points"],
+    ids=["soft nodes", "clusters", "points"],
 )
 def test_ellipses_are_answered_as_such(options, bound, clusters):
     """RMSE of the colour over the mean; asked for the round footprint of equal area half as much again at least."""

@@ -40,7 +40,7 @@ def equal_queries(wi, wo, sigma=2.0, rows=1, centre=(0.3, 0.7)):
 
 
 def answering(estimator, **options):
-    """Return options of an estimator; `quadrature` knows the fabric plane alone."""
+    """Return options of an estimator; of `quadrature`, which knows no rims, those of the fabric plane."""
     plane = {"parallax": False} if estimator == "quadrature" else {}
     return TruthOptions(estimator=estimator, **plane | options)
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.horizon_points.horizon_map import horizon_map
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.summed_area.clusters import _split, blocks_of, sources
+from pipeline.analytic.summed_area.horizon_map import horizon_map
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP, WARP, WEFT
 from pipeline.truth.options import TruthOptions

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.horizon_points.horizon_map import horizon_map
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.summed_area.clusters import sources
+from pipeline.analytic.summed_area.horizon_map import horizon_map
 from pipeline.analytic.summed_area.layers import MOST_LAYERS, HeightLayer, _share, layers_of
 from pipeline.analytic.summed_area.tables import GRID, LANES, tabulate
 from pipeline.truth.cloth import cloth_side
@@ -64,4 +64,4 @@ def test_one_layer_for_what_is_not_displaced():
     assert above == 1
     assert 1 < low < lower < grazing == MOST_LAYERS
     assert layers(50.0, (60.0, 88.0)) == [1, 1]
-    assert len(tabulate(woven("denim"), 16).extent) == 0
+    assert len(tabulate(woven("denim"), 16, False).extent) == 0

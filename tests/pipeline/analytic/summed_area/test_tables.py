@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pipeline.analytic.horizon_points.horizon_map import horizon_map
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.summed_area.clusters import LANES, blocks_of, sources
+from pipeline.analytic.summed_area.horizon_map import horizon_map
 from pipeline.analytic.summed_area.tables import AREA, SPREAD_U, SPREAD_V, TEXEL_AZIMUTHS, Sums, U, V, plan, tabulate
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import WARP

@@ -24,6 +24,16 @@ def table(lopsided):
     return tabulate(lopsided)
 
 
+def test_features_are_bounded_where_walls_are_most_of_what_is_seen():
+    """High yarns that hardly bend end in steps; some shares of the bare sums reach the bound."""
+    stepped = woven("denim", ("##.#", ".##.", "#..#"), warp={"bend": 5.0, "relief": 1.8}, weft={"bend": 5.0})
+    asked = draw_queries(QueryOptions(sigma=(0.1, 1.0), stretch=4.0), stepped.weave.repeat, 1, 0, 4000)
+    features = read_queries(tabulate(stepped), asked).features
+    doubts = features[:, [4, 5, 12, 13]]
+    assert np.abs(features).max() <= 4.0 and features[:, [1, 2, 3, 9, 10, 11]].max() == 2.0
+    assert doubts.min() == 0.0 and doubts.max() <= 1.0
+
+
 @pytest.mark.parametrize("symmetry", [GENERATORS[0], slow(GENERATORS[1]), GENERATORS[2]])
 def test_mirror_images_have_the_same_features_and_exchanges_permute_them(symmetry, lopsided, table):
     """Most rows to rounding, of grids to 8 bits too; where a node lies on the border of two cells, rounding decides."""

@@ -34,7 +34,7 @@ def drawn(fabric, seed, rows, **options):
 def true_batch(seed, rows):
     """Return a step about the second fabric, with the truth as its target."""
     asked = drawn(TWILL, seed, rows)
-    return batch_of(asked, truth_of(TWILL, asked, estimator="node_table"), 1)
+    return batch_of(asked, truth_of(TWILL, asked), 1)
 
 
 def trained_a_little(steps):
@@ -56,6 +56,31 @@ def test_it_learns_and_training_sees_what_rendering_sees():
     read = network._read(batch_of(asked, answers, 1))
     answer = network(read.features, read.components, read.bounds)
     assert network.correction_loss(answer, read.target).item() < 1e-10
+
+
+def test_what_nodes_give_of_a_row_is_computed_once(monkeypatch):
+    """Rows of earlier steps in another order, beside new and held-out ones: the same bits, exchanged or not."""
+    asked, counts = drawn(TWILL, 3, 64, stretch=8.0), []
+    network, keeping = SelvageNetwork(SELVAGE, FABRICS), SelvageNetwork(SELVAGE, FABRICS)
+    keeping.expect(70)
+
+    def counted(table, queries):
+        counts.append(len(queries.u))
+        return read_queries(table, queries)
+
+    def equal(row, numbers):
+        batch = batch_of(asked.take(row), np.ones((len(row), 4), np.float32), 1)
+        expected, counts[:] = network._read(batch), []
+        found = keeping._read(batch._replace(row=torch.from_numpy(numbers)[None]))
+        for one, other in zip((*found, *found.exchanged()), (*expected, *expected.exchanged()), strict=True):
+            assert torch.equal(one, other)
+        return list(counts)
+
+    monkeypatch.setattr("pipeline.models.selvage.model.read_queries", counted)
+    order = np.random.default_rng(1).permutation(64)
+    assert equal(order[:40], order[:40]) == [40, 40]
+    assert equal(order[::-1], order[::-1].copy()) == [24, 24]
+    assert equal(order, np.where(order < 10, -1, order)) == [10, 10]
 
 
 def test_normalised_features_have_mean_0_and_deviation_1():
@@ -115,15 +140,15 @@ def test_light_from_behind_is_answered_by_the_soft_nodes(finest):
 
 
 def test_footprints_of_view_rays_are_those_of_its_soft_nodes():
-    """In training and in rendering; also of the finest ones, in place of a fallback without parallax."""
-    fabric, options = LINING, SELVAGE.model_copy(update={"parallax": True})
+    """In training and in rendering; of the finest ones, where the fallback means other walls."""
+    fabric, options = LINING, SELVAGE.model_copy(update={"walls": "left_out"})
     asked = drawn(fabric, 1, 64, sigma=(0.1, 0.5))
-    network, nodes = SelvageNetwork(options, [fabric]), SoftNodes(parallax=True)
+    network, nodes = SelvageNetwork(options, [fabric]), SoftNodes(walls="left_out")
     method, expected = Selvage(network), nodes.predict(fabric, asked)
     np.testing.assert_allclose(method.predict(fabric, asked), expected, rtol=1e-5, atol=1e-7)
     np.testing.assert_array_equal(network._read(batch_of(asked, expected)).components, expected)
     assert np.abs(expected - SoftNodes().predict(fabric, asked)).max() > 0.1 * expected.max()
-    finest = SoftNodes(8, parallax=True).predict(fabric, asked)
+    finest = SoftNodes(8, walls="left_out").predict(fabric, asked)
     np.testing.assert_array_equal(method.within(1e-6).predict(fabric, asked), finest)
 
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.horizon_points.horizon_map import horizon_map
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes.nodes import LEVELS
+from pipeline.analytic.summed_area.horizon_map import horizon_map
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.analytic.methods import soft_table
