@@ -150,7 +150,7 @@ def test_what_stops_a_thread_stops_everything(case):
     """The table knows nothing of tiny footprints: the first such row in the file is named, whoever meets it first."""
     case.options = OPTIONS.model_copy(update={"estimator": "node_table"})
     columns = query_columns()
-    columns["sigma"] = np.where(np.isin(np.arange(ROWS), [150, 250]), 0.001, 1.0)
+    columns["sigma"] = np.where(np.isin(np.arange(ROWS), [150, 250]), 0.001, 32.0)
     with pytest.raises(BadInput, match="row 150"):
         case.write(columns).run(chunk=10, threads=4)
     assert not list(case.out.parent.iterdir())

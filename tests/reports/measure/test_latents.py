@@ -13,7 +13,7 @@ from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import Fabric, load_fabric
 
 TRUTH = TruthOptions(estimator="node_table")
-ASKED = QueryOptions(sigma=(0.3, 4.0))
+ASKED = QueryOptions(sigma=(2.0, 8.0), max_angle=60.0)
 
 
 class Truth(FakeMethod):
