@@ -46,14 +46,14 @@ class Bounded(Around):
     Parameters
     ----------
     method : Method
-        Anything that answers for flat cloth, lit from either side. One that was trained with parallax is bounded by
-        footprints of view rays.
+        Anything that answers for flat cloth, lit from either side. One that was trained without parallax is bounded by
+        footprints of the fabric plane.
     """
 
     def __init__(self, method: Method) -> None:
         super().__init__(method, "bounded")
         domain: Domain | None = getattr(method, "domain", None)
-        self._tables = soft_tables(USUAL, False, False, *(domain.rays if domain else (False, False)))
+        self._tables = soft_tables(USUAL, False, False, *(domain.rays if domain else (True, True)))
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method, and tabulate the fabric."""
