@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
@@ -170,41 +169,3 @@ def bend_rows(
             little = first_low[b, k] + turn * (last_low[b, k] - first_low[b, k])
             much = first_high[b, k] + turn * (last_high[b, k] - first_high[b, k])
             found[b, k] = flat - bend.of_low * little - bend.of_high * much
-
-
-@kernel
-def bend_cells(
-    grid: npt.NDArray[np.uint8],
-    falls: npt.NDArray[np.uint8],
-    cells: npt.NDArray[np.uint32],
-    low: np.uint32,
-    high: np.uint32,
-    turn: np.float32,
-    bend: Bend,
-    found: Float32,
-) -> None:
-    """Write the horizons of placed nodes over a curved base, in levels of the grid.
-
-    Parameters
-    ----------
-    grid, falls : uint8 (cells,), (curvatures, cells)
-        Horizons over a flat base, and their falls.
-    cells : uint32 (N,)
-        Each node's cell at the first azimuth.
-    low, high, turn
-        What leads to the azimuths around the direction, and where between them it lies.
-    bend : Bend
-        Curvature along the direction; with factors of 0 no falls are read.
-    found : float32 (N,)
-        Written.
-    """
-    bent = bend.of_low > _0 or bend.of_high > _0
-    for k in range(len(cells)):
-        first, last = cells[k] + low, cells[k] + high
-        level = np.float32(grid[first]) + turn * (np.float32(grid[last]) - np.float32(grid[first]))
-        if bent:
-            little, much = np.float32(falls[bend.low, first]), np.float32(falls[bend.high, first])
-            little += turn * (np.float32(falls[bend.low, last]) - little)
-            much += turn * (np.float32(falls[bend.high, last]) - much)
-            level -= bend.of_low * little + bend.of_high * much
-        found[k] = level

@@ -46,14 +46,13 @@ class Bounded(Around):
     Parameters
     ----------
     method : Method
-        Anything that answers for flat cloth, lit from either side. One that was trained without parallax is bounded by
-        footprints of the fabric plane.
+        Anything that answers for flat cloth, lit from either side.
     """
 
     def __init__(self, method: Method) -> None:
         super().__init__(method, "bounded")
         domain: Domain | None = getattr(method, "domain", None)
-        self._tables = soft_tables(USUAL, False, False, *(domain.rays if domain else (True, True)))
+        self._tables = soft_tables(USUAL, False, False, domain.rays[1] if domain else True)
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method, and tabulate the fabric."""
@@ -78,10 +77,7 @@ class Bounded(Around):
 
 
 def _with_open_back(table: SoftNodeTable) -> SoftNodeTable:
-    """Return a table of the front with which `read_behind` answers without shadows of the light.
-
-    Narrow footprints keep the ramp of a horizon in the fabric plane.
-    """
+    """Return a table of the front with which `read_behind` answers without shadows of the light."""
     low = np.full_like(table.mean, _BELOW)
     return table._replace(behind_mean=low, behind_sharpness=table.sharpness, behind_grid=np.zeros_like(table.grid))
 

@@ -93,7 +93,7 @@ class TruthOptions(Frozen):
     parallax: bool = True
     """True if a footprint is a patch of view rays: its density belongs to the points where they cross the reference
     plane (`pipeline.truth.geometry.pieces`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
-    which heights displace nothing [Chen2024Woven]. Known to all estimators but `quadrature`."""
+    which heights displace nothing [Chen2024Woven]. `quadrature` knows it with walls left out."""
     walls: Walls = "rim"
     """Meaning of a view ray that meets the step between two floats: it sees the rim of the yarn above, so that the mean
     over all places does not depend on the footprint, or it does not count. Without parallax it is `left_out`."""
@@ -135,7 +135,12 @@ class TruthOptions(Frozen):
         if self.parallax and (self.frame == "macro" or not self.shadows):
             raise ValueError("parallax needs frame 'ply' and shadows: a view ray ends at the first point that it meets")
         if self.parallax and self.estimator == "quadrature":
-            raise ValueError("quadrature integrates over the fabric plane, without parallax: take auto or owen")
+            known = self.walls == "left_out", self.footprint == "gaussian", self.normaliser == "visible"
+            if not all(known):
+                raise ValueError(
+                    "with parallax, quadrature needs walls 'left_out', footprint 'gaussian' and normaliser 'visible': "
+                    "take auto or owen"
+                )
         if self.walls != "left_out" and not self.parallax:
             raise ValueError("walls are met by view rays alone: parallax is needed")
         return self

@@ -1,20 +1,10 @@
-"""Sums over soft nodes for each query: fixed nodes for a wide footprint, nodes placed in a narrow one.
+"""Sums over soft nodes for each query: fixed nodes for a wide footprint of view rays, nodes on lines for a narrow one.
 
-deviations                           weights
-both >= `SoftNodeTable.uniform`              the cloth evenly
-both >= `SoftNodeTable.waves_from`           waves, where they take less time than densities
-the narrower one < `NARROW`,
-    `STRETCHED` times the other      nodes placed on lines along the footprint, at most `MOST`
-the narrower one < `SoftNodeTable.narrow`,
-    the wider one < `LONG`           nodes placed in the footprint, a second time where it is almost hidden
-else                                 densities of both axes, which fixed nodes resolve from `RESOLVED` on
-
-A footprint of view rays (`SoftNodeTable.parallax`) has its own ways: the cloth evenly, nodes on view lines below
-`SoftNodeTable.view_lines` unless they were too many, else the density where the viewer sees each fixed node.
-
-Deviations are compared along a footprint's own axes. For a rotated footprint densities are a mixture
-(pipeline.truth.footprint.mixture), waves and lines are exact, and other nodes are placed in a footprint along the
-yarns of equal area.
+least deviation, of any direction            nodes
+below `SoftNodeTable.view_lines`, twice
+    that where rays rise again               placed on lines along view rays, unless they were too many
+at least `SoftNodeTable.uniform`             fixed ones, which cover the cloth evenly
+else                                         fixed ones, by the footprint's density where the viewer sees each of them
 """
 
 from __future__ import annotations
@@ -25,28 +15,22 @@ from typing import Final
 import numpy as np
 
 from pipeline.analytic.soft_horizons import around
-from pipeline.analytic.soft_nodes.ellipse_nodes import MOST, Ellipse, ellipse, most_nodes
-from pipeline.analytic.soft_nodes.narrow import LONG, MOST_OF_FOOTPRINT, sum_ellipse, sum_round, sum_view_lines
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.analytic.soft_nodes.scratch import MOST_ON_LINES, Scratch, SoftQuery, scratch_for
 from pipeline.analytic.soft_nodes.shade import NODE_SUMS
-from pipeline.analytic.soft_nodes.view_lines import nodes_on_lines
-from pipeline.analytic.soft_nodes.wide import NARROW, sum_fixed
+from pipeline.analytic.soft_nodes.view_lines import nodes_on_lines, sum_view_lines
+from pipeline.analytic.soft_nodes.wide import sum_fixed
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.mixture import Footprints, footprints, narrow_axis
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import directions_of
 
-STRETCHED: Final = 1.5
-"""Least ratio of the axes of a narrow footprint that places nodes along its own axes."""
-
 SMALLEST: Final = np.float32(1e-3)
 """Least deviation of a footprint: a thousandth of a yarn is a point. Smaller ones would fall between the digits of a
 place."""
 
-_ROUND = Ellipse(1.0, 0.0, 1.0, 1.0, 1.0, 1)
-_0, _1 = np.float32(0.0), np.float32(1.0)
+_0 = np.float32(0.0)
 
 
 def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32]:
@@ -81,7 +65,7 @@ def sum_queries(
     """
     kinds = table.kinds[0] + table.kinds[1]
     result, gaps = np.zeros((len(wi), kinds, NODE_SUMS), np.float32), np.zeros(len(wi), np.float32)
-    _sum_rows(table, scratch_for(table, MOST_OF_FOOTPRINT), patches, wi, wo, curvature, result, gaps)
+    _sum_rows(table, scratch_for(table), patches, wi, wo, curvature, result, gaps)
     return result, gaps
 
 
@@ -107,20 +91,12 @@ def _sum_rows(
     """Write sums and areas of all queries."""
     u, v, deviation_x, deviation_y, correlation = patches
     ends, picks = table.repeat[0], table.repeat[1]
-    widest = max(table.uniform, LONG)
     for n in range(len(u)):
         # Reduced in double precision: single would lose the place of a far centre within the repeat.
         x = np.float64(u[n]) - ends * math.floor(np.float64(u[n]) / ends)
         y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
         dx, dy, rho = deviation_x[n], deviation_y[n], correlation[n]
-        narrowest, near_x, near_y = min(dx, dy), dx, dy
-        if rho != _0:
-            narrowest, blur = np.float32(narrow_axis(dx, dy, rho)), np.sqrt(np.sqrt(_1 - rho * rho))
-            near_x, near_y = blur * dx, blur * dy
-        thin, shape = narrowest < NARROW and (rho != _0 or max(dx, dy) >= LONG), _ROUND
-        if thin:
-            shape = ellipse(dx, dy, rho)
-            thin = shape.major > STRETCHED * shape.minor and most_nodes(shape) <= MOST
+        narrowest = min(dx, dy) if rho == _0 else np.float32(narrow_axis(dx, dy, rho))
         low_i, high_i, turn_i = around(wi[n, 0], wi[n, 1])
         low_o, high_o, turn_o = around(wo[n, 0], wo[n, 1])
         bend_i, bend_o = _0, _0
@@ -134,16 +110,9 @@ def _sum_rows(
             x, y, dx, dy, rho, narrowest, wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2], low_i, high_i,
             turn_i, low_o, high_o, turn_o, bend_i, bend_o,
         )  # fmt: skip
-        if table.parallax:
-            # Where rays turn, nodes are seen far from one another.
-            lines = table.view_lines * (2.0 if _rises(table, wo[n], bend_o) else 1.0)
-            if narrowest < lines and nodes_on_lines(dx, dy, narrowest, table.spacing) <= MOST_ON_LINES:
-                gaps[n] = sum_view_lines(table, scratch, look, result[n])
-            else:
-                gaps[n] = sum_fixed(table, scratch, look, widest, result[n])
-        elif thin:
-            gaps[n] = sum_ellipse(table, scratch, look, shape, result[n])
-        elif min(near_x, near_y) < table.narrow and max(near_x, near_y) < LONG:
-            gaps[n] = sum_round(table, scratch, look, near_x, near_y, result[n])
+        # Where rays turn, nodes are seen far from one another.
+        lines = table.view_lines * (2.0 if _rises(table, wo[n], bend_o) else 1.0)
+        if narrowest < lines and nodes_on_lines(dx, dy, narrowest, table.spacing) <= MOST_ON_LINES:
+            gaps[n] = sum_view_lines(table, scratch, look, result[n])
         else:
-            gaps[n] = sum_fixed(table, scratch, look, widest, result[n])
+            gaps[n] = sum_fixed(table, scratch, look, result[n])

@@ -38,12 +38,8 @@ class Detail(NamedTuple):
         Nodes along a yarn, as a multiple of those at level 2.
     parts : int
         Parts of a yarn across, each with nodes of its own.
-    legendre : int
-        Most nodes along each axis of a piece that a narrow footprint covers in part.
-    narrow : float
-        Deviation, in yarn spacings, below which a footprint places its nodes; at most `NARROW`.
     lines : float
-        The same of a footprint of view rays, which places them on lines.
+        Deviation, in yarn spacings, below which a footprint places its nodes, on lines.
     spacing : float
         Distance of these lines and of their nodes, as a multiple of that at level 2.
     """
@@ -51,17 +47,15 @@ class Detail(NamedTuple):
     most: int
     along: float
     parts: int
-    legendre: int
-    narrow: float
     lines: float
     spacing: float
 
 
 DETAILS: Final = {
-    1: Detail(most=64, along=0.5, parts=1, legendre=5, narrow=0.15, lines=0.15, spacing=1.3),
-    2: Detail(most=256, along=1.0, parts=1, legendre=6, narrow=0.25, lines=0.3, spacing=1.0),
-    4: Detail(most=1024, along=1.0, parts=2, legendre=6, narrow=0.25, lines=0.5, spacing=0.7),
-    8: Detail(most=2048, along=2.0, parts=2, legendre=6, narrow=0.25, lines=0.8, spacing=0.5),
+    1: Detail(most=64, along=0.5, parts=1, lines=0.15, spacing=1.3),
+    2: Detail(most=256, along=1.0, parts=1, lines=0.3, spacing=1.0),
+    4: Detail(most=1024, along=1.0, parts=2, lines=0.5, spacing=0.7),
+    8: Detail(most=2048, along=2.0, parts=2, lines=0.8, spacing=0.5),
 }
 """The details of every level k."""
 

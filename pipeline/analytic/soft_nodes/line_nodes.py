@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import Bend, above, ramp
-from pipeline.analytic.soft_nodes.footprint_nodes import sine_cosine
 from pipeline.analytic.soft_nodes.nodes import LEVELS, UPPER
 from pipeline.analytic.soft_nodes.scratch import DRAFT_ROWS
 from pipeline.analytic.soft_nodes.shade import (
@@ -83,6 +82,15 @@ class LineNode(NamedTuple):
     column: np.float32
 
 
+@fast_kernel
+def _sine(v: np.float32) -> np.float32:
+    """Return the sine of |v| <= pi/2."""
+    w = v * v
+    series = np.float32(-1 / 5040) + w * np.float32(1 / 362880)
+    sine = v * (_1 + w * (np.float32(-1 / 6) + w * (np.float32(1 / 120) + w * series)))
+    return min(max(sine, -_VERTICAL), _VERTICAL)
+
+
 @inlined_fast_kernel
 def _node(
     draft: Float32, k: int, rays: LineRays, radius: np.float32, fibre: Fibre, size: np.float32, d: YarnDirections
@@ -91,7 +99,7 @@ def _node(
     # Place across and along the yarn.
     at, length, across, by_across = draft[AT, k], draft[LENGTH, k], draft[ACROSS, k], draft[BY_ACROSS, k]
     turned, rim = length > _0, length == _0
-    of_angle, _ = sine_cosine(min(max(at, -_RIGHT), _RIGHT))
+    of_angle = _sine(min(max(at, -_RIGHT), _RIGHT))
     sine = of_angle if turned else min(max((across + at * by_across) / radius, -_VERTICAL), _VERTICAL)
     cosine = np.sqrt((_1 - sine) * (_1 + sine))
     part_a, part_b = abs(by_across), abs(draft[BY_ALONG, k])

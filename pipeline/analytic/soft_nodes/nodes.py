@@ -1,8 +1,9 @@
 """The table of a cloth: fixed nodes for wide footprints, grids of horizons for narrow ones.
 
     wide     The nodes of every group are fixed. A node has the mean and spread of its horizon for some azimuths, over
-             the box of the node and over all cells of its group: its visibility is a ramp, not a step.
-    narrow   Nodes are placed in footprint and piece; horizons are read from a grid of the piece.
+             the box of the node and over all cells of its group: a light reaches it by a ramp, not a step. What a
+             viewer sees of its box is tabulated (seen_areas).
+    narrow   Nodes are placed on lines of view rays; a light's horizons are read from a grid of the piece.
 
 Nodes come in blocks of BLOCK_NODES, the width of vector units. Horizons are sines of elevation, compared with the z of
 a direction; azimuths are even in the diamond angle, which needs no arc tangent. Grids hold 8 bits a value; the more
@@ -12,8 +13,6 @@ different pieces there are, the coarser they are, so that a table stays near a m
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -32,7 +31,6 @@ from pipeline.analytic.soft_nodes.groups import (
     piece_rows,
 )
 from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES, rays_left, seen_areas
-from pipeline.analytic.soft_nodes.waves import TOGETHER, tabulate_waves
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import ClothSide, cloth_side
 from pipeline.truth.geometry.heightfield import (
@@ -66,16 +64,10 @@ _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 EVEN: Final = 0.42
 """Of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %."""
 
-_NO_RAYS: Final[dict[str, Any]] = {
-    "floats": np.zeros((0, 4)), "crowns": np.zeros(0), "heights": np.zeros((0, 8)), "highest": 0.0, "lowest": 0.0,
-    "plane": 0.0, "spots": np.zeros((0, 4, COLUMNS), np.float32), "shown": np.zeros(0, np.float32),
-    "areas": np.zeros((0, 0, 0, BLOCK_NODES), np.float32),
-}  # fmt: skip
-
 _SHARPEST = 0.02  # least spread of a horizon
 
 # Columns of `SoftNodeTable.groups`.
-START, LINES, RULE_X, RULE_Y, GROUP_FAMILY = range(5)
+START, LINES, GROUP_FAMILY = range(3)
 # Columns of `SoftNodeTable.pieces` and of `SoftNodeTable.bounds`.
 FAMILY, BLOCK = range(2)
 X_LOW, X_HIGH, Y_LOW, Y_HIGH, SHIFT, CURVE, BOUND = range(7)
@@ -94,8 +86,8 @@ class SoftNodeTable(NamedTuple):
         Optical thickness T.
     float_length : float32 (2,)
         Mean length of the floats of each family over the cells that show them; 1 if none does.
-    uniform, waves_from : float
-        Deviations from which on a Gaussian covers the cloth evenly, and from which on the waves give its weights.
+    uniform : float
+        Deviation from which on a Gaussian covers the cloth evenly.
     starts : int64 (K + 2,)
         First block of the nodes of each kind of yarn, and of gaps; their end. Kinds are warps and wefts, K = 2, or all
         ends, then all picks.
@@ -107,18 +99,10 @@ class SoftNodeTable(NamedTuple):
         Share of the cloth's area that a node represents.
     mean, sharpness : float32 (AZIMUTHS, B, BLOCK_NODES)
         Mean of the horizon, and 1 over the width of its ramp, sqrt 12 standard deviations.
-    groups : uint32 (K, 5)
-        First node, lines of nodes, rules along x and y, family.
-    lines_per_cell : float
-        Mean number of lines of nodes in a cell.
+    groups : uint32 (K, 3)
+        First node, lines of nodes, family.
     group_starts, cell_groups : uint32
         The groups in cell c = pick ends + end are cell_groups[group_starts[c] : group_starts[c + 1]].
-    places_x, weights_x, places_y, weights_y : float32 (R COLUMNS,)
-        Rules one after another, along both axes; shorter ones are filled with weights of 0.
-    waves : int64 (H, 2)
-    wave_size : float32 (H,)
-    wave_nodes : float32 (B, H / TOGETHER, 2 TOGETHER, BLOCK_NODES)
-        See `waves`.
     piece_starts : int64
         The pieces of cell c are those from piece_starts[c] to piece_starts[c + 1].
     pieces : int64 (P, 2)
@@ -137,10 +121,6 @@ class SoftNodeTable(NamedTuple):
     falls, grid_falls : float32 (curvatures, AZIMUTHS, B, BLOCK_NODES), uint8 (curvatures, …)
         Falls of `mean` and `grid` over curved cloth, as shares (curved_horizons); of no curvatures if the table was
         built without.
-    legendre : int
-        Most nodes along each axis of a piece that a narrow footprint covers in part.
-    narrow : float32
-        Deviation below which a footprint places its nodes.
     heights : float64 (2, 8)
         `HeightField.yarn` in double precision, in which heights are found.
     highest, lowest, plane : float
@@ -152,11 +132,9 @@ class SoftNodeTable(NamedTuple):
     areas : float32 (AZIMUTHS, SEEN_ANGLES, B, BLOCK_NODES)
         Area that a viewer sees of each node's box (seen_areas).
     view_lines : float
-        Deviation below which a footprint of rays places its nodes on lines.
+        Deviation below which a footprint places its nodes on lines.
     spacing : float
         Distance of lines and of their nodes, as a multiple of that at level 2.
-    parallax : bool
-        Whether footprints are patches of view rays; without, columns that only these need have no rows.
     rims : bool
         Whether view rays that meet a wall see the yarn's rim above it.
     """
@@ -166,7 +144,6 @@ class SoftNodeTable(NamedTuple):
     thickness: np.float32
     float_length: Float32
     uniform: float
-    waves_from: float
     starts: Index
     kinds: Index
     nodes: Float32
@@ -174,16 +151,8 @@ class SoftNodeTable(NamedTuple):
     mean: Float32
     sharpness: Float32
     groups: npt.NDArray[np.uint32]
-    lines_per_cell: float
     group_starts: npt.NDArray[np.uint32]
     cell_groups: npt.NDArray[np.uint32]
-    places_x: Float32
-    weights_x: Float32
-    places_y: Float32
-    weights_y: Float32
-    waves: Index
-    wave_size: Float32
-    wave_nodes: Float32
     piece_starts: Index
     pieces: Index
     bounds: Float32
@@ -195,8 +164,6 @@ class SoftNodeTable(NamedTuple):
     behind_grid: npt.NDArray[np.uint8]
     falls: Float32
     grid_falls: npt.NDArray[np.uint8]
-    legendre: int
-    narrow: np.float32
     heights: Float64
     highest: float
     lowest: float
@@ -206,7 +173,6 @@ class SoftNodeTable(NamedTuple):
     areas: Float32
     view_lines: float
     spacing: float
-    parallax: bool
     rims: bool
 
 
@@ -216,14 +182,13 @@ def tabulate(
     behind: bool = False,
     level: int = USUAL,
     curved: bool = False,
-    parallax: bool = True,
     rims: bool = True,
 ) -> SoftNodeTable:
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
     With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind,
-    with `curved` cloth that is curved towards the viewer. `level` is one of DETAILS. With `parallax` a footprint is a
-    patch of view rays; with `rims` those that meet a wall see the rim above it.
+    with `curved` cloth that is curved towards the viewer. `level` is one of DETAILS. With `rims` view rays that meet a
+    wall see the rim above it.
     """
     detail = DETAILS[level]
     model = cloth_side(fabric, TruthOptions())
@@ -260,44 +225,28 @@ def tabulate(
             of_nodes[:, indices], _ = _soft_horizons(group, across, along, of_grid)
         if behind:
             behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, across, along, behind_grid)
-    # Across a weft is along y.
-    wefts = [group.piece.family == WEFT for group in groups]
-    rules_x, of_x = _different(rule[weft] for rule, weft in zip(rules, wefts, strict=True))
-    rules_y, of_y = _different(rule[not weft] for rule, weft in zip(rules, wefts, strict=True))
-    rows = zip(groups, first_nodes, of_x, of_y, strict=True)
-    waves = tabulate_waves(groups, rules, first_nodes, stop, (ends, picks))
+    rows = zip(groups, first_nodes, strict=True)
     cell_groups: list[list[int]] = [[] for _ in range(ends * picks)]
     for index, group in enumerate(groups):
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    rays = partial(
-        _ray_columns, model, located, grid, groups, rules, first_nodes, evenly, starts[-2] * BLOCK_NODES, rims
-    )
+    rays = _ray_columns(model, located, grid, groups, rules, first_nodes, evenly, starts[-2] * BLOCK_NODES, rims)
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
         float_length=_float_lengths(front),
         uniform=EVEN * (max(ends, picks) if by_thread else longest_period(front)),
-        waves_from=waves.enough_from,
         starts=np.array(starts, np.int64),
         kinds=np.array(kinds, np.int64),
         nodes=np.ascontiguousarray(_in_blocks(nodes).transpose(1, 0, 2)),
         evenly=_in_blocks(evenly),
         mean=_in_blocks(mean),
         sharpness=_in_blocks(_sharpness(variance)),
-        groups=np.array([(first, group.lines, x, y, group.piece.family) for group, first, x, y in rows], np.uint32),
-        lines_per_cell=sum(group.lines * len(group.cells) for group in groups) / (ends * picks),
+        groups=np.array([(first, group.lines, group.piece.family) for group, first in rows], np.uint32),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
         cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
-        places_x=_filled([rule.places for rule in rules_x], edge=True),
-        weights_x=_filled([rule.weights for rule in rules_x], edge=False),
-        places_y=_filled([rule.places for rule in rules_y], edge=True),
-        weights_y=_filled([rule.weights for rule in rules_y], edge=False),
-        waves=waves.periods,
-        wave_size=waves.size,
-        wave_nodes=_together(waves.nodes),
         **_piece_columns(located),
         grid=grid,
         behind_mean=_in_blocks(behind_mean),
@@ -305,10 +254,8 @@ def tabulate(
         behind_grid=behind_grid,
         falls=_in_blocks(falls),
         grid_falls=grid_falls,
-        legendre=detail.legendre,
-        narrow=np.float32(detail.narrow),
-        **(rays() if parallax else _NO_RAYS),
-        view_lines=detail.lines, spacing=detail.spacing, parallax=parallax, rims=rims,
+        **rays,
+        view_lines=detail.lines, spacing=detail.spacing, rims=rims,
     )  # fmt: skip
 
 
@@ -442,19 +389,6 @@ def _piece_columns(located: _Located) -> dict[str, Any]:
     }
 
 
-def _different(rules: Iterable[Rule]) -> tuple[list[Rule], list[int]]:
-    """Return the different ones of some rules, and which of them each is; equal rules are one object."""
-    own = list(rules)
-    found = {id(rule): rule for rule in own}
-    return list(found.values()), [list(found).index(id(rule)) for rule in own]
-
-
-def _together(waves: Float32) -> Float32:
-    """Return waves (H, 2, nodes) by blocks of nodes, TOGETHER of them side by side."""
-    blocks = waves.reshape(len(waves) // TOGETHER, 2 * TOGETHER, waves.shape[2] // BLOCK_NODES, BLOCK_NODES)
-    return np.ascontiguousarray(blocks.transpose(2, 0, 1, 3))
-
-
 def _sharpness(variance: Float64) -> Float64:
     """Return 1 over the width of the ramp of a horizon."""
     return np.asarray(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2)))
@@ -470,12 +404,6 @@ def _rules(group: PieceGroup) -> tuple[Rule, Rule]:
 def _bounds(piece: CellPiece) -> tuple[float, ...]:
     x, y = piece.box
     return (*x, *y, piece.offset, piece.sign * piece.curve, min(piece.steepest, LARGEST_SINE))
-
-
-def _filled(rows: list[Float64], edge: bool) -> Float32:
-    """Return rows of COLUMNS numbers, the last one repeated if `edge`, else 0."""
-    padded = [np.pad(row, (0, COLUMNS - len(row)), mode="edge" if edge else "constant") for row in rows]
-    return np.array(padded, np.float32).ravel()
 
 
 def _float_lengths(front: HeightField) -> Float32:

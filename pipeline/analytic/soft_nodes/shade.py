@@ -23,11 +23,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, LEVELS
-from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, spread, tangent, turning
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES
+from pipeline.analytic.torus_frame import sigma, spread
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel
-from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WEFT
+from pipeline.truth.geometry.heightfield import WEFT
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
 NODE_SUMS: Final = 10
@@ -47,13 +47,6 @@ FADED: Final = np.float32(1e-4)
 TINY: Final = np.float32(1e-18)
 """Keeps a quotient of sums finite."""
 
-BLOCK_ROWS: Final = 8
-"""Rows of a block of nodes placed in a footprint."""
-
-SIN, COS, ALONG, HALF_V, HALF_ALONG, WEIGHT, TURN, LIMIT = range(BLOCK_ROWS)
-"""Sine and cosine of v; position along the yarn from its float's middle; half boxes across and along; weight; curve,
-negative beneath; largest sine of u."""
-
 Eight = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
 Ten = tuple[
     np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32,
@@ -68,9 +61,6 @@ _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) o
 _GAUSS = np.float32(1.0 / math.sqrt(3.0))
 _WHOLE = np.float32(1.001)  # a box that is seen, with the tail of its ramp
 _AWAY = np.float32(0.05)  # cosine to the viewer of a fixed node that faces away; a part of its box may not
-_LEVELS = np.float32(LEVELS)
-# A horizon's ramp has a faint tail, so that a patch hidden almost wholly still has a colour: that of its edge.
-_TAIL = np.float32(0.0005)
 
 
 class YarnDirections(NamedTuple):
@@ -129,12 +119,9 @@ class NodeHorizons(NamedTuple):
 
 
 class GridHorizons(NamedTuple):
-    """Grids of horizons, and what leads from a node's cell to those at the azimuths around a direction.
+    """Grids of horizons, and what leads from a node's cell to those at the azimuths around a direction."""
 
-    Over curved cloth each node has a cell of its own, a number in single precision.
-    """
-
-    grid: npt.NDArray[np.uint8] | Float32
+    grid: npt.NDArray[np.uint8]
     low: np.uint32
     high: np.uint32
     turn: np.float32
@@ -249,12 +236,6 @@ def node_behind(
 
 
 @inlined_fast_kernel
-def _seen(over: np.float32) -> np.float32:
-    """Return the share of a node that the viewer sees, `over` widths of the ramp above its horizon."""
-    return ramp(over) + _TAIL / (_1 + over * over)
-
-
-@inlined_fast_kernel
 def _seen_of(at: NodeFrame, area: np.float32, freed: np.float32, d: YarnDirections) -> np.float32:
     """Return the share of a node's box that the viewer sees, walls included, given its area over flat cloth."""
     facing = d.ox * at.nx + d.oy * at.ny + d.oz * at.nz
@@ -276,19 +257,6 @@ def _fixed_node(
 
 
 @inlined_fast_kernel
-def _footprint_node(
-    nodes: Float32, k: int, radius: np.float32, fibre: Fibre, hx: np.float32, hy: np.float32, hz: np.float32
-) -> tuple[NodeFrame, np.float32, np.float32]:
-    """Return the same of a node placed in a footprint."""
-    angles, inner = bend(nodes[SIN, k], nodes[COS, k], radius, nodes[ALONG, k], nodes[TURN, k], nodes[LIMIT, k])
-    nx, ny, nz = normal(angles, fibre.beta)
-    t = tangent(angles, fibre)
-    by_u, by_v = turning(hx, hy, hz, t, angles, fibre)
-    along = nodes[HALF_ALONG, k] * inner / angles.cos_u * _GAUSS * by_u
-    return NodeFrame(nx, ny, nz, _1 / nz, t.x, t.y, t.z), along, nodes[HALF_V, k] * _GAUSS * by_v
-
-
-@inlined_fast_kernel
 def yarn_layer(alpha: np.float32, thickness: np.float32, blend: np.float32) -> YarnLayer:
     """Return the optics of a family."""
     square = alpha * alpha
@@ -300,15 +268,14 @@ def shade_fixed(
     nodes: Float32,
     weight: Float32,
     light: NodeHorizons,
-    viewer: NodeHorizons,
-    areas: Float32 | None,
+    areas: Float32,
     freed: Float32,
     d: YarnDirections,
     alpha: np.float32,
     thickness: np.float32,
     blend: np.float32,
 ) -> Ten:
-    """Return the sums over fixed nodes of one family; `areas` and `freed` as in `Scratch`, None without parallax."""
+    """Return the sums over fixed nodes of one family; `areas` and `freed` as in `Scratch`."""
     layer = yarn_layer(alpha, thickness, blend)
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
@@ -316,12 +283,8 @@ def shade_fixed(
         for k in range(BLOCK_NODES):
             lit = ramp(above(d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
-            if areas is None:
-                seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
-                total = add_node(total, d, at, along, across, seen, lit, weight[b, k], layer)
-            else:
-                seen = _seen_of(at, areas[b, k], freed[b, k], d)
-                total = add_node(total, d, at, along, across, seen, lit, weight[b, k], layer, _AWAY)
+            seen = _seen_of(at, areas[b, k], freed[b, k], d)
+            total = add_node(total, d, at, along, across, seen, lit, weight[b, k], layer, _AWAY)
     return total
 
 
@@ -330,8 +293,7 @@ def shade_fixed_behind(
     nodes: Float32,
     weight: Float32,
     light: NodeHorizons,
-    viewer: NodeHorizons,
-    areas: Float32 | None,
+    areas: Float32,
     freed: Float32,
     d: YarnDirections,
     alpha: np.float32,
@@ -346,12 +308,8 @@ def shade_fixed_behind(
         for k in range(BLOCK_NODES):
             lit = ramp(above(-d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
-            if areas is None:
-                seen = _seen(above(d.oz, viewer.low[b, k], viewer.high[b, k], viewer.turn, viewer.sharpness[b, k]))
-                of_node = node_behind(d, at, along, across, seen, lit, weight[b, k], layer)
-            else:
-                seen = _seen_of(at, areas[b, k], freed[b, k], d)
-                of_node = node_behind(d, at, along, across, seen, lit, weight[b, k], layer, _AWAY)
+            seen = _seen_of(at, areas[b, k], freed[b, k], d)
+            of_node = node_behind(d, at, along, across, seen, lit, weight[b, k], layer, _AWAY)
             a += of_node[0]
             c += of_node[1]
             s += of_node[2]
@@ -360,86 +318,11 @@ def shade_fixed_behind(
     return a, c, s, a0, through
 
 
-@inlined_fast_kernel
-def _over(horizons: GridHorizons, cell: np.uint32, level: np.float32, sharpness: np.float32) -> np.float32:
-    """Return by how many widths of the ramp a direction clears the horizon of a cell."""
-    low, high = horizons.grid[cell + horizons.low], horizons.grid[cell + horizons.high]
-    return above(level, np.float32(low), np.float32(high), horizons.turn, sharpness)
-
-
-@fast_kernel
-def shade_footprint(
-    nodes: Float32,
-    cells: npt.NDArray[np.uint32],
-    light: GridHorizons,
-    viewer: GridHorizons,
-    sharpness: np.float32,
-    d: YarnDirections,
-    yarn: Float32,
-    thickness: np.float32,
-) -> Ten:
-    """Return the sums over nodes placed in a footprint; `cells` is each one's cell of its grid at the first azimuth."""
-    radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
-    hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
-    level_i, level_o, sharp = d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
-    total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
-    for k in range(len(cells)):
-        lit = ramp(_over(light, cells[k], level_i, sharp))
-        seen = _seen(_over(viewer, cells[k], level_o, sharp))
-        at, along, across = _footprint_node(nodes, k, radius, fibre, hx, hy, hz)
-        total = add_node(total, d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
-    return total
-
-
-@fast_kernel
-def shade_footprint_behind(
-    nodes: Float32,
-    cells: npt.NDArray[np.uint32],
-    light: GridHorizons,
-    viewer: GridHorizons,
-    sharpness: np.float32,
-    d: YarnDirections,
-    yarn: Float32,
-    thickness: np.float32,
-) -> Five:
-    """Return the sums over nodes placed in a footprint with the light behind; `light` has the grids of the back."""
-    radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    alpha = yarn[ALPHA]
-    layer = YarnLayer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, yarn[BLEND])
-    hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
-    level_i, level_o, sharp = -d.iz * _LEVELS, d.oz * _LEVELS, sharpness / _LEVELS
-    a, c, s, a0, through = _0, _0, _0, _0, _0
-    for k in range(len(cells)):
-        lit = ramp(_over(light, cells[k], level_i, sharp))
-        seen = _seen(_over(viewer, cells[k], level_o, sharp))
-        at, along, across = _footprint_node(nodes, k, radius, fibre, hx, hy, hz)
-        of_node = node_behind(d, at, along, across, seen, lit, nodes[WEIGHT, k], layer)
-        a += of_node[0]
-        c += of_node[1]
-        s += of_node[2]
-        a0 += of_node[3]
-        through += of_node[4]
-    return a, c, s, a0, through
-
-
 @inlined_kernel
 def write_sums(sums: Ten | Five, result: Float32) -> None:
     """Write the sums of a family to its row."""
     for q in range(len(sums)):
         result[q] = sums[q]
-
-
-@fast_kernel
-def shade_gaps(
-    weight: Float32, low_o: Float32, high_o: Float32, sharpness_o: Float32, turn_o: np.float32, oz: np.float32
-) -> np.float32:
-    """Return the area seen through gaps, of fixed nodes."""
-    area = _0
-    for b in range(len(weight)):
-        for k in range(BLOCK_NODES):
-            area += weight[b, k] * ramp(above(oz, low_o[b, k], high_o[b, k], turn_o, sharpness_o[b, k]))
-    return area * oz
 
 
 @fast_kernel

@@ -23,7 +23,7 @@ class AnalyticOptions(Options):
     footprint: Gaussian = "gaussian"
     parallax: bool = True
     """True if footprints are patches of view rays, or points view rays; must be that of the truth. A method that knows
-    the fabric plane alone declares `Literal[False]`."""
+    only one of both declares a `Literal`."""
 
     def methods(self) -> Sequence[Method]:
         """Return one method for each setting."""

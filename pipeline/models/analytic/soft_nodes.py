@@ -32,13 +32,13 @@ _SHARED: Final[WeakValueDictionary[tuple[object, ...], PerFabric[SoftNodeTable]]
 
 
 def soft_tables(
-    level: int, behind: bool = False, curved: bool = False, parallax: bool = True, rims: bool = True
+    level: int, behind: bool = False, curved: bool = False, rims: bool = True
 ) -> PerFabric[SoftNodeTable]:
     """Return the tables of fabrics at a level of detail, which all methods at hand share."""
     from pipeline.analytic.soft_nodes.nodes import tabulate
 
-    tables = PerFabric(lambda fabric: tabulate(fabric, False, behind, level, curved, parallax, rims))
-    return _SHARED.setdefault((level, behind, curved, parallax, rims), tables)
+    tables = PerFabric(lambda fabric: tabulate(fabric, False, behind, level, curved, rims))
+    return _SHARED.setdefault((level, behind, curved, rims), tables)
 
 
 class SoftNodesOptions(AnalyticOptions):
@@ -52,6 +52,8 @@ class SoftNodesOptions(AnalyticOptions):
     model: Literal["soft_nodes"] = "soft_nodes"
     levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
     """Levels of detail k, from few nodes to many; each is a row of the tables."""
+    parallax: Literal[True] = True
+    """Footprints are patches of view rays."""
     walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
 
@@ -62,7 +64,7 @@ class SoftNodesOptions(AnalyticOptions):
 
     def methods(self) -> list[SoftNodes]:
         """Return one method for each level."""
-        return [SoftNodes(level, self.name, self.parallax, self.walls) for level in self.levels]
+        return [SoftNodes(level, self.name, self.walls) for level in self.levels]
 
 
 class SoftNodes(Analytic["SoftNodeTable"]):
@@ -74,24 +76,22 @@ class SoftNodes(Analytic["SoftNodeTable"]):
         Level of detail, one of `pipeline.analytic.soft_nodes.groups.DETAILS`.
     name : str
         Name of the method.
-    parallax : bool
-        Whether footprints are patches of view rays.
     walls : {"left_out", "rim"}
         What view rays see that meet a wall.
     """
 
     turns: ClassVar[bool] = SoftNodesOptions.turns
 
-    def __init__(self, level: int = 2, name: str = "soft_nodes", parallax: bool = True, walls: Walls = "rim") -> None:
+    def __init__(self, level: int = 2, name: str = "soft_nodes", walls: Walls = "rim") -> None:
         from pipeline.analytic.soft_nodes.features import read_queries
 
         def read(table: SoftNodeTable, queries: Queries, seed: int) -> Float32:
             return in_chunks(queries, lambda part: read_queries(table, part).components)
 
-        rays = parallax, walls == "rim"
-        super().__init__(SoftNodesOptions(name=name), level, soft_tables(level, False, False, *rays), read)
-        self._both_sides = soft_tables(level, True, False, *rays)
-        self._curved = soft_tables(level, True, True, *rays)
+        rims = walls == "rim"
+        super().__init__(SoftNodesOptions(name=name), level, soft_tables(level, False, False, rims), read)
+        self._both_sides = soft_tables(level, True, False, rims)
+        self._curved = soft_tables(level, True, True, rims)
 
     def behind(self, fabric: Fabric, queries: Queries) -> Float32:
         """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""

@@ -44,8 +44,8 @@ class SelvageOptions(Options):
     bound: bool = True
     """Bound each component by the answer of the soft nodes without shadows: no diffuse light is then gained."""
     footprint: Gaussian = "gaussian"
-    parallax: bool = True
-    """True if the footprints of its soft nodes are patches of view rays; must be that of the truth."""
+    parallax: Literal[True] = True
+    """The footprints of its soft nodes are patches of view rays."""
     walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
 
@@ -65,9 +65,9 @@ class SelvageOptions(Options):
     """Weight of the squared error of the whole colour beside those of the components."""
 
     @property
-    def rays(self) -> tuple[bool, bool]:
-        """Two truths: footprints are patches of view rays, and those that meet a wall see a rim."""
-        return self.parallax, self.walls == "rim"
+    def rims(self) -> bool:
+        """Whether view rays that meet a wall see a rim."""
+        return self.walls == "rim"
 
     @property
     def kinds(self) -> frozenset[str]:

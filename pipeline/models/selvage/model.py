@@ -113,7 +113,7 @@ class SelvageNetwork(Trainable):
         self.errors = ErrorNetwork(options, FEATURES)
         levels = (options.level, options.finest)
         self._tables, self._finest = (
-            [tabulate(fabric, False, False, level, False, *options.rays) for fabric in fabrics] for level in levels
+            [tabulate(fabric, False, False, level, False, options.rims) for fabric in fabrics] for level in levels
         )
         self.expect(0)
         if fabrics:
@@ -272,8 +272,8 @@ class Selvage(_OverNodes):
         self.bound = network.options.bound
         self._network = network.eval()
         self._cloths = PerFabric(self._tabulate)
-        self.nodes = SoftNodes(network.options.level, self.name, network.options.parallax, network.options.walls)
-        self._tables = soft_tables(network.options.level, False, False, *network.options.rays)
+        self.nodes = SoftNodes(network.options.level, self.name, network.options.walls)
+        self._tables = soft_tables(network.options.level, False, False, network.options.rims)
         self._correction = _Folded([*network.hidden, network.last], network)
         self._estimate = _Folded([network.errors.hidden, network.errors.last], network)
         self._answering = Answering(self._network, self._components)
@@ -399,7 +399,7 @@ class Adaptive(_OverNodes, Around):
         super().__init__(selvage, f"error {100 * error:g} %")
         self.domain, self.error = selvage.domain, error
         self._selvage = selvage
-        self.nodes = SoftNodes(selvage.options.finest, selvage.name, selvage.options.parallax, selvage.options.walls)
+        self.nodes = SoftNodes(selvage.options.finest, selvage.name, selvage.options.walls)
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric for both levels of soft nodes and for the fallback, once."""

@@ -30,13 +30,16 @@ from pipeline.truth.monte_carlo import OWEN, query_directions, sample_rows
 from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.rules import (
     BOX_WEIGHT,
+    CUTS,
     KIND,
     MASS,
     PART,
     RULES,
     TURNING,
+    Patch,
     cut_parts,
     integrate,
+    lean_of,
     rectangles,
 )
 
@@ -69,7 +72,7 @@ def integrate_rows(
     picks, ends = cloth.front.top.shape
     everything = rectangles(cloth.front, np.ones((picks, ends), np.bool_))
     kinds, share = rectangles(cloth.front, different), picks * ends / different.sum()
-    across, along = np.zeros((32, 3)), np.zeros((32, 3))
+    across, along = np.zeros((CUTS, 3)), np.zeros((CUTS, 3))
     grid, states = np.zeros((64, 64, POINT_SUMS)), np.zeros((64, 64), np.int64)
     for row in range(rows):
         directions = query_directions(columns, row)
@@ -80,8 +83,10 @@ def integrate_rows(
         x_axis = Axis(cloth.shape, columns.u[row], sigma_x, float(ends))
         y_axis = Axis(cloth.shape, columns.v[row], sigma_y, float(picks))
         even = cloth.shape == GAUSSIAN and sigma_x >= _EVEN * ends and sigma_y >= _EVEN * picks
-        pieces = kinds if even else everything
-        parts = _all_parts(pieces, cloth.front.yarn, x_axis, y_axis, across, along)
+        wo = directions.viewer
+        x_lean, y_lean = lean_of(cloth, wo.x, wo.z), lean_of(cloth, wo.y, wo.z)
+        patch = Patch(cloth, directions, x_axis, y_axis, x_lean, y_lean)
+        parts = _all_parts(patch, kinds if even else everything, across, along)
         if even:
             parts[:, BOX_WEIGHT] *= share
             parts[:, MASS] *= share
@@ -92,7 +97,7 @@ def integrate_rows(
         changes, earlier = np.zeros((total, POINT_SUMS)), np.zeros((total, POINT_SUMS))
         costs, badness = np.zeros(total, np.int64), np.zeros(total)
         for p in range(total):
-            counts[row] += integrate(cloth, directions, parts[p], x_axis, y_axis, first, split, grid, states, sums[p])
+            counts[row] += integrate(patch, parts[p], first, split, grid, states, sums[p])
         cut = -1.0
         while True:
             refined = False
@@ -102,9 +107,7 @@ def integrate_rows(
                     earlier[p] = changes[p]
                     changes[p] = sums[p]
                     levels[p] += 1
-                    costs[p] = integrate(
-                        cloth, directions, parts[p], x_axis, y_axis, levels[p], split, grid, states, sums[p]
-                    )
+                    costs[p] = integrate(patch, parts[p], levels[p], split, grid, states, sums[p])
                     changes[p] = sums[p] - changes[p]
                     counts[row] += costs[p]
                     refined = True
@@ -126,16 +129,16 @@ def integrate_rows(
 
 
 @allocating_kernel
-def _all_parts(pieces: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, across: Float64, along: Float64) -> Float64:
+def _all_parts(patch: Patch, pieces: Float64, across: Float64, along: Float64) -> Float64:
     """Return the parts of all rectangles that the footprint reaches, (n, PART)."""
-    nothing = np.zeros((0, PART))
+    nothing, yarn = np.zeros((0, PART)), patch.cloth.front.yarn
     total = 0
     for p in range(len(pieces)):
-        total += cut_parts(pieces[p], yarn, x_axis, y_axis, across, along, nothing)
+        total += cut_parts(pieces[p], yarn, patch.x, patch.y, patch.x_lean, patch.y_lean, across, along, nothing)
     parts = np.zeros((total, PART))
     total = 0
     for p in range(len(pieces)):
-        total += cut_parts(pieces[p], yarn, x_axis, y_axis, across, along, parts[total:])
+        total += cut_parts(pieces[p], yarn, patch.x, patch.y, patch.x_lean, patch.y_lean, across, along, parts[total:])
     return parts
 
 
@@ -190,11 +193,13 @@ def _estimate_errors(
 def quadrature_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every row; the points of the two first rules may exceed `max_count`.
 
-    Rotated footprints are no product in x and y. Of patches that are almost hidden, rules may step over all that is
-    visible. Both are sampled as `owen` does, and only they depend on `seed`.
+    Rotated footprints are no product in x and y; rays over curved cloth may turn. Of patches that are almost hidden,
+    rules may step over all that is visible. All these are sampled as `owen` does, and only they depend on `seed`.
     """
     quarter = np.sin(2.0 * columns.angle)
     aligned = (np.abs(quarter) < 1e-6) | ((cloth.shape == GAUSSIAN) & (columns.sigma == columns.sigma_minor))
+    if cloth.parallax:
+        aligned &= columns.curvature <= 0.0
     answers = Raw.empty(len(index))
     if aligned.any():
         mean, error, count, barely = integrate_rows(

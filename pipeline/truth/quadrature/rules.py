@@ -6,12 +6,15 @@ rule of few nodes resolves it. The integrand jumps at shadow edges and bends whe
 the viewer, which it does along its edges under any slanted direction, shadows or not. Where a grid of nodes meets such
 edges, its lines in the direction that crosses more of them are cut at each, found by bisection, and every piece of a
 line gets a rule of its own. The integrand of the other direction is then smooth wherever edges run across the lines.
+
+A footprint of view rays has its density where the ray to a point of the yarn crosses the reference plane: a point of
+height h at p counts as p - (h - z0) wo_xy / wo_z. All that is seen is integrated so; walls are left out.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -32,11 +35,14 @@ from pipeline.truth.geometry.heightfield import (
     WARP,
     WEFT,
     HeightField,
+    surface_at,
 )
 from pipeline.truth.scattering.point import Directions, point_share
 
 _REACH: Final = 5.5
 _RESOLVED: Final = 3.0  # widest part in standard deviations: 8 nodes give its mass to 1e-7
+CUTS: Final = 64
+"""Most pieces that a rectangle is cut into along an axis. View rays at grazing angles may ask for more."""
 
 # Columns of a part: limits across (the angle v; at gaps x) and along, whose yarn, its middle and half width, the box's
 # weight, the larger of the angles that the surface turns by across and along, over the roughness, and its share of the
@@ -114,29 +120,40 @@ def density(axis: Axis, x: float) -> float:
     return max(1.0 + 2.0 * total, 0.0) / axis.repeat
 
 
-@kernel
-def _mass(axis: Axis, low: float, high: float) -> float:
-    """Return the integral of `density` over a resolved interval, by Simpson's rule: 4 % at worst."""
-    middle = 0.5 * (low + high)
-    return (high - low) / 6.0 * (density(axis, low) + 4.0 * density(axis, middle) + density(axis, high))
+class Lean(NamedTuple):
+    """How far view rays lead along x or y: by how much for each unit of height, at least and at most over the cloth."""
+
+    slope: float
+    least: float
+    most: float
 
 
 @kernel
-def _cut(axis: Axis, low: float, high: float, pieces: Float64) -> int:
+def lean_of(cloth: ClothSide, towards: float, cosine: float) -> Lean:
+    """Return the lean of view rays of a direction: its component along an axis, and its cosine; 0 without parallax."""
+    slope = towards / cosine if cloth.parallax else 0.0
+    highest, lowest = cloth.front.highest - cloth.plane, cloth.front.lowest - cloth.plane
+    return Lean(slope, min(slope * highest, slope * lowest), max(slope * highest, slope * lowest))
+
+
+@kernel
+def _cut(axis: Axis, lean: Lean, low: float, high: float, pieces: Float64) -> int:
     """Write the pieces of [low, high] that the footprint reaches, (from, to, weight); return their number."""
     count = 0
     if axis.shape == GAUSSIAN:
-        reach = _REACH * axis.sigma
+        before, after = _REACH * axis.sigma - lean.least, _REACH * axis.sigma + lean.most
         # From half a repeat on, images meet: the folded kernel is taken everywhere.
-        everywhere = reach >= 0.5 * axis.repeat
-        first = 0.0 if everywhere else math.ceil((low - axis.centre - reach) / axis.repeat)
-        last = 0.0 if everywhere else math.floor((high - axis.centre + reach) / axis.repeat)
+        everywhere = before + after >= axis.repeat
+        first = 0.0 if everywhere else math.ceil((low - axis.centre - after) / axis.repeat)
+        last = 0.0 if everywhere else math.floor((high - axis.centre + before) / axis.repeat)
         image = first
         while image <= last:
             middle = axis.centre + image * axis.repeat
-            start = low if everywhere else max(low, middle - reach)
-            stop = high if everywhere else min(high, middle + reach)
-            number = math.ceil((stop - start) / (_RESOLVED * axis.sigma))
+            start = low if everywhere else max(low, middle - before)
+            stop = high if everywhere else min(high, middle + after)
+            # On a round yarn a ray's place changes by up to sqrt(1 + slope^2) times the arc.
+            number = math.ceil((stop - start) * math.sqrt(1.0 + lean.slope**2) / (_RESOLVED * axis.sigma))
+            number = min(number, CUTS - count)
             for k in range(number):
                 pieces[count, 0] = start + (stop - start) * k / number
                 pieces[count, 1] = start + (stop - start) * (k + 1) / number
@@ -164,17 +181,39 @@ def _cut(axis: Axis, low: float, high: float, pieces: Float64) -> int:
 
 
 @kernel
+def _mass(axis: Axis, lean: Lean, low: float, high: float) -> float:
+    """Return the integral of `density` over a resolved interval, by Simpson's rule: 4 % at worst, heights apart.
+
+    Over heights the density is taken to be that of a wider kernel.
+    """
+    wider = Axis(axis.shape, axis.centre + 0.5 * (lean.least + lean.most), axis.sigma, axis.repeat)
+    if lean.most > lean.least:
+        wider = Axis(axis.shape, wider.centre, axis.sigma + 0.25 * (lean.most - lean.least), axis.repeat)
+    middle = 0.5 * (low + high)
+    return (high - low) / 6.0 * (density(wider, low) + 4.0 * density(wider, middle) + density(wider, high))
+
+
+@kernel
 def cut_parts(
-    rectangle: Float64, yarn: Float64, x_axis: Axis, y_axis: Axis, across: Float64, along: Float64, parts: Float64
+    rectangle: Float64,
+    yarn: Float64,
+    x_axis: Axis,
+    y_axis: Axis,
+    x_lean: Lean,
+    y_lean: Lean,
+    across: Float64,
+    along: Float64,
+    parts: Float64,
 ) -> int:
     """Write the parts of a rectangle that the footprint reaches if `parts` has rows; return their number.
 
     `across` and `along` are scratch: what is cut along each axis of the yarn.
     """
     first, second, at = (y_axis, x_axis, 2) if rectangle[4] == WEFT else (x_axis, y_axis, 0)
+    first_lean, second_lean = (y_lean, x_lean) if rectangle[4] == WEFT else (x_lean, y_lean)
     low, high = rectangle[at], rectangle[at + 1]
-    columns = _cut(first, low, high, across)
-    rows = _cut(second, rectangle[2 - at], rectangle[3 - at], along) if columns > 0 else 0
+    columns = _cut(first, first_lean, low, high, across)
+    rows = _cut(second, second_lean, rectangle[2 - at], rectangle[3 - at], along) if columns > 0 else 0
     if len(parts) > 0:
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         for k in range(columns):
@@ -188,7 +227,7 @@ def cut_parts(
                 part[KIND], part[MIDDLE], part[HALF] = rectangle[4], middle, half
                 part[BOX_WEIGHT] = across[k, 2] * along[n, 2]
                 x, y = (along[n], across[k]) if rectangle[4] == WEFT else (across[k], along[n])
-                part[MASS] = part[BOX_WEIGHT] * _mass(x_axis, x[0], x[1]) * _mass(y_axis, y[0], y[1])
+                part[MASS] = part[BOX_WEIGHT] * _mass(x_axis, x_lean, x[0], x[1]) * _mass(y_axis, y_lean, y[0], y[1])
                 if rectangle[4] != GAP:
                     turn = max(to - from_, rectangle[5] * (along[n, 1] - along[n, 0]))
                     part[TURNING] = turn / yarn[int(rectangle[4]), ALPHA]
@@ -204,29 +243,41 @@ _NODES: Final = np.concatenate([nodes for nodes, _ in _RULES])  # rule of 2^(l +
 _WEIGHTS: Final = np.concatenate([weights for _, weights in _RULES])
 
 
-@kernel
-def _weight_across(part: Float64, axis: Axis, a: float) -> float:
-    """Return kernel times length for each unit of the coordinate across."""
-    if part[KIND] == GAP:
-        return density(axis, a)
-    stretch: float = part[HALF] * math.cos(a)
-    return stretch * density(axis, part[MIDDLE] + part[HALF] * math.sin(a))
+class Patch(NamedTuple):
+    """A query's patch of one side of a cloth."""
+
+    cloth: ClothSide
+    directions: Directions
+    x: Axis
+    y: Axis
+    x_lean: Lean
+    y_lean: Lean
 
 
 @kernel
-def _shares(cloth: ClothSide, directions: Directions, part: Float64, a: float, b: float, shares: Float64) -> int:
-    """Write the shares of a point of a part in the sums; return which of viewer, light and back it sees, as bits."""
+def _shares(patch: Patch, part: Float64, a: float, b: float, shares: Float64) -> int:
+    """Write the shares of a point of a part in the sums; return which of viewer, light and back it sees, as bits.
+
+    Shares are those of a unit of the coordinates across and along.
+    """
+    cloth, directions = patch.cloth, patch.directions
     picks, ends = cloth.front.top.shape
     across = a if part[KIND] == GAP else part[MIDDLE] + part[HALF] * math.sin(a)
     x, y = (b, across) if part[KIND] == WEFT else (across, b)
     x = x - ends if x >= ends else x
     y = y - picks if y >= picks else y
     family, area, specular, diffuse, through = point_share(cloth.front, cloth.back, x, y, directions, cloth.choices)
+    above = 0.0
+    if cloth.parallax:
+        above = surface_at(cloth.front, x, y, int(x), int(y))[2] - cloth.plane
+    weight = density(patch.x, x - patch.x_lean.slope * above) * density(patch.y, y - patch.y_lean.slope * above)
+    if part[KIND] != GAP:
+        weight *= part[HALF] * math.cos(a)
     shares[:] = 0.0
     if family != GAP:
-        shares[family], shares[2 + family] = specular, diffuse
-    shares[4] = through
-    shares[AREA_SUM] = directions.viewer.z if cloth.projected else area
+        shares[family], shares[2 + family] = weight * specular, weight * diffuse
+    shares[4] = weight * through
+    shares[AREA_SUM] = weight * (directions.viewer.z if cloth.projected else area)
     state = 1 if area > 0.0 else 0
     if specular + diffuse > 0.0:
         state += 2
@@ -237,11 +288,8 @@ def _shares(cloth: ClothSide, directions: Directions, part: Float64, a: float, b
 
 @allocating_kernel
 def integrate(
-    cloth: ClothSide,
-    directions: Directions,
+    patch: Patch,
     part: Float64,
-    x_axis: Axis,
-    y_axis: Axis,
     level: int,
     split: int,
     grid: Float64,
@@ -250,13 +298,12 @@ def integrate(
 ) -> int:
     """Write the sums over a part with 2^(level + 1) nodes an axis; return the points used."""
     n, rule = 2 << level, (2 << level) - 2
-    across, along = (y_axis, x_axis) if part[KIND] == WEFT else (x_axis, y_axis)
     half_a, half_b = 0.5 * (part[A1] - part[A0]), 0.5 * (part[B1] - part[B0])
     mid_a, mid_b = 0.5 * (part[A1] + part[A0]), 0.5 * (part[B1] + part[B0])
     for i in range(n):
         for j in range(n):
             a, b = mid_a + half_a * _NODES[rule + i], mid_b + half_b * _NODES[rule + j]
-            states[i, j] = _shares(cloth, directions, part, a, b, grid[i, j])
+            states[i, j] = _shares(patch, part, a, b, grid[i, j])
     used = n * n
 
     # Lines run in the direction that crosses more edges.
@@ -272,10 +319,10 @@ def integrate(
     for k in range(n):
         if inner_a:
             fixed = mid_b + half_b * _NODES[rule + k]
-            outer = half_b * _WEIGHTS[rule + k] * density(along, fixed)
+            outer = half_b * _WEIGHTS[rule + k]
         else:
             fixed = mid_a + half_a * _NODES[rule + k]
-            outer = half_a * _WEIGHTS[rule + k] * _weight_across(part, across, fixed)
+            outer = half_a * _WEIGHTS[rule + k]
         line[:] = 0.0
         begin, first = middle - half, 0
         for m in range(1, n + 1):
@@ -288,7 +335,7 @@ def integrate(
                 for _ in range(_BISECTIONS):
                     centre = 0.5 * (low + high)
                     a, b = (centre, fixed) if inner_a else (fixed, centre)
-                    if _shares(cloth, directions, part, a, b, point) == before:
+                    if _shares(patch, part, a, b, point) == before:
                         low = centre
                     else:
                         high = centre
@@ -297,21 +344,16 @@ def integrate(
             if m == n and first == 0:
                 # No edge: the grid's own nodes serve.
                 for i in range(n):
-                    t = middle + half * _NODES[rule + i]
-                    weight = half * _WEIGHTS[rule + i]
-                    weight *= _weight_across(part, across, t) if inner_a else density(along, t)
-                    line += weight * (grid[i, k] if inner_a else grid[k, i])
-            elif before != 0 or cloth.projected:
+                    line += half * _WEIGHTS[rule + i] * (grid[i, k] if inner_a else grid[k, i])
+            elif before != 0 or patch.cloth.projected:
                 size = 2
                 while size < m - first:
                     size *= 2
                 for i in range(size - 2, 2 * size - 2):
                     t = 0.5 * (begin + finish) + 0.5 * (finish - begin) * _NODES[i]
-                    weight = 0.5 * (finish - begin) * _WEIGHTS[i]
-                    weight *= _weight_across(part, across, t) if inner_a else density(along, t)
                     a, b = (t, fixed) if inner_a else (fixed, t)
-                    _shares(cloth, directions, part, a, b, point)
-                    line += weight * point
+                    _shares(patch, part, a, b, point)
+                    line += 0.5 * (finish - begin) * _WEIGHTS[i] * point
                 used += size
             begin, first = finish, m
         sums += outer * line

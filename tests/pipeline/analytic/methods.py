@@ -14,9 +14,9 @@ from pipeline.truth.options import TruthOptions
 
 @lru_cache(maxsize=64)
 def soft_table(fabric, level=2, behind=False):
-    """Return a table with grids of an eighth of the usual size: as exact in all that is compared here, and cheaper."""
+    """Return a table with grids of a quarter of the usual size: as exact in all that is compared here, and cheaper."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nodes, "_GRID_BYTES", 1 << 17)
+        patch.setattr(nodes, "_GRID_BYTES", 1 << 18)
         return nodes.tabulate(fabric, level=level, behind=behind)
 
 

@@ -5,7 +5,6 @@ import pytest
 
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.bounded import Bounded, counterpart, limited
-from pipeline.models.domain import Domain
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from tests.directions import sphere, unit
@@ -14,14 +13,12 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-@pytest.mark.parametrize("parallax", [False, True])
 @pytest.mark.parametrize(("name", "behind"), [("denim", 0.0), ("voile", 1.0)])
-def test_what_is_below_the_bound_stays_as_it_is(name, behind, parallax):
+def test_what_is_below_the_bound_stays_as_it_is(name, behind):
     # Shadows only take light away: the sums themselves lie below their bound.
     fabric = load_fabric(name)
     queries = draw_queries(QueryOptions(behind=behind), fabric.weave.repeat, 3, 0, 500)
-    sums = SoftNodes(parallax=parallax)
-    sums.domain = Domain.of({"truth": {"parallax": parallax}}, [fabric])
+    sums = SoftNodes()
     # Where there is no shadow both are one sum, rounded twice: what is cut, a last digit of 1, goes to the other yarn.
     expected = sums.predict(fabric, queries)
     np.testing.assert_allclose(Bounded(sums).predict(fabric, queries), expected, rtol=1e-6, atol=1.2e-7)

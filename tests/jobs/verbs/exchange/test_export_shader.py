@@ -60,7 +60,7 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(refusal, monke
     assert "not installed: onnxscript" in refusal(CLOTH, *shader, "selvage", "--language", "onnx")
     monkeypatch.setattr(verb, "covering_model", lambda *_: object())
     assert "has no shader; soft_nodes, selvage and" in refusal(CLOTH, *shader, "woven")
-    rays = Selvage(SelvageNetwork(SelvageOptions(parallax=True)))
+    rays = Selvage(SelvageNetwork(SelvageOptions()))
     monkeypatch.setattr(verb, "covering_model", lambda *_: rays)
     assert "was trained with parallax" in refusal(CLOTH, *shader, "rays")
     assert not (tmp_path / "x").exists()

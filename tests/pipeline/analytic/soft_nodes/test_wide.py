@@ -1,70 +1,58 @@
-"""Weights of fixed nodes: products against the Gaussian itself, waves against products."""
+"""Weights of fixed nodes: the Gaussian over all images where the viewer sees each of them."""
+
+import math
 
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.analytic.soft_nodes.nodes import LINES, START, tabulate
 from pipeline.analytic.soft_nodes.scratch import SoftQuery, scratch_for
-from pipeline.analytic.soft_nodes.wide import axis_densities, product_weights, wave_weights, waves_kept
+from pipeline.analytic.soft_nodes.wide import displaced_weights
 from pipeline.truth.footprint.mixture import narrow_axis
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
-def by_products(table, x, y, deviation_x, deviation_y, correlation=0.0):
-    """Return the weights by products; those of an ellipse at an angle from 401 points of its line."""
-    scratch = scratch_for(table, 1)
-    blur, line = np.sqrt(1.0 - abs(correlation)), np.sqrt(abs(correlation))
-    places = np.linspace(-4.0, 4.0, 401) if correlation else np.zeros(1)
-    shares = np.exp(-0.5 * places**2) / np.exp(-0.5 * places**2).sum()
-    deviation_x, deviation_y, shift_x, shift_y = (
-        blur * deviation_x, blur * deviation_y, line * deviation_x, np.sign(correlation) * line * deviation_y,
-    )  # fmt: skip
-    of_x = table.places_x, table.weights_x, scratch.density_x, scratch.touched_x, scratch.columns
-    of_y = table.places_y, table.weights_y, scratch.density_y, scratch.touched_y, scratch.rows
-    for place, share in zip(places, shares, strict=True):
-        columns, rows = (
-            axis_densities(*rules, np.float32(centre), np.float32(deviation), *written)
-            for (*rules, density, touched, found), centre, deviation in (
-                (of_x, x + place * shift_x, deviation_x),
-                (of_y, y + place * shift_y, deviation_y),
-            )
-            for written in [(density, touched, found)]
-        )
-        product_weights(table, scratch, columns, rows, np.float32(share))
-    return scratch.weight / (2.0 * np.pi * deviation_x * deviation_y)
-
-
-def by_waves(table, x, y, deviation_x, deviation_y, correlation=0.0):
-    scratch = scratch_for(table, 1)
-    narrowest = np.float32(narrow_axis(deviation_x, deviation_y, correlation))
-    footprint = (np.float32(n) for n in (deviation_x, deviation_y, correlation))
-    above, turn = (np.float32(n) for n in (0, 0, 1, 0, 0, 1)), np.float32(0)
-    look = SoftQuery(float(x), float(y), *footprint, narrowest, *above, 0, 1, turn, 0, 1, turn, turn, turn)
-    wave_weights(table, scratch, look, waves_kept(table.wave_size, narrowest))
-    return scratch.weight
+def weights(table, x, y, deviations, correlation, wo, bend=0.0):
+    scratch = scratch_for(table)
+    numbers = (*deviations, correlation, narrow_axis(*deviations, correlation), 0.0, 0.0, 1.0, *wo)
+    turn = np.float32(0)
+    look = SoftQuery(x, y, *(np.float32(n) for n in numbers), 0, 1, turn, 0, 1, turn, turn, np.float32(bend))
+    displaced_weights(table, scratch, look)
+    return scratch.lines
 
 
 @pytest.mark.parametrize("name", ["denim", slow("satin_8"), slow("herringbone")])
 @pytest.mark.parametrize("correlation", [slow(0.0), -0.4, 0.8])
-@pytest.mark.parametrize("stretch", [1.0, 1.7])
-def test_waves_are_the_gaussian_over_all_images(name, stretch, correlation):
-    """To a tenth of the largest: several waves of 1 % are missing, and tails of up to 3.4 % of the peak are cut off."""
+@pytest.mark.parametrize(("theta", "bend"), [(0.0, 0.0), (1.2, 0.0), (1.2, 0.05)])
+def test_they_are_the_gaussian_over_all_images(name, correlation, theta, bend):
+    """Cut off where it is 3.4 % of its peak; summed in double precision over every cell of nine repeats each way."""
     table = tabulate(load_fabric(name))
-    narrow = max(table.waves_from, 0.3)
-    for x, y, deviation in ((0.3, 0.7, narrow), (2.9, 1.2, 1.3 * narrow)):
-        deviation /= narrow_axis(1.0, stretch, correlation)
-        asked = (table, x, y, deviation, stretch * deviation, correlation)
-        waves, products = (of(*asked) for of in (by_waves, by_products))
-        assert np.abs(waves - products).max() < 0.1 * table.evenly.max()
-        if correlation == 0.0:
-            assert np.abs(waves - table.evenly).max() > 0.2 * table.evenly.max()  # far from even: the test can fail
-        assert waves.sum() == pytest.approx(1.0, abs=0.03)
-        assert products.sum() == pytest.approx(1.0, abs=0.03)
+    ends, picks = (int(n) for n in table.repeat)
+    x, y, deviations = 0.3, 1.7, (0.5, 0.8)
+    wo = math.sin(theta) * math.cos(0.7), math.sin(theta) * math.sin(0.7), math.cos(theta)
+    found, run = weights(table, x, y, deviations, correlation, wo, bend), math.tan(theta)
+    within = np.linalg.inv(np.outer(deviations, deviations) * [[1.0, correlation], [correlation, 1.0]])
+    expected = np.zeros(found.shape)
+    for cell in range(ends * picks):
+        for group in table.cell_groups[table.group_starts[cell] : table.group_starts[cell + 1]]:
+            start, lines = int(table.groups[group, START]) // 8, int(table.groups[group, LINES])
+            spots = table.spots[start : start + lines].astype(np.float64)
+            over = spots[:, 3] - table.plane
+            distance = 2.0 * over * run / (1.0 + np.sqrt(1.0 + 2.0 * bend * run**2 * over))
+            for repeat in np.ndindex(9, 9):
+                dx = spots[:, 0] - distance * math.cos(0.7) + cell % ends + ends * (repeat[0] - 4) - x
+                dy = spots[:, 1] - distance * math.sin(0.7) + cell // ends + picks * (repeat[1] - 4) - y
+                square = within[0, 0] * dx**2 + 2.0 * within[0, 1] * dx * dy + within[1, 1] * dy**2
+                expected[start : start + lines] += spots[:, 2] * np.exp(-0.5 * square)
+    assert expected.max() > 4.0 * expected.mean()
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=0.04 * expected.max())
+    assert np.abs(found - expected).mean() < 2e-3 * expected.max()
 
 
 def test_from_uniform_on_the_cloth_is_covered_evenly():
     table = tabulate(load_fabric("cotton_twill"))
     assert table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
-    weights = by_waves(table, 0.4, 1.7, table.uniform, table.uniform)
-    np.testing.assert_allclose(weights, table.evenly, atol=0.07 * table.evenly.max())
+    wide = float(table.uniform)
+    found = weights(table, 0.4, 1.7, (wide, wide), 0.0, (0.6, 0.0, 0.8)) / (2.0 * np.pi * wide**2)
+    np.testing.assert_allclose(found.reshape(table.evenly.shape), table.evenly, atol=0.07 * table.evenly.max())

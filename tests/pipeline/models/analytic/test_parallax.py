@@ -22,7 +22,8 @@ from pipeline.truth.scattering.point import Choices, directions_of, ray_share
 from tests.pipeline.truth.cloths import LOPSIDED, direction, equal_queries, woven
 from tests.presets import slow
 
-RAYS = TruthOptions(estimator="owen", parallax=True, relative_error=0.01)
+RAYS = TruthOptions(estimator="owen", relative_error=0.01)
+PLANE = TruthOptions(estimator="owen", relative_error=0.01, parallax=False)
 
 
 def _queries(fabric, count, seed, sigma=(0.06, 0.3), steepest=78.0):
@@ -57,8 +58,12 @@ def _kind(queries, kind):
 
 def _error(method, fabric, queries, truth):
     method.prepare(fabric)
-    found = method.predict(fabric, queries).sum(axis=1, dtype=np.float64)
-    expected = truth.mean.sum(axis=1, dtype=np.float64)
+    return _differ(method.predict(fabric, queries), truth)
+
+
+def _differ(found, truth):
+    """Return the rms difference of the light of answers (N, 4) from that of the truth, over its root mean square."""
+    found, expected = (components.sum(axis=1, dtype=np.float64) for components in (found, truth.mean))
     return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
 
 
@@ -78,22 +83,22 @@ def _error(method, fabric, queries, truth):
     ],
 )
 def test_soft_nodes_see_what_view_rays_see(fabric, kind, most):
-    """Soft nodes differ from the truth with parallax by some per cent, those of the fabric plane by far more."""
+    """Soft nodes differ from the truth by some per cent, the truth of the fabric plane by far more."""
     queries = _kind(_queries(fabric, 60, 4), kind)
     truth = estimate(fabric, queries, RAYS, 1)
-    error = _error(SoftNodes(2, parallax=True), fabric, queries, truth)
+    error = _error(SoftNodes(2), fabric, queries, truth)
     assert error < most
-    assert _error(SoftNodes(2), fabric, queries, truth) > 1.5 * error
+    assert _differ(estimate(fabric, queries, PLANE, 1).mean, truth) > 1.5 * error
 
 
 def test_fixed_nodes_are_weighted_where_the_viewer_sees_them():
-    """These footprints are too wide for lines; without parallax the error is more than twice as large."""
+    """These footprints are too wide for lines; the fabric plane differs by more than twice the error."""
     fabric = woven("satin_8")
     queries = _queries(fabric, 60, 5, sigma=(0.35, 0.7))
     truth = estimate(fabric, queries, RAYS, 1)
-    error = _error(SoftNodes(2, parallax=True), fabric, queries, truth)
+    error = _error(SoftNodes(2), fabric, queries, truth)
     assert error < 0.05
-    assert _error(SoftNodes(2), fabric, queries, truth) > 2.0 * error
+    assert _differ(estimate(fabric, queries, PLANE, 1).mean, truth) > 2.0 * error
 
 
 @pytest.mark.parametrize("name", ["denim", slow("satin_8"), slow("voile")])
@@ -102,7 +107,7 @@ def test_every_ray_of_an_even_footprint_ends(name):
     queries = _queries(woven(name), 60, 6, sigma=(8.0, 9.0), steepest=88.0)
     areas = []
     for rims in (True, False):
-        sums, gaps = query_sums(tabulate(woven(name), parallax=True, rims=rims), queries)
+        sums, gaps = query_sums(tabulate(woven(name), rims=rims), queries)
         areas.append((sums[:, :, AREA].sum(axis=1) + gaps) / queries.wo[:, 2])
     np.testing.assert_allclose(areas[0], 1.0, atol=5e-3)  # linear between angles
     assert areas[1].min() < 0.97
@@ -115,7 +120,7 @@ def test_an_even_footprint_sees_no_parallax(walls):
     fabric = woven("denim")
     queries = _queries(fabric, 60, 6, sigma=(4.0, 8.0), steepest=85.0)
     truth = estimate(fabric, queries, RAYS.model_copy(update={"walls": walls}), 1)
-    assert _error(SoftNodes(2, parallax=True, walls=walls), fabric, queries, truth) < 0.03
+    assert _error(SoftNodes(2, walls=walls), fabric, queries, truth) < 0.03
 
 
 @pytest.mark.parametrize("name", ["denim", slow("satin_8")])
@@ -123,22 +128,22 @@ def test_rims_are_seen_as_the_truth_sees_them(name):
     """Steep views meet walls: nodes that leave them out are off by more."""
     fabric = woven(name)
     queries = _queries(fabric, 80, 11, sigma=(0.05, 1.0), steepest=85.0)
-    truth = estimate(fabric, queries, RAYS.model_copy(update={"walls": "rim"}), 1)
-    error = _error(SoftNodes(2, parallax=True, walls="rim"), fabric, queries, truth)
+    truth = estimate(fabric, queries, RAYS, 1)
+    error = _error(SoftNodes(2), fabric, queries, truth)
     assert error < 0.04
-    assert _error(SoftNodes(2, parallax=True), fabric, queries, truth) > 1.3 * error
+    assert _error(SoftNodes(2, walls="left_out"), fabric, queries, truth) > 1.3 * error
 
 
 @pytest.mark.parametrize("degrees", [0.0, 35.0, 60.0])
 def test_the_area_of_a_footprint_is_that_of_its_rays(degrees):
-    """Lines that miss a part, or see one twice, have another area than rays, which is wo_z but at walls.
+    """Lines that miss a part, or see one twice, have another area than rays, which is wo_z.
 
     Footprints end at 2.6 deviations: up to 2 % of one lie beyond, and Gauss's rule is up to 3 % off where it is cut.
     Up to .3 of the rays of these meet walls.
     """
     fabric = woven("polyester_lining")
-    front, back, table = height_field(fabric), height_field(fabric.back()), tabulate(fabric, parallax=True)
-    plane, choices = reference_plane(front), Choices(macro=False, shadows=True)
+    front, back, table = height_field(fabric), height_field(fabric.back()), tabulate(fabric)
+    plane, choices = reference_plane(front), Choices(macro=False, shadows=True, rims=True)
     for x in (0.0, 0.5, 1.1, 1.7):
         look = equal_queries(direction(20.0, 10.0), direction(degrees, 25.0), sigma=0.2, centre=(x, 0.7))
         sums, gaps = query_sums(table, look)
@@ -155,10 +160,10 @@ def test_the_area_of_a_footprint_is_that_of_its_rays(degrees):
 def test_light_does_not_depend_on_how_finely_one_looks(name, degrees):
     """The mean over 1,024 places of narrow footprints against the truth of a wide one; three lights together."""
     fabric, narrow, wide = woven(name), 0.0, 0.0
-    nodes = SoftNodes(2, parallax=True, walls="rim")
+    nodes = SoftNodes(2)
     nodes.prepare(fabric)
     places = (qmc.Sobol(2, seed=1).random(1024) * fabric.weave.repeat).astype(np.float32)
-    exact = RAYS.model_copy(update={"walls": "rim", "relative_error": 0.002, "max_count": 1 << 16})
+    exact = RAYS.model_copy(update={"relative_error": 0.002, "max_count": 1 << 16})
     for azimuth, light in ((20.0, (40.0, 200.0)), (110.0, (60.0, 10.0)), (250.0, (20.0, 300.0))):
         look = direction(*light), direction(degrees, azimuth)
         asked = equal_queries(*look, sigma=0.03, rows=1024)._replace(u=places[:, 0], v=places[:, 1])
@@ -170,7 +175,7 @@ def test_light_does_not_depend_on_how_finely_one_looks(name, degrees):
 def test_lines_turn_with_the_viewer():
     """A plain weave of equal yarns is the same cloth after half a turn; its lines lie elsewhere."""
     fabric = woven("polyester_lining")
-    table = tabulate(fabric, parallax=True)
+    table = tabulate(fabric)
     queries = _queries(fabric, 40, 8)
     turn = np.float32([-1, -1, 1])
     ends, picks = fabric.weave.repeat
@@ -205,9 +210,12 @@ AREAS = {"clusters": [64]}
     ],
 )
 def test_tables_are_read_where_view_rays_end(options, choices, fabric, most, ratio):
-    """The error against the truth of view rays is below `most`, that of the fabric plane `ratio` times as large."""
+    """The error against the truth of view rays is below `most`, that of the fabric plane `ratio` times as large.
+
+    The tables know no walls: rays that meet one are left out.
+    """
     queries = _queries(fabric, 100, 4)
-    truth = estimate(fabric, queries, RAYS, 1)
+    truth = estimate(fabric, queries, RAYS.model_copy(update={"walls": "left_out"}), 1)
     (rays,), (plane,) = (options(parallax=parallax, **choices).methods() for parallax in (True, False))
     error = _error(rays, fabric, queries, truth)
     assert error < most

@@ -1,0 +1,309 @@
+"""How view rays meet a cloth along a line in the viewer's azimuth: which interval of each piece they see.
+
+A ray belongs to the point of the reference plane that it crosses. Seen in the viewer's azimuth, a point of height h at
+s is displaced to q = s - d, with d the distance in which a ray sinks from h to the plane; across the azimuth nothing is
+displaced. Going away from the viewer, a point is seen if its q is less than all q before it. On a torus h is concave,
+so q(s) falls to its least at the crest that the viewer sees and rises from there: what is seen of a piece is one
+interval, found by its two ends. Rays between what is covered and the near end of a piece meet the wall below it.
+
+Over a cloth of curvature kappa the ray is a parabola: with T = |o_xy| / o_z and g the height over the plane,
+d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) [Kuznetsov2022Curved]. A steep view's ray rises again before it has sunk to
+the lowest yarns, and may meet the flank of a yarn then: this is the other root of the parabola, on which q grows
+towards the crest. What it clears leaves the cloth.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from pipeline.analytic.soft_nodes.nodes import CURVE, FAMILY, SHIFT, SoftNodeTable
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
+from pipeline.truth.geometry.heightfield import (
+    AXIS_DROP,
+    BEND_RADIUS,
+    BETA,
+    HALF_LENGTH,
+    INVERSE_RADIUS,
+    RADIUS,
+    WEFT,
+)
+
+FOOTPRINT_ENDS: Final = 2.4
+"""Deviations at which a footprint of rays ends."""
+
+NEVER: Final = 1e9
+"""Place that no ray reaches."""
+
+_CREST_STEPS: Final = 8
+_CREST_CLOSE: Final = 1e-2
+_ROOT_STEPS: Final = 8
+_THIRDS, _HALVINGS = 16, 24
+_CLOSE: Final = 0.02  # of a deviation: how near the end of an interval is found where something hides the rest,
+_WHERE_IT_ENDS: Final = 0.3  # and where the footprint ends
+
+
+class ViewRay(NamedTuple):
+    """How the rays of a footprint sink.
+
+    Attributes
+    ----------
+    dx, dy : float
+        The viewer's azimuth.
+    run : float
+        Distance in the plane for each unit of height, T.
+    bend : float
+        Curvature of the cloth in this azimuth, 1/yarn spacings.
+    plane : float
+        Height of the reference plane.
+    least : float
+        Height at which the rays rise again; that of the lowest yarn if they do not before.
+    """
+
+    dx: float
+    dy: float
+    run: float
+    bend: float
+    plane: float
+    least: float
+
+
+class YarnCurve(NamedTuple):
+    """A piece of a yarn along a line, in its own frame.
+
+    Attributes
+    ----------
+    across, by_across, along, by_along : float
+        Place across and along the yarn, a + s a' and b + s b'.
+    per_radius, radius, beta : float
+        Of the yarn.
+    bend, half, drop, side : float
+        Of its float: bend radius, 0 if it is drawn flat; half length and drop; 1 on top and -1 beneath.
+    """
+
+    across: float
+    by_across: float
+    along: float
+    by_along: float
+    per_radius: float
+    radius: float
+    beta: float
+    bend: float
+    half: float
+    drop: float
+    side: float
+
+
+@fast_kernel
+def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
+    """Return how far before the plane a ray has a height, and its slope there, as a share of that at the plane."""
+    if ray.bend == 0.0:
+        return (height - ray.plane) * ray.run, 1.0
+    square = 1.0 + 2.0 * ray.bend * ray.run * ray.run * (height - ray.plane)
+    if square <= 0.0:
+        return -NEVER, 0.0
+    root = math.sqrt(square)
+    return 2.0 * (height - ray.plane) * ray.run / (1.0 + root), root
+
+
+@inlined_fast_kernel
+def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
+    """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the yarn's border.
+
+    The height is that of `torus_height` and `height_beneath`, sqrt((R +- rho)^2 - b^2) - R cos u_max times the relief.
+    """
+    sine = min(1.0, max(-1.0, (curve.across + s * curve.by_across) * curve.per_radius))
+    cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
+    rho, b = curve.radius * cosine, curve.along + s * curve.by_along
+    if curve.bend == 0.0:
+        return curve.beta * rho, curve.beta * sine * curve.by_across, cosine
+    ring, beyond = curve.bend + curve.side * rho, 0.0
+    if curve.side < 0.0:
+        bound = ring * curve.half / curve.bend
+        on_arc = min(max(b, -bound), bound)
+        beyond = abs(b - on_arc) * curve.half / curve.drop
+        b = on_arc
+    root = math.sqrt((ring - b) * (ring + b))
+    slope = ring * sine * curve.by_across + curve.side * b * cosine * curve.by_along
+    return curve.beta * (curve.side * (root - curve.drop) + beyond), curve.beta * slope, cosine * root
+
+
+@inlined_fast_kernel
+def seen_at(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
+    """Return to where the point at s is displaced, and a number with the sign of n.o."""
+    height, slope, upright = _height_and_slope(curve, s)
+    distance, steep = sunk(ray, height)
+    return s - distance, upright * steep + ray.run * slope
+
+
+@inlined_fast_kernel
+def seen_rising(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
+    """Return the same for rays that rise: its place, and a number that is positive where they meet the flank."""
+    height, slope, upright = _height_and_slope(curve, s)
+    steep = math.sqrt(max(1.0 + 2.0 * ray.bend * ray.run * ray.run * (height - ray.plane), 0.0))
+    return s + (1.0 + steep) / (ray.bend * ray.run), ray.run * slope - upright * steep
+
+
+@fast_kernel
+def reached(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> tuple[float, float]:
+    """Return between which places of a piece rays reach it that rise at `ViewRay.least`; none: the second is first."""
+    # The highest place, by thirds.
+    left, right = low, high
+    for _ in range(_THIRDS):
+        third = (right - left) / 3.0
+        if _height_and_slope(curve, left + third)[0] < _height_and_slope(curve, right - third)[0]:
+            left += third
+        else:
+            right -= third
+    top = 0.5 * (left + right)
+    if _height_and_slope(curve, top)[0] <= ray.least:
+        return high, low
+    first = low if _height_and_slope(curve, low)[0] > ray.least else _halve(curve, ray, top, low)
+    return first, high if _height_and_slope(curve, high)[0] > ray.least else _halve(curve, ray, top, high)
+
+
+@fast_kernel
+def _halve(curve: YarnCurve, ray: ViewRay, inside: float, outside: float) -> float:
+    """Return the place between two at which rays just reach a piece."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if _height_and_slope(curve, middle)[0] > ray.least:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@fast_kernel
+def rising_crest(curve: YarnCurve, ray: ViewRay, low: float, high: float) -> float:
+    """Return the crest of a piece that rising rays clear; they meet the flank between it and `high`."""
+    if seen_rising(curve, ray, high)[1] <= 0.0:
+        return high
+    crest = low
+    if seen_rising(curve, ray, low)[1] < 0.0:
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (crest + high)
+            if seen_rising(curve, ray, middle)[1] > 0.0:
+                high = middle
+            else:
+                crest = middle
+    return crest
+
+
+@fast_kernel
+def rising_interval(
+    curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_from: float, q_to: float
+) -> tuple[float, float]:
+    """Return from where to where a flank is seen by rising rays from `q_from` to `q_to`."""
+    start, stop = crest, high
+    if q_to <= q_from or seen_rising(curve, ray, crest)[0] <= q_from or seen_rising(curve, ray, high)[0] >= q_to:
+        return high, high
+    if seen_rising(curve, ray, high)[0] < q_from:
+        stop = place_of(curve, ray, crest, high, q_from, True)
+    if seen_rising(curve, ray, crest)[0] > q_to:
+        start = place_of(curve, ray, crest, high, q_to, True)
+    return start, stop
+
+
+@fast_kernel
+def place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: float, rising: bool) -> float:
+    """Return the place between two that rays through `target` meet."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        q = seen_rising(curve, ray, middle)[0] if rising else seen_at(curve, ray, middle)[0]
+        if (q > target) == rising:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@inlined_fast_kernel
+def _crest(
+    curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, q_high: float
+) -> tuple[float, float]:  # fmt: skip
+    """Return where between a place that faces away and one that faces the viewer the displaced place is least, and it.
+
+    Illinois' method; the error of the least place is of second order.
+    """
+    kept, q = 0, q_high
+    for _ in range(_CREST_STEPS):
+        s = low + (high - low) * at_low / (at_low - at_high)
+        q, at = seen_at(curve, ray, s)
+        if at > 0.0:
+            high, at_high = s, at
+            at_low *= 0.5 if kept > 0 else 1.0
+            kept = 1
+        else:
+            low, at_low = s, at
+            at_high *= 0.5 if kept < 0 else 1.0
+            kept = -1
+        if high - low < _CREST_CLOSE or abs(at) < _CREST_CLOSE:
+            return s, q
+    return s, q
+
+
+@inlined_fast_kernel
+def _at_place(
+    curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_crest: float, q_high: float, target: float, near: float
+) -> float:  # fmt: skip
+    """Return an s between the crest and `high` that is displaced to `target`, or to a place as `near` as that.
+
+    Displaced places rise between them. Steps are those of parabolas through both ends, level at the first one.
+    """
+    s = high
+    for _ in range(_ROOT_STEPS):
+        s = crest + (high - crest) * math.sqrt((target - q_crest) / (q_high - q_crest))
+        q, _ = seen_at(curve, ray, s)
+        if abs(q - target) < near:
+            break
+        if q > target:
+            high, q_high = s, q
+        else:
+            crest, q_crest = s, q
+    return s
+
+
+@inlined_fast_kernel
+def curve_of(table: SoftNodeTable, p: int, ray: ViewRay, x: float, y: float) -> YarnCurve:
+    """Return the curve of a piece along a line that has s = 0 at (x, y) from the corner of the cell."""
+    family, box, own = table.pieces[p, FAMILY], table.bounds[p], table.floats[p]
+    yarn, side = table.heights[family], -1.0 if box[CURVE] < 0.0 else 1.0
+    a, by_a, b, by_b = x - 0.5, ray.dx, y - 0.5 + box[SHIFT], ray.dy
+    if family == WEFT:
+        # Along a weft, y of its frame runs against x.
+        a, by_a, b, by_b = y - 0.5, ray.dy, -(x - 0.5 + box[SHIFT]), -ray.dx
+    return YarnCurve(
+        a, by_a, b, by_b, yarn[INVERSE_RADIUS], yarn[RADIUS], yarn[BETA], own[BEND_RADIUS], own[HALF_LENGTH],
+        own[AXIS_DROP], side,
+    )  # fmt: skip
+
+
+@inlined_fast_kernel
+def seen_interval(
+    curve: YarnCurve, ray: ViewRay, low: float, high: float, sigma: float, covered: float
+) -> tuple[float, float, float, float, float]:
+    """Return from where to where a piece between two places is seen, how long that seems, and what is covered then.
+
+    Rays from `covered` on meet something nearer to the viewer. The interval is empty if its end is not behind its
+    start, and cut where the footprint ends. Returned last is the displaced place of the piece's near end: rays from
+    there to `covered` meet the wall below it. It is `covered` if this end faces away from the viewer.
+    """
+    crest, left, right = low, -FOOTPRINT_ENDS * sigma, FOOTPRINT_ENDS * sigma
+    q_crest, at_low = seen_at(curve, ray, low)
+    q_high, at_high = seen_at(curve, ray, high)
+    if at_low < 0.0:
+        if at_high <= 0.0:
+            return low, low, 0.0, min(covered, q_high), covered
+        crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, q_high)
+    q_from, q_to = max(q_crest, left), min(q_high, right, covered)
+    start, stop = crest, high
+    if q_to > q_from:
+        if q_from > q_crest:
+            start = _at_place(curve, ray, crest, high, q_crest, q_high, q_from, _WHERE_IT_ENDS * sigma)
+        if q_to < q_high:
+            near = (_WHERE_IT_ENDS if q_to == right else _CLOSE) * sigma
+            stop = _at_place(curve, ray, crest, high, q_crest, q_high, q_to, near)
+    else:
+        stop = start
+    return start, stop, q_to - q_from, min(covered, q_crest), q_high
