@@ -79,9 +79,9 @@ class Domain(Frozen):
         return frozenset(kind for kind, there in trained.items() if there)
 
     @property
-    def rays(self) -> tuple[bool, bool]:
-        """Two truths: footprints were patches of view rays, and those that meet a wall see a rim."""
-        return bool(self.physics["parallax"]), self.physics["walls"] == "rim"
+    def rims(self) -> bool:
+        """True if view rays that meet a wall see a rim."""
+        return bool(self.physics["walls"] == "rim")
 
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
         """Return which queries on a fabric lie outside the ranges trained on, (N,); all of them if its yarns do.

@@ -9,7 +9,7 @@ answers a viewer behind the cloth as one in front of the cloth's back.
 
 The fallback is a node table of the ground truth with other nodes (`_NODES` is odd, the truth's numbers are even) and
 other azimuths: its error has nothing in common with that of the truth, and is measured like any method's error. It has
-view rays and rims, as the truth has unless told otherwise. Queries that the table does not know, such as cloth that
+view rays and rims, as the truth has by default. Queries that the table does not know, such as cloth that
 turns across a footprint, narrow footprints at low views and irregular drafts, are sampled, by the estimator `owen`.
 Viewers too low for the truth are tilted up to the lowest one.
 """

@@ -425,7 +425,7 @@ class Adaptive(_OverNodes, Around):
         result, errors = self._selvage.with_errors(fabric, queries)
         too_far = errors[:, OWN] > self.error
         # The fallback sees rims: what is left of another meaning of walls stays with the finest nodes.
-        finer = too_far & ((errors[:, FINEST] <= self.error) | (not all(self._selvage.options.rays)))
+        finer = too_far & ((errors[:, FINEST] <= self.error) | (not self._selvage.options.rims))
         left = too_far & ~finer
         if finer.any():
             result[finer] = self.nodes.predict(fabric, queries.take(finer))

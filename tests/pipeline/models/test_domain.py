@@ -61,7 +61,7 @@ def test_cards_that_say_nothing_of_view_rays_are_of_the_fabric_plane():
     card = PLAIN.model_dump()
     old = {name: value for name, value in card["physics"].items() if name not in ("parallax", "walls")}
     earlier = Domain.model_validate(card | {"physics": old})
-    assert PLAIN.rays == (True, True) and earlier.rays == (False, False)
+    assert PLAIN.rims and not earlier.rims
     earlier.refuse_truth(TruthOptions(parallax=False), "m")
     with pytest.raises(BadInput, match=r"truth: parallax = True.*parallax = False"):
         earlier.refuse_truth(TruthOptions(), "m")
@@ -102,7 +102,7 @@ def test_large_footprints_are_known_where_training_saw_the_average_of_the_repeat
     assert NARROW.out_of_domain(load_fabric("satin_8"), huge).all()
     asked = NARROW.within(DENIM, huge)
     np.testing.assert_allclose([asked.sigma, asked.sigma_minor], 3.0, rtol=1e-6)
-    truth = TruthOptions(estimator="quadrature", relative_error=1e-4)
+    truth = TruthOptions(estimator="quadrature", walls="left_out", relative_error=1e-4)
     found, reference = (estimate(DENIM, queries, truth, 0).mean for queries in (asked, huge))
     np.testing.assert_allclose(found, reference, rtol=2e-3)
 
