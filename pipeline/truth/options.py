@@ -27,7 +27,7 @@ FEWEST_NODES: Final = 24
 """Nodes on a yarn spacing of the truth's fine table, at least."""
 
 USUAL_WALLS: Final[dict[bool, Walls]] = {True: "rim", False: "left_out"}
-"""What `walls` means unless it is given, with and without parallax."""
+"""The meaning of `walls` unless it is given, with and without parallax."""
 
 RAYS_RESOLVED: Final[dict[Walls, float]] = {"left_out": 0.7, "rim": 2.5}
 """Smallest standard deviation of a footprint of view rays that `node_table` resolves, over `seen_distance`."""

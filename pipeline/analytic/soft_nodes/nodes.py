@@ -13,6 +13,7 @@ different pieces there are, the coarser they are, so that a table stays near a m
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -196,7 +197,8 @@ def tabulate(
     picks, ends = front.top.shape
 
     located = _locate(front)
-    grid, grid_falls, behind_grid = _horizon_grids(model, located.samples, behind, curved)
+    size = next((n for n in _GRIDS if len(located.samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
+    grid, grid_falls, behind_grid = _horizon_grids(fabric, size, behind, curved)
 
     # The nodes of every group, each kind in whole blocks.
     groups = gather(located.pieces, detail, by_thread)
@@ -259,12 +261,13 @@ def tabulate(
     )  # fmt: skip
 
 
+@lru_cache(maxsize=4)  # most of the time of a table; tables of all levels have the same
 def _horizon_grids(
-    model: ClothSide, samples: list[tuple[int, int, CellPiece]], behind: bool, curved: bool
+    fabric: Fabric, size: int, behind: bool, curved: bool
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], npt.NDArray[np.uint8]]:
     """Return grids of horizons, their falls over curved cloth, and those of the back, empty if not wanted."""
-    size = next((n for n in _GRIDS if len(samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
-    x, y, gap = _grid_places(samples, size)
+    model = cloth_side(fabric, TruthOptions())
+    x, y, gap = _grid_places(_locate(model.front).samples, size)
     sines = horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS)
     grid = _grids(sines, size)
     grid_falls = np.zeros((len(CURVATURES) if curved else 0, *grid.shape), np.uint8)

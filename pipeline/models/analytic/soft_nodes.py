@@ -31,9 +31,7 @@ Level = Literal[1, 2, 4, 8]
 _SHARED: Final[WeakValueDictionary[tuple[object, ...], PerFabric[SoftNodeTable]]] = WeakValueDictionary()
 
 
-def soft_tables(
-    level: int, behind: bool = False, curved: bool = False, rims: bool = True
-) -> PerFabric[SoftNodeTable]:
+def soft_tables(level: int, behind: bool = False, curved: bool = False, rims: bool = True) -> PerFabric[SoftNodeTable]:
     """Return the tables of fabrics at a level of detail, which all methods at hand share."""
     from pipeline.analytic.soft_nodes.nodes import tabulate
 

@@ -111,10 +111,10 @@ class SelvageNetwork(Trainable):
         self.register_buffer("mean", torch.zeros(FEATURES))
         self.register_buffer("scale", torch.ones(FEATURES))
         self.errors = ErrorNetwork(options, FEATURES)
-        levels = (options.level, options.finest)
-        self._tables, self._finest = (
-            [tabulate(fabric, False, False, level, False, options.rims) for fabric in fabrics] for level in levels
-        )
+        self._tables, self._finest = [], []
+        for fabric in fabrics:
+            for level, tables in ((options.level, self._tables), (options.finest, self._finest)):
+                tables.append(tabulate(fabric, level=level, rims=options.rims))
         self.expect(0)
         if fabrics:
             self._measure(fabrics)

@@ -36,7 +36,7 @@ from pipeline.truth.quadrature.rules import (
     PART,
     RULES,
     TURNING,
-    Patch,
+    QueryPatch,
     cut_parts,
     integrate,
     lean_of,
@@ -85,7 +85,7 @@ def integrate_rows(
         even = cloth.shape == GAUSSIAN and sigma_x >= _EVEN * ends and sigma_y >= _EVEN * picks
         wo = directions.viewer
         x_lean, y_lean = lean_of(cloth, wo.x, wo.z), lean_of(cloth, wo.y, wo.z)
-        patch = Patch(cloth, directions, x_axis, y_axis, x_lean, y_lean)
+        patch = QueryPatch(cloth, directions, x_axis, y_axis, x_lean, y_lean)
         parts = _all_parts(patch, kinds if even else everything, across, along)
         if even:
             parts[:, BOX_WEIGHT] *= share
@@ -129,7 +129,7 @@ def integrate_rows(
 
 
 @allocating_kernel
-def _all_parts(patch: Patch, pieces: Float64, across: Float64, along: Float64) -> Float64:
+def _all_parts(patch: QueryPatch, pieces: Float64, across: Float64, along: Float64) -> Float64:
     """Return the parts of all rectangles that the footprint reaches, (n, PART)."""
     nothing, yarn = np.zeros((0, PART)), patch.cloth.front.yarn
     total = 0

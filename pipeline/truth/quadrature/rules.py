@@ -243,7 +243,7 @@ _NODES: Final = np.concatenate([nodes for nodes, _ in _RULES])  # rule of 2^(l +
 _WEIGHTS: Final = np.concatenate([weights for _, weights in _RULES])
 
 
-class Patch(NamedTuple):
+class QueryPatch(NamedTuple):
     """A query's patch of one side of a cloth."""
 
     cloth: ClothSide
@@ -255,7 +255,7 @@ class Patch(NamedTuple):
 
 
 @kernel
-def _shares(patch: Patch, part: Float64, a: float, b: float, shares: Float64) -> int:
+def _shares(patch: QueryPatch, part: Float64, a: float, b: float, shares: Float64) -> int:
     """Write the shares of a point of a part in the sums; return which of viewer, light and back it sees, as bits.
 
     Shares are those of a unit of the coordinates across and along.
@@ -288,7 +288,7 @@ def _shares(patch: Patch, part: Float64, a: float, b: float, shares: Float64) ->
 
 @allocating_kernel
 def integrate(
-    patch: Patch,
+    patch: QueryPatch,
     part: Float64,
     level: int,
     split: int,
