@@ -58,7 +58,7 @@ _FOOTPRINTS = (
 
 
 class Group(NamedTuple):
-    """Golden queries of one kind: how many, the sides of light and viewer, whether the cloth is curved, z of viewers."""
+    """Golden queries of one kind: their number, sides of light and viewer, whether cloth is curved, z of viewers."""
 
     rows: int
     light: float

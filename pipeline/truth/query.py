@@ -90,8 +90,8 @@ class Queries(NamedTuple):
         if not low.any():
             return self
         flat, wo = self.wo[low, :2].astype(np.float64), self.wo.copy()
-        wo[low, :2] = flat * (math.sqrt(1.0 - _RAISED**2) / np.linalg.norm(flat, axis=1, keepdims=True))
-        wo[low, 2] = np.copysign(_RAISED, wo[low, 2])
+        wo[low, :2] = flat * (math.sqrt(1.0 - LOWEST_VIEWER**2) / np.linalg.norm(flat, axis=1, keepdims=True))
+        wo[low, 2] = np.copysign(LOWEST_VIEWER, wo[low, 2])
         return self._replace(wo=wo)
 
     def take(self, index: npt.NDArray[np.integer] | Mask | slice) -> Queries:
@@ -136,8 +136,6 @@ HIDDEN_SHARE = 1e-3
 
 LOWEST_VIEWER = math.cos(math.radians(89.0))
 """Least cosine of a viewer with parallax: a lower one sees a footprint through many yarns."""
-
-_RAISED = 1.0001 * LOWEST_VIEWER  # above it in single precision, too
 
 STEEPEST_CURVATURE = 1.0
 """Largest curvature: a cylinder as thick as two yarn spacings."""
