@@ -156,6 +156,15 @@ def test_what_stops_a_thread_stops_everything(case):
     assert not list(case.out.parent.iterdir())
 
 
+def test_viewers_too_low_for_parallax_are_bad_rows(case):
+    columns = query_columns(30)
+    for axis, value in zip("xyz", (0.9999, 0.0, 0.01414), strict=True):
+        columns[f"wo_{axis}"][[7, 9]] = value
+    with pytest.raises(BadInput, match=r"row 7, .*within 89 degrees of the normal"):
+        case.write(columns).run()
+    assert case.run(skip_bad=True).bad == 2
+
+
 @pytest.mark.parametrize("row_group_size", [10, 1000])
 def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, monkeypatch, row_group_size):
     case.write(query_columns(), row_group_size)
