@@ -66,7 +66,7 @@ def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, 
 
 @pytest.mark.parametrize("sigma", [(0.1, 0.5), slow((1.5, 6.0))])
 def test_threads_are_those_that_a_grazing_viewer_sees(sigma):
-    """A thread of height h is seen h tan(theta) away, up to three yarns here: the bound is that of steep views."""
+    """A thread of height h is seen h tan(theta) away, up to three yarns here; colours err no more than from above."""
     fabric, random = load_fabric("tartan"), np.random.default_rng(5)
     asked = draw_queries(QueryOptions(sigma=sigma, max_angle=60.0), fabric.repeat, 3, 0, 40)
     turn, theta = random.uniform(0.0, 2.0 * math.pi, 40), random.uniform(math.radians(70.0), math.radians(82.0), 40)
@@ -75,7 +75,7 @@ def test_threads_are_those_that_a_grazing_viewer_sees(sigma):
     components = estimate(fabric, asked, TruthOptions(estimator="owen", max_count=1024), 1).mean
     exact = component_colours(fabric, asked, TruthOptions(relative_error=0.02, max_count=1 << 11), 2)
     truth, found = (np.einsum("nc,ncx->nx", components, own) for own in (exact.mean, footprint_colours(fabric, asked)))
-    assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < 0.08
+    assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < 0.03
 
 
 def test_the_mean_over_the_cloth_does_not_depend_on_the_footprint():
