@@ -77,10 +77,7 @@ def export_fabric(
     ] = NOTHING,
     kind: Annotated[
         list[str],
-        Parameter(
-            help="Of a shader: behind, curvature or all, beside lights and viewers in front of flat cloth; "
-            "parallax: view rays do not see walls; flat: footprints are patches of the fabric plane."
-        ),
+        Parameter(help="Of a shader: behind, curvature or all, beside light and viewer in front of flat cloth."),
     ] = NOTHING,
 ) -> None:
     """Write a fabric for other programs, and print what was written.

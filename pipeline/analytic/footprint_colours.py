@@ -1,9 +1,10 @@
 """Colours of the components where ends or picks differ in colour, for methods that know four components.
 
 Light and viewer in front: soft nodes are summed thread by thread of the weave's repeat (pipeline.analytic.soft_nodes),
-each component apart, and each thread has the mean colour of its copies in the footprint. From behind, each thread
-counts by the footprint's mass on its cells, times the share of each cell in which it is seen from straight above.
-pipeline.truth.scattering.thread_colours has the exact colours. Nothing aliases: masses are integrals of a Gaussian.
+each component apart, and each thread has the mean colour of its copies in the footprint. A copy counts by the density
+of the footprint where the viewer sees its nodes, times the area that is seen of them. From behind, each thread counts
+by the footprint's mass on its cells, times the share of each cell in which it is seen from straight above.
+pipeline.truth.scattering.thread_colours has the exact colours.
 """
 
 from __future__ import annotations
@@ -14,12 +15,24 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.soft_nodes.answer import SMALLEST, query_sums
-from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
+from pipeline.analytic.soft_horizons import around
+from pipeline.analytic.soft_nodes.answer import LONGEST, SMALLEST, query_sums, shortened
+from pipeline.analytic.soft_nodes.groups import COLUMNS
+from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
+from pipeline.analytic.soft_nodes.seen_areas import angle_of, write_areas
 from pipeline.analytic.soft_nodes.shade import DIFFUSE, SPECULAR
-from pipeline.compiled.arrays import Float64
+from pipeline.analytic.soft_nodes.wide import RESOLVED, Sight, density, form, sight, touched, where_seen
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.footprint.mixture import COARSE_LINE, along_axes, deviations, line_points
+from pipeline.truth.footprint.mixture import (
+    COARSE_LINE,
+    Footprints,
+    along_axes,
+    footprints,
+    line_points,
+    narrow_axis,
+)
+from pipeline.truth.geometry.heightfield import WARP
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -31,6 +44,10 @@ _HIDDEN: Final = 1e-6  # share of a cell that a yarn covers in any case: where i
 _CHUNK: Final = 4096  # queries whose sums are held at a time
 _FAINT: Final = 1e-6  # share of the light by which threads count in any case
 _TINY: Final = 1e-30
+_0 = np.float32(0.0)
+
+Patch = tuple[float, float, np.float32, np.float32, np.float32]
+"""Centre of a footprint, deviations along x and y, and their correlation."""
 
 
 class Threads(NamedTuple):
@@ -85,9 +102,9 @@ def _by_sums(fabric: Fabric, queries: Queries) -> Float64:
     for start in range(0, len(result), _CHUNK):
         part = queries.take(slice(start, start + _CHUNK))
         sums, _ = query_sums(table, part)
-        u, v, x, y = (np.ascontiguousarray(a, np.float64) for a in (part.u, part.v, *deviations(part, SMALLEST)[:2]))
+        wo = np.ascontiguousarray(part.raised().wo, np.float32)
         weights = np.ascontiguousarray(sums[:, :, (SPECULAR, DIFFUSE)], np.float64)
-        found = weighed_colours(warp, weft, u, v, x, y, weights)
+        found = weighed_colours(table, warp, weft, footprints(part, SMALLEST), wo, weights)
         result[start : start + _CHUNK] = found.transpose(0, 2, 1, 3).reshape(-1, 4, 3)
     return result
 
@@ -156,26 +173,126 @@ def mean_colours(
 
 @allocating_kernel
 def weighed_colours(
-    warp: Threads, weft: Threads, u: Float64, v: Float64, x: Float64, y: Float64, weights: Float64
+    table: SoftNodeTable, warp: Threads, weft: Threads, patches: Footprints, wo: Float32, weights: Float64
 ) -> Float64:
-    """Return k_s and k_d of the ends and of the picks in N footprints of deviations x and y, (N, 2, 2, 3).
+    """Return k_s and k_d of the ends and of the picks in N footprints, (N, 2, 2, 3).
 
     `weights` (N, ends + picks, 2) are the specular and diffuse light of each thread of the weave's repeat.
     """
+    u, v, deviation_x, deviation_y, correlation = patches
     ends, picks = warp.seen.shape
     found = np.zeros((len(u), 2, 2, 3))
     masses = np.zeros(ends), np.zeros(picks)
     sums = np.zeros((ends, 9)), np.zeros((picks, 9))
+    areas, seen = np.zeros(table.evenly.shape, np.float32), np.empty((len(table.spots), 2, COLUMNS), np.float32)
+    of_lines = areas.reshape(len(seen), COLUMNS)
     for row in range(len(u)):
-        _fold(warp, u[row], x[row], masses[0], sums[0])
-        _fold(weft, v[row], y[row], masses[1], sums[1])
-        _weigh(masses[0], sums[0], weights[row, :ends], found[row, 0])
-        _weigh(masses[1], sums[1], weights[row, ends:], found[row, 1])
+        dx, dy, rho = deviation_x[row], deviation_y[row], correlation[row]
+        narrowest = np.float32(narrow_axis(dx, dy, rho))
+        low, high, turn = around(wo[row, 0], wo[row, 1])
+        step, part = angle_of(wo[row, 2])
+        write_areas(table.areas, low, high, turn, step, part, areas)
+        towards = sight(wo[row, 0], wo[row, 1], wo[row, 2], _0)
+        where_seen(table, towards, seen)
+        if narrowest >= table.uniform:
+            _fold_seen(table, warp, 0, u[row], dx, of_lines, seen, masses[0], sums[0])
+            _fold_seen(table, weft, 1, v[row], dy, of_lines, seen, masses[1], sums[1])
+        else:
+            if max(dx, dy) > LONGEST:
+                dx, dy, rho = shortened(dx, dy, rho, narrowest)
+            patch = np.float64(u[row]), np.float64(v[row]), dx, dy, rho
+            _add_cells(table, (warp, weft), patch, towards, of_lines, seen, masses, sums)
+        _weigh(warp, masses[0], sums[0], weights[row, :ends], found[row, 0])
+        _weigh(weft, masses[1], sums[1], weights[row, ends:], found[row, 1])
     return found
 
 
 @kernel
-def _weigh(masses: Float64, sums: Float64, weights: Float64, found: Float64) -> None:
+def _add_cells(
+    table: SoftNodeTable,
+    threads: tuple[Threads, Threads],
+    patch: Patch,
+    towards: Sight,
+    areas: Float32,
+    seen: Float32,
+    masses: tuple[Float64, Float64],
+    sums: tuple[Float64, Float64],
+) -> None:
+    """Write what a footprint sees of each thread, and the same times its colour, cell by cell."""
+    for family in range(2):
+        masses[family][:], sums[family][:] = 0.0, 0.0
+    x, y, dx, dy, rho = patch
+    ends, picks = len(masses[0]), len(masses[1])
+    dx, dy = max(dx, np.float32(RESOLVED)), max(dy, np.float32(RESOLVED))
+    of_xx, of_yy, of_xy = form(dx, dy, rho)
+    x_low, x_high, y_low, y_high = touched(table, towards, dx, dy)
+    for row in range(math.floor(y + y_low), math.floor(y + y_high) + 1):
+        for column in range(math.floor(x + x_low), math.floor(x + x_high) + 1):
+            middle_x, middle_y = np.float32(x - column), np.float32(y - row)
+            end, pick = column % ends, row % picks
+            cell = pick * ends + end
+            for c in range(table.group_starts[cell], table.group_starts[cell + 1]):
+                group = table.groups[table.cell_groups[c]]
+                start, family, total = group[START] // np.uint32(COLUMNS), group[GROUP_FAMILY], 0.0
+                if family > 1:
+                    continue
+                for line in range(start, start + group[LINES]):
+                    for k in range(COLUMNS):
+                        at_x, at_y = seen[line, 0, k] - middle_x, seen[line, 1, k] - middle_y
+                        share = table.spots[line, 2, k] * max(areas[line, k], np.float32(_HIDDEN))
+                        total += share * density(at_x, at_y, of_xx, of_yy, of_xy)
+                copy, thread = (column, end) if family == WARP else (row, pick)
+                _add_thread(threads[family].colours, copy, thread, total, masses[family], sums[family])
+
+
+@kernel
+def _add_thread(colours: Float64, copy: int, thread: int, mass: float, masses: Float64, sums: Float64) -> None:
+    """Add what is seen of a copy of a thread."""
+    masses[thread] += mass
+    for c in range(9):
+        sums[thread, c] += mass * colours[copy % len(colours), c]
+
+
+@kernel
+def _fold_seen(
+    table: SoftNodeTable, family: Threads, axis: int, centre: np.float32, sigma: np.float32, areas: Float32,
+    seen: Float32, masses: Float64, sums: Float64,
+) -> None:  # fmt: skip
+    """Write the same along one axis of a footprint that covers the weave's repeat evenly.
+
+    Each thread counts as the Gaussian of the places where its nodes are seen.
+    """
+    threads, first = len(masses), 0 if axis == 0 else table.kinds[0]
+    masses[:], sums[:] = 0.0, 0.0
+    shares = table.evenly.reshape(len(seen), COLUMNS)
+    for thread in range(threads):
+        total, mean, square = 0.0, 0.0, 0.0
+        a, b = table.starts[first + thread], table.starts[first + thread + 1]
+        for line in range(a * len(seen) // len(table.evenly), b * len(seen) // len(table.evenly)):
+            for k in range(COLUMNS):
+                share, place = shares[line, k] * max(areas[line, k], np.float32(_HIDDEN)), seen[line, axis, k]
+                total += share
+                mean += share * place
+                square += share * place * place
+        if sigma >= _SPREAD_OUT * family.repeat:
+            masses[thread] = total
+            for c in range(9):
+                sums[thread, c] = total * threads * family.even[thread, c]
+            continue
+        mean /= max(total, _TINY)
+        wide = math.sqrt(sigma * sigma + max(square / max(total, _TINY) - mean * mean, 0.0))
+        place = centre - thread - mean
+        for copy in range(
+            math.floor((place - _REACH * wide) / threads), math.floor((place + _REACH * wide) / threads) + 2
+        ):
+            away = (copy * threads - place) / wide
+            _add_thread(
+                family.colours, thread + copy * threads, thread, total * math.exp(-0.5 * away * away), masses, sums
+            )  # fmt: skip
+
+
+@kernel
+def _weigh(family: Threads, masses: Float64, sums: Float64, weights: Float64, found: Float64) -> None:
     """Write the mean colours of a family's threads, (2, 3), by the light of each."""
     for kind in range(2):
         total = 0.0
@@ -190,7 +307,10 @@ def _weigh(masses: Float64, sums: Float64, weights: Float64, found: Float64) -> 
                 for c in range(3):
                     found[kind, c] += weight * sums[thread, 3 * kind + c]
         for c in range(3):
-            found[kind, c] /= whole
+            if whole > 0.0:
+                found[kind, c] /= whole
+            else:  # none of it is near: it sends no light
+                found[kind, c] = family.even[:, 3 * kind + c].sum()
 
 
 @kernel

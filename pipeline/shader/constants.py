@@ -14,17 +14,15 @@ from pipeline.analytic.importance import lobes
 from pipeline.analytic.importance import mixture as importance_mixture
 from pipeline.analytic.soft_nodes import (
     answer,
-    ellipse_nodes,
-    footprint_nodes,
+    cuts,
     groups,
     line_nodes,
-    narrow,
     nodes,
     scratch,
     seen_areas,
     shade,
     view_lines,
-    waves,
+    view_rays,
     wide,
 )
 from pipeline.compiled import float32
@@ -37,23 +35,24 @@ from weaves.colour import LUMINANCE
 
 ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
     "YARN": (heightfield, ("RADIUS", "INVERSE_RADIUS", "SIN_TWIST", "COS_TWIST", "ALPHA", "BETA", "BLEND", "BEND")),
-    "GROUP": (nodes, ("START", "LINES", "RULE_X", "RULE_Y", "GROUP_FAMILY")),
+    "GROUP": (nodes, ("START", "LINES", "GROUP_FAMILY")),
     "PIECE": (nodes, ("FAMILY", "BLOCK")),
     "BOUNDS": (nodes, ("X_LOW", "X_HIGH", "Y_LOW", "Y_HIGH", "SHIFT", "CURVE", "BOUND")),
 }
 """Columns of the arrays of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, by the name of the array."""
 
-FLOAT: Final = ("FLOAT_BEND", "FLOAT_HALF", "FLOAT_DROP", "CROWN")
-"""Columns of a piece that only view rays need."""
-
-CELLS_OF_GROUP: Final = ("FIRST_CELL", "CELLS")
-"""Two more columns of a group: the shader sums over the cells of a node, so that they are listed by group."""
+ADDED: Final[dict[str, tuple[str, ...]]] = {
+    # The shader sums over the cells of a node, so that they are listed by group.
+    "GROUP": ("FIRST_CELL", "CELLS"),
+    "FLOAT": ("FLOAT_BEND", "FLOAT_HALF", "FLOAT_DROP", "CROWN"),
+}
+"""Columns that the shader has beside them."""
 
 TEXTURE_WIDTH: Final = 1024
 """Texels of a row of every texture."""
 
-WAVE_ROW: Final = 4 + soft_horizons.AZIMUTHS // 2
-"""Row of a node from which on it has its waves."""
+OTHER_ROW: Final = 4 + soft_horizons.AZIMUTHS // 2
+"""Row of a node from which on it has what not all tables know."""
 
 FALL_ROWS: Final = soft_horizons.AZIMUTHS // 4
 """Rows of a node for the falls of one curvature."""
@@ -73,14 +72,15 @@ _SAME: Final[tuple[tuple[ModuleType, tuple[str, ...]], ...]] = (
     (groups, ("COLUMNS",)),
     (nodes, ("LEVELS", "UPPER")),
     (shade, ("LEAST_SEEN", "FADED", "TINY")),
-    (answer, ("STRETCHED", "SMALLEST")),
-    (wide, ("NARROW",)),
-    (narrow, ("LONG",)),
-    (footprint_nodes, ("REACH", "MOST_ACROSS", "HERMITE")),
-    (ellipse_nodes, ("MOST",)),
-    (waves, ("MOST_WAVES",)),
+    (answer, ("LONGEST", "SMALLEST")),
+    (view_lines, ("MOST_GAUSS",)),
+    (view_rays, ("FOOTPRINT_ENDS", "NEVER")),
+    (cuts, ("NEAREST",)),
     (wide, ("RESOLVED",)),
-    (query, ("HIDDEN_SHARE",)),
+    (scratch, ("MOST_ON_LINES",)),
+    (query, ("LOWEST_VIEWER",)),
+    (seen_areas, ("SEEN_ANGLES",)),
+    (coverage, ("RAYS",)),
     (soft_horizons, ("FALL",)),
     (lobes, ("SCATTERED", "BROAD")),
     (importance_mixture, ("LEAST_COSINE",)),
@@ -98,64 +98,35 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
         "LOBE_STEEPEST": "_STEEPEST", "ALONE": "_ALONE", "LOBE_TINY": "_TINY",
     },
     importance_mixture: {"LEFT_THROUGH": "STRAIGHT_ON", "LOBE_SHORTEST": "_SHORTEST"},
-    shade: {"SHORTEST": "_SHORTEST", "FLAKES": "_FLAKES", "GAUSS": "_GAUSS", "TAIL": "_TAIL"},
-    footprint_nodes: {
-        "HERMITE_BOX": "_HERMITE_BOX", "WHOLE": "_WHOLE", "VERTICAL": "_VERTICAL", "INVERSE_ROOT": "_INVERSE_ROOT",
-        "OUTWARDS": "_OUTWARDS",
+    shade: {
+        "SHORTEST": "_SHORTEST", "FLAKES": "_FLAKES", "GAUSS": "_GAUSS", "AWAY": "_AWAY", "WHOLE_BOX": "_WHOLE"
     },
-    ellipse_nodes: {
-        name: f"_{name}"
-        for name in (
-            "BETWEEN", "ALONG_YARNS", "CLOSER", "COARSEST", "CUT", "SLIGHT", "APART", "CUTS", "LENGTH", "MOST_BETWEEN",
-            "NEAREST",
-        )
+    wide: {"REACH": "_REACH"},
+    seen_areas: {"AREA_STEPS": "_STEPS", "AREA_TURN": "_TURN"},
+    view_lines: {
+        "VIEW_BETWEEN": "_BETWEEN", "VIEW_COARSEST": "_COARSEST", "VIEW_LENGTH": "_LENGTH", "LINE_BOX": "_BOX",
+        "FROM_ABOVE": "_FROM_ABOVE", "JUST_HALF": "_JUST",
+        **{name: f"_{name}" for name in ("DEVIATIONS", "FARTHEST", "STEEP", "SMEARED")},
     },
-    narrow: {"HIDDEN": "_HIDDEN", "PARTS": "_PARTS", "FAR": "_FAR", "LEAST": "_LEAST"},
-    wide: {
-        "FAINTEST": "_FAINTEST",
-        "COST_WAVES": "_WAVES", "COST_WAVE": "_WAVE", "COST_DENSITIES": "_DENSITIES", "COST_DENSITY": "_DENSITY",
-        "COST_PRODUCT": "_PRODUCT",
+    view_rays: {
+        "VIEW_HALVINGS": "_HALVINGS",
+        **{
+            name: f"_{name}"
+            for name in ("CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS", "THIRDS")
+        },
     },
+    visibility: {"NARROWINGS": "_NARROWINGS", "STRIP_POINTS": "_STRIP_POINTS"},
+    line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING"},
+    query: {"RAISED": "_RAISED"},
     mixture: {"LITTLE": "_LITTLE", "WIDEST": "_WIDEST"},
 }  # fmt: skip
 
 
 _ERROR_FUNCTION: Final = (0.3275911, 0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429)
 
-_OF_RAYS: Final[dict[ModuleType, dict[str, str]]] = {
-    narrow: {"FROM_ABOVE": "_FROM_ABOVE", "LINE_BETWEEN": "_BETWEEN", "JUST_HALF": "_JUST"},
-    shade: {"AWAY": "_AWAY", "WHOLE_BOX": "_WHOLE"},
-    seen_areas: {"SEEN_ANGLES": "SEEN_ANGLES", "AREA_STEPS": "_STEPS", "AREA_TURN": "_TURN"},
-    view_lines: {
-        "VIEW_BETWEEN": "_BETWEEN", "VIEW_COARSEST": "_COARSEST", "VIEW_LENGTH": "_LENGTH", "VIEW_NEAREST": "_NEAREST",
-        "VIEW_HALVINGS": "_HALVINGS",
-        **{
-            name: f"_{name}"
-            for name in (
-                "FOOTPRINT_ENDS", "DEVIATIONS", "CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS",
-                "NEVER", "FARTHEST", "STEEP", "SMEARED", "THIRDS",
-            )
-        },
-    },
-    visibility: {"NARROWINGS": "_NARROWINGS", "STRIP_POINTS": "_STRIP_POINTS"},
-    line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING"},
-}  # fmt: skip
-
-
-def ray_constants() -> dict[str, float | int]:
-    """Return the constants that footprints of view rays add."""
-    values: dict[str, float | int] = {name: column for column, name in enumerate(FLOAT)}
-    values |= {"FLOAT_COLUMNS": len(FLOAT), "MOST_ON_LINES": scratch.MOST_ON_LINES, "RAYS": coverage.RAYS}
-    values |= {"VERTICAL_SLOPE": 1e-6, "BORDER": 1.0 - 4e-6, "TURNS": 1e-6, "ROOT_HALF": math.sqrt(0.5)}
-    values |= {"ROOT_RIGHT": math.sqrt(0.5 * math.pi), **{f"ERF_{n}": value for n, value in enumerate(_ERROR_FUNCTION)}}
-    for module, renamed in _OF_RAYS.items():
-        values |= {name: vars(module)[own] for name, own in renamed.items()}
-    return {name: value if isinstance(value, int) else float(np.float32(value)) for name, value in values.items()}
-
 
 def constants() -> dict[str, float | int]:
     """Return the constants of the shader, by name; those of type int are integers there."""
-    line = mixture.COARSE_LINE
     first, second, third = soft_horizons.CURVATURES
     hidden_cosine, hidden_straight = vars(lobes)["_HIDDEN"]
     red, green, blue = LUMINANCE
@@ -164,18 +135,15 @@ def constants() -> dict[str, float | int]:
         "PI": math.pi,
         "INVERSE_PI": 1.0 / math.pi,
         "RIGHT": 0.5 * math.pi,
-        "ROOT_3": math.sqrt(3.0),
-        "GAUSS_COLUMNS": footprint_nodes.GAUSS_PLACES.shape[1],
-        "WAVES_TOGETHER": waves.TOGETHER,
-        "LINE_STEP": line.step,
-        "LINE_REACH": line.reach,
-        "LINE_TWO": line.two,
-        "LINE_THREE": line.three,
-        "LINE_HALF": line.half,
-        "LINE_POINTS": float(line.points),
-        "STRONGEST": line.most,
+        "ROOT_HALF": math.sqrt(0.5),
+        "ROOT_RIGHT": math.sqrt(0.5 * math.pi),
+        **{f"ERF_{n}": value for n, value in enumerate(_ERROR_FUNCTION)},
+        "VERTICAL_SLOPE": 1e-6,
+        "ROUNDING": 2.0**-22,
+        "TURNS": 1e-6,
+        "GAUSS_COLUMNS": view_lines.GAUSS_PLACES.shape[1],
+        "STRONGEST": mixture.COARSE_LINE.most,
         **{f"NODE_{name}": row for row, name in enumerate(("NORMAL", "TANGENT", "ALONG", "ACROSS", "HORIZONS"))},
-        "NODE_WAVES": WAVE_ROW,
         "FALL_ROWS": FALL_ROWS,
         "CURVATURE_0": first,
         "CURVATURE_1": second,
@@ -190,11 +158,12 @@ def constants() -> dict[str, float | int]:
         "LUMINANCE_GREEN": green,
         "LUMINANCE_BLUE": blue,
     }
-    for name, (module, columns) in ARRAYS.items():
+    for name in {**ARRAYS, **ADDED}:
+        module, columns = ARRAYS.get(name, (nodes, ()))
         values |= {column: vars(module)[column] for column in columns}
-        extra = CELLS_OF_GROUP if name == "GROUP" else ()
-        values |= {column: len(columns) + index for index, column in enumerate(extra)}
-        values[f"{name}_COLUMNS"] = len(columns) + len(extra)
+        added = ADDED.get(name, ())
+        values |= {column: len(columns) + index for index, column in enumerate(added)}
+        values[f"{name}_COLUMNS"] = len(columns) + len(added)
     for module, names in _SAME:
         values |= {name: vars(module)[name] for name in names}
     for module, renamed in _RENAMED.items():

@@ -16,7 +16,7 @@ from pipeline.shader.descriptor import GOLDEN, Shader, vectors
 from pipeline.shader.languages import ALL, LANGUAGES, ONNX, SOURCE, compiler_for, refuse_unknown, translate
 from pipeline.shader.networks import NEUMIP, SELVAGE, neumip_shader, selvage_shader
 from pipeline.shader.soft_nodes import SOFT_NODES, soft_nodes_shader
-from pipeline.shader.tables import PARALLAX, USUAL_FOOTPRINTS, wanted_kinds
+from pipeline.shader.tables import wanted_kinds
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -47,8 +47,7 @@ def write_shader(
     language : sequence of str
         Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
     kind : sequence of str
-        Kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY; of footprints:
-        PARALLAX, and WALLS, or PLANE_FOOTPRINTS. Soft nodes have USUAL_FOOTPRINTS if none of them is named.
+        Kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY.
 
     Raises
     ------
@@ -58,7 +57,7 @@ def write_shader(
         If slangc refuses the source.
     """
     refuse_unknown(language)
-    known = wanted_kinds(kind, USUAL_FOOTPRINTS if model in (None, SOFT_NODES) else ())
+    known = wanted_kinds(kind)
     wanted = [name for name in LANGUAGES if ALL in language or name in language]
     compiler = compiler_for(wanted) if wanted else None
     shader = shader_of(model, fabric, level, known)
@@ -96,10 +95,7 @@ def _source(shader: Shader) -> dict[str, bytes]:
     """Return the files of the source."""
     texts = {name: (_HOME / name).read_text(encoding="utf-8") for name in (*shader.sources, *ENTRIES)}
     name = shader.name
-    lines = ["// The model of this folder.", ""]
-    if PARALLAX in shader.about.kinds:
-        lines += ["/// Footprints are patches of view rays.", "#define PARALLAX", ""]
-    lines += [f'#include "{name}.slang"']
+    lines = ["// The model of this folder.", "", f'#include "{name}.slang"']
     if shader.sampled:
         lines += ['#include "importance.slang"', "", "/// Directions can be drawn.", "#define SAMPLED"]
     lines += ["", f"Answer bsdf(Query query) {{ return {name}(query); }}", ""]
@@ -123,8 +119,6 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
         return soft_nodes_shader(fabric, level, kinds)
     method = covering_model(model, fabric, "export", "model")
     if isinstance(method, Selvage):
-        if method.options.parallax:
-            raise BadInput("export", "model", model, "was trained with parallax, which soft nodes of the shader lack")
         return selvage_shader(method, fabric, level, kinds)
     if isinstance(method, Neumip):
         return neumip_shader(method, fabric, level, kinds)

@@ -24,7 +24,7 @@ from pipeline.compiled.arrays import Float32, Mask
 from pipeline.shader.constants import POINTS, WIDENING
 from pipeline.shader.tables import BEHIND, CURVATURE, Sides
 from pipeline.truth.footprint.mixture import deviations
-from pipeline.truth.query import STEEPEST_CURVATURE, Queries
+from pipeline.truth.query import LOWEST_VIEWER, STEEPEST_CURVATURE, Queries
 from weaves.colour import LUMINANCE
 
 GOLDEN_COLUMNS: Final = (
@@ -44,7 +44,7 @@ _DIGITS_OF_LINES = 32  # what is seen on a view line is found by steps: it loses
 _LEAST_RISE = 0.05  # of light and viewer
 _LEAST_CURVATURE = 0.01
 # Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow, wide,
-# wider than the repeat; thin ellipses, long and short, and thick ones.
+# wider than the repeat; thin ellipses, long and short, and thick ones; such as are shortened.
 _FOOTPRINTS = (
     ((0.01, 0.1), (1.0, 1.0)),
     ((0.1, 0.25), (1.0, 1.0)),
@@ -53,20 +53,23 @@ _FOOTPRINTS = (
     ((0.1, 0.7), (1.6, 6.0)),
     ((0.75, 2.0), (4.0, 8.0)),
     ((0.4, 3.0), (1.1, 2.5)),
+    ((60.0, 1000.0), (200.0, 1000.0)),
 )
 
 
 class Group(NamedTuple):
-    """Golden queries of one kind: how many, the sides of light and viewer, whether the cloth is curved."""
+    """Golden queries of one kind: their number, sides of light and viewer, whether cloth is curved, z of viewers."""
 
     rows: int
     light: float
     viewer: float
     curved: bool
+    rise: tuple[float, float] = (_LEAST_RISE, 1.0)
 
 
 GROUPS: Final = {
     "front": Group(128, 1.0, 1.0, False),
+    "grazing": Group(16, 1.0, 1.0, False, (1e-3, LOWEST_VIEWER)),
     "transmitted": Group(64, -1.0, 1.0, False),
     "back": Group(64, -1.0, -1.0, False),
     "back_transmitted": Group(64, 1.0, -1.0, False),
@@ -109,9 +112,8 @@ def golden(sides: Sides, read: Answering | None = None) -> Golden:
         if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
     }
     ends, picks = sides.front.repeat
-    digits = _DIGITS_OF_LINES if sides.front.parallax else 1
-    depth = sides.front.plane - sides.front.lowest  # 0 without view rays
-    return golden_of(groups, (int(ends), int(picks)), read or partial(read_sides, sides), digits=digits, depth=depth)
+    own, depth = read or partial(read_sides, sides), sides.front.plane - sides.front.lowest
+    return golden_of(groups, (int(ends), int(picks)), own, digits=_DIGITS_OF_LINES, depth=depth)
 
 
 def golden_of(
@@ -207,7 +209,8 @@ def _candidates(repeat: tuple[int, int], group: Group, rng: np.random.Generator)
     place = rng.random((count, 2)) * repeat
     # Half of the ellipses lie along the yarns.
     angle = np.where(rng.random(count) < 0.5, 0.0, rng.uniform(-0.5, 0.5, count)) * np.pi
-    wi, wo = (_front(rng, count) * np.array([1.0, 1.0, side]) for side in (group.light, group.viewer))
+    towards = (_front(rng, count), group.light), (_front(rng, count, group.rise), group.viewer)
+    wi, wo = (front * np.array([1.0, 1.0, side]) for front, side in towards)
     curvature = np.zeros(count)
     if group.curved:
         curvature = _LEAST_CURVATURE * (STEEPEST_CURVATURE / _LEAST_CURVATURE) ** rng.random(count)
@@ -215,9 +218,9 @@ def _candidates(repeat: tuple[int, int], group: Group, rng: np.random.Generator)
     return Queries(*(np.asarray(column, np.float32) for column in columns))
 
 
-def _front(rng: np.random.Generator, count: int) -> Float32:
-    """Return unit vectors, even over the directions in front, (N, 3)."""
-    z, turn = rng.uniform(_LEAST_RISE, 1.0, count), rng.uniform(0.0, 2.0 * np.pi, count)
+def _front(rng: np.random.Generator, count: int, rise: tuple[float, float] = (_LEAST_RISE, 1.0)) -> Float32:
+    """Return unit vectors, even over the directions in front whose z lies between two, (N, 3)."""
+    z, turn = rng.uniform(*rise, count), rng.uniform(0.0, 2.0 * np.pi, count)
     level = np.sqrt(1.0 - z * z)
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), z]).astype(np.float32)
 
@@ -229,8 +232,9 @@ def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits:
     change = np.zeros(len(answer))
     for _ in range(_TRIALS):
         moved = queries._replace(
-            u=_next(queries.u, rng, digits), v=_next(queries.v, rng, digits), sigma=_next(queries.sigma, rng, digits),
-            sigma_minor=_next(queries.sigma_minor, rng, digits),
+            # Sums have places in yarn spacings: a small one keeps no more digits there than 1 does.
+            u=_next(queries.u, rng, digits, 1.0), v=_next(queries.v, rng, digits, 1.0),
+            sigma=_next(queries.sigma, rng, digits), sigma_minor=_next(queries.sigma_minor, rng, digits),
         )  # fmt: skip
         change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
@@ -242,9 +246,7 @@ def turning(queries: Queries, depth: float) -> Mask:
     return np.asarray(square[:, 2] < 2.0 * queries.curvature * (square[:, 0] + square[:, 1]) * depth)
 
 
-def _next(values: Float32, rng: np.random.Generator, digits: int) -> Float32:
-    """Return numbers so many digits above or below, at random."""
-    towards = np.where(rng.random(len(values)) < 0.5, np.float32(-np.inf), np.float32(np.inf))
-    for _ in range(digits):
-        values = np.nextafter(values, towards, dtype=np.float32)
-    return values
+def _next(values: Float32, rng: np.random.Generator, digits: int, least: float = 0.0) -> Float32:
+    """Return numbers so many last digits above or below, at random; digits are those of `least` at least."""
+    step = digits * np.spacing(np.maximum(np.abs(values), np.float32(least)))
+    return values + np.where(rng.random(len(values)) < 0.5, -step, step)

@@ -39,7 +39,6 @@ from pipeline.shader.golden import GROUPS, golden, golden_of, read_sides
 from pipeline.shader.limits import MOST_HEIGHT
 from pipeline.shader.soft_nodes import SOFT_NODES_SOURCES, nodes_of
 from pipeline.shader.tables import (
-    PARALLAX,
     Place,
     Sides,
     constants_slang,
@@ -136,11 +135,11 @@ class Weights:
 
 _SELVAGE_BY_FAMILY: Final = (
     "share of the area seen, 0 to 1",
-    "area seen over that with nothing hidden",
-    "diffuse light with shadows over that without hiding",
-    "specular light with shadows over that without hiding",
-    "twice the share of the diffuse light within ramps of horizons",
-    "twice the share of the specular light within ramps of horizons",
+    "area seen over that with nothing hidden, at most 2",
+    "diffuse light with shadows over that without hiding, at most 2",
+    "specular light with shadows over that without hiding, at most 2",
+    "twice the share of the diffuse light within ramps of horizons, 0 to 1",
+    "twice the share of the specular light within ramps of horizons, 0 to 1",
     "s / (s + 0.05) of the specular component s, 1/sr",
     "c / (c + 0.05) of the diffuse component c, 1/sr",
 )
@@ -153,7 +152,7 @@ _SELVAGE_INPUTS: Final = (
     ),
     *(f"slope of the half vector along {axis}, at most 3" for axis in "xy"),
     "wi . wo",
-    "seen share q of the bare area",
+    "seen share q of the bare area, at most 2",
     "s / (s + 0.1) of the footprint s, the geometric mean of its deviations in yarn spacings",
     "r / (r + 0.02) of r = sqrt(q)",
     "twist of the warp, radians; its sign changes with each mirror",
@@ -166,10 +165,8 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Co
     trained = method.options.level
     if level not in (None, trained):
         raise BadInput("export", "level", level, f"leave it out: {method.name} was trained with level {trained}")
-    if PARALLAX in kinds:
-        raise BadInput("export", "kind", PARALLAX, f"{method.name} was trained on footprints of the fabric plane")
     refuse_large_repeat(fabric)
-    sides = tabulate_sides(fabric, trained, kinds)
+    sides = tabulate_sides(fabric, trained, kinds, method.options.walls == "rim")
     cloth, (weights, described, network) = tables(sides), correction(method, fabric)
     about_tables = descriptor(fabric, trained, cloth, kinds)
     about = Networks(
@@ -220,7 +217,7 @@ def correction(method: Selvage, fabric: Fabric) -> tuple[Weights, list[PlacedLay
         "SLOPE": SLOPE,
         "LARGEST": LARGEST_FACTOR,
         "BOUNDED": method.bound,
-        **{name: float(own[f"_{name}"]) for name in ("DARK", "SMALL", "STEEPEST")},
+        **{name: float(own[f"_{name}"]) for name in ("DARK", "SMALL", "STEEPEST", "MOST_SEEN")},
         "ALMOST_HIDDEN": float(own["_HIDDEN"]),
     }
     return weights, described, constants_slang(constants, "pipeline.models.selvage")

@@ -8,15 +8,7 @@ from typing import Final
 from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL
 from pipeline.shader.descriptor import Shader, descriptor
 from pipeline.shader.golden import golden
-from pipeline.shader.tables import (
-    PARALLAX,
-    Sides,
-    layout_slang,
-    refuse_large_repeat,
-    table_files,
-    tables,
-    tabulate_sides,
-)
+from pipeline.shader.tables import Sides, layout_slang, refuse_large_repeat, table_files, tables, tabulate_sides
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -25,14 +17,10 @@ SOFT_NODES: Final = "soft_nodes"
 
 SOFT_NODES_SOURCES: Final = (
     "soft_nodes.slang", "importance.slang", "buffers.slang", "arithmetic.slang", "horizons.slang", "query.slang",
-    "look.slang", "colours.slang", "shade.slang", "fixed_nodes.slang", "placed_nodes.slang",
+    "look.slang", "colours.slang", "shade.slang", "pieces.slang", "fixed_nodes.slang", "seen_areas.slang",
+    "view_rays.slang", "view_lines.slang", "coverage.slang",
 )  # fmt: skip
 """Files of the source."""
-
-PARALLAX_SOURCES: Final = (
-    "seen_areas.slang", "view_rays.slang", "displaced_nodes.slang", "view_lines.slang", "coverage.slang",
-)  # fmt: skip
-"""Files that footprints of view rays add."""
 
 
 def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
@@ -45,7 +33,7 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
     cloth = tables(sides)
     return Shader(
         SOFT_NODES,
-        (*SOFT_NODES_SOURCES, *(PARALLAX_SOURCES if PARALLAX in kinds else ())),
+        SOFT_NODES_SOURCES,
         {"layout.slang": layout_slang(cloth)},
         table_files(cloth),
         descriptor(fabric, level, cloth, kinds),

@@ -3,9 +3,9 @@
     integers   int32: scalars of `SoftNodeTable`, of the front and of the back, then arrays
     numbers    float32: scalars, then colours, yarns, extents of pieces, the rules along both axes and those of Gauss
     nodes      float32 (rows, 4), `stride` rows a node: normal and 1 / n_z; tangent and share of the area; change of the
-               tangent along; across; mean and sharpness of horizons, two azimuths a row; cosine and sine of waves, two
-               a row; the horizons of the other side, if known; falls over curved cloth, if known, four azimuths a row;
-               with parallax areas that a viewer sees, four azimuths a row, angle by angle
+               tangent along; across; mean and sharpness of horizons, two azimuths a row; the horizons of the other
+               side, if known; falls over curved cloth, if known, four azimuths a row; areas that a viewer sees, four
+               azimuths a row, angle by angle
     grid       uint8: horizons of the pieces, 255 straight above; those of the other side; falls; the same of the back
 
 `layout.slang` holds the constants and a function that reads the scalars and places.
@@ -25,14 +25,12 @@ from PIL import Image
 from pipeline.analytic.coverage import ray_points
 from pipeline.analytic.importance.lobes import point_places
 from pipeline.analytic.soft_horizons import AZIMUTHS
-from pipeline.analytic.soft_nodes import footprint_nodes
-from pipeline.analytic.soft_nodes.groups import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable, tabulate
+from pipeline.analytic.soft_nodes.nodes import SoftNodeTable, tabulate
 from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES
-from pipeline.analytic.soft_nodes.waves import TOGETHER
+from pipeline.analytic.soft_nodes.view_lines import GAUSS_PLACES, GAUSS_WEIGHTS
 from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
-from pipeline.shader.constants import FALL_ROWS, POINTS, TEXTURE_WIDTH, WAVE_ROW, constants, ray_constants
+from pipeline.shader.constants import FALL_ROWS, OTHER_ROW, POINTS, TEXTURE_WIDTH, constants
 from pipeline.shader.limits import MOST_HEIGHT, MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.truth.geometry.heightfield import AXIS_DROP, BEND_RADIUS, HALF_LENGTH
 from weaves.errors import BadInput, one_line
@@ -42,18 +40,6 @@ BEHIND: Final = "behind"
 CURVATURE: Final = "curvature"
 QUERY_KINDS: Final = (BEHIND, CURVATURE)
 """Kinds of queries beside light and viewer in front of flat cloth, as `pipeline.models` names them."""
-
-PARALLAX: Final = "parallax"
-"""Kind of all queries whose footprints are patches of view rays; it needs a program of its own."""
-
-WALLS: Final = "walls"
-"""Kind of PARALLAX whose rays that meet a wall see the yarn's rim above it; the program is the same."""
-
-PLANE_FOOTPRINTS: Final = "flat"
-"""Kind of all queries whose footprints are patches of the fabric plane, in place of USUAL_FOOTPRINTS."""
-
-USUAL_FOOTPRINTS: Final = (PARALLAX, WALLS)
-"""Kinds of the footprints of soft nodes if no kind says which."""
 
 EVERY: Final = "all"
 """All of QUERY_KINDS."""
@@ -97,54 +83,37 @@ class ClothTables(NamedTuple):
 
 
 _MEANINGS: Final = {
-    "groups": "first node, lines of nodes, rules along x and y, family, first cell, number of cells",
+    "groups": "first node, lines of nodes, family, first cell, number of cells",
     "group_cells": "end and pick of the cells of all groups",
     "piece_starts": "first piece of every cell, pick by pick; their end",
     "pieces": "family (0 warp, 1 weft, 2 gap) and grid of every piece",
-    "wave_periods": "periods of every wave in a repeat, along x and y",
     "colours": "linear Rec. 709: k_s, k_d and k_dt, each of warp and weft",
-    "floats": "with parallax, of every piece: bend radius, half length, drop of its float; greatest height of its cell",
-    "spots": "with parallax, of every line of nodes: places in x and y in the cell, shares of it, heights",
-    "ray_points": "with parallax, rays of the coverage: deviations along both axes of a footprint",
+    "floats": "of every piece: bend radius, half length, drop of its float; greatest height of its cell",
+    "spots": "of every line of nodes: places in x and y in the cell, shares of it, heights",
+    "ray_points": "rays of the coverage: deviations along both axes of a footprint",
     "point_places": "points of the lobes: in deviations of a footprint; in repeats, where it covers the cloth evenly",
     "yarn": "warp, weft: radius, 1/radius, sine and cosine of the twist, roughness, relief, blend, largest bend",
     "bounds": "extent of every piece in x and y within its cell; offset, curve, largest sine of its inclination",
-    "places_x": "nodes of the rules along x, within a cell",
-    "weights_x": "their weights",
-    "places_y": "nodes of the rules along y",
-    "weights_y": "their weights",
-    "wave_size": "squared wave numbers, 1/yarn spacings^2",
     "gauss_places": "Gauss-Legendre rules of 0 to 6 nodes, filled up to 8",
     "gauss_weights": "their weights",
-    "hermite_places": "Gauss-Hermite rule, in deviations",
-    "hermite_weights": "its weights",
 }
 
 
-def wanted_kinds(names: Collection[str], usual: Collection[str] = USUAL_FOOTPRINTS) -> frozenset[str]:
-    """Return the kinds that names choose, with the `usual` ones of footprints; BadInput if one is none."""
+def wanted_kinds(names: Collection[str]) -> frozenset[str]:
+    """Return the kinds of queries that names choose; BadInput if one is none."""
     for name in names:
-        if name not in (known := (*QUERY_KINDS, EVERY, PARALLAX, WALLS, PLANE_FOOTPRINTS)):
+        if name not in (known := (*QUERY_KINDS, EVERY)):
             raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join(known)}")
-    kinds = {
-        *names,
-        *(QUERY_KINDS if EVERY in names else ()),
-        *(() if {PARALLAX, PLANE_FOOTPRINTS} & {*names} else usual),
-    }
-    if WALLS in kinds and PARALLAX not in kinds:
-        raise BadInput("export", "kind", WALLS, f"only view rays meet walls; name {PARALLAX} too")
-    if {PARALLAX, PLANE_FOOTPRINTS} <= kinds:
-        raise BadInput("export", "kind", PLANE_FOOTPRINTS, f"names other footprints than {PARALLAX}; choose one")
-    return frozenset(kinds) - {EVERY, PLANE_FOOTPRINTS}
+    return frozenset(QUERY_KINDS if EVERY in names else names)
 
 
-def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str]) -> Sides:
-    """Return the tables of a fabric at a level of detail, for kinds of queries."""
-    behind, curved, parallax = BEHIND in kinds, CURVATURE in kinds, PARALLAX in kinds
-    reflected, transmitted, rims = colours(fabric), colours(fabric, transmitted=True), WALLS in kinds
+def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str], rims: bool = True) -> Sides:
+    """Return the tables of a fabric at a level of detail, for kinds of queries; `rims` as for `tabulate`."""
+    behind, curved = BEHIND in kinds, CURVATURE in kinds
+    reflected, transmitted = colours(fabric), colours(fabric, transmitted=True)
     return Sides(
-        tabulate(fabric, behind=behind, level=level, curved=curved, parallax=parallax, rims=rims),
-        tabulate(fabric.back(), behind=True, level=level, parallax=parallax, rims=rims) if behind else None,
+        tabulate(fabric, behind=behind, level=level, curved=curved, rims=rims),
+        tabulate(fabric.back(), behind=True, level=level, rims=rims) if behind else None,
         np.concatenate([reflected, transmitted[2:]]).astype(np.float32),
     )
 
@@ -224,49 +193,50 @@ def _side(table: SoftNodeTable) -> _Side:
     """Return what the shader reads of one side."""
     rows = _node_rows(table)
     groups, cells = _groups(table)
-    waves, behind, curvatures = len(table.waves), int(len(table.behind_grid) > 0), len(table.grid_falls)
+    behind, curvatures = int(len(table.behind_grid) > 0), len(table.grid_falls)
+    least, greatest = map(float, table.shown)
     integers: dict[str, int | float] = {
         "ends": int(table.repeat[0]),
         "picks": int(table.repeat[1]),
         "size": table.grid.shape[2],
         "per_azimuth": table.grid.shape[2] * table.grid.shape[3],
         "grid_size": table.grid.size,
-        "legendre": table.legendre,
-        "blocks": len(table.evenly),
         "stride": rows.shape[1],
-        "waves": waves,
-        "rules_x": len(table.places_x) // COLUMNS,
-        "rules_y": len(table.places_y) // COLUMNS,
         "group_count": len(groups),
         "behind": behind,
         "curvatures": curvatures,
-        "behind_row": WAVE_ROW + waves // 2,
-        "falls_row": WAVE_ROW + waves // 2 + behind * (AZIMUTHS // 2),
+        "behind_row": OTHER_ROW,
+        "falls_row": OTHER_ROW + behind * (AZIMUTHS // 2),
+        "areas_row": rows.shape[1] - SEEN_ANGLES * FALL_ROWS,
+        "rims": int(table.rims),
     }
     numbers: dict[str, int | float] = {
         "thickness": float(table.thickness),
         "uniform": table.uniform,
-        "waves_from": table.waves_from,
-        "lines_per_cell": table.lines_per_cell,
-        "narrow": float(table.narrow),
+        "highest": table.highest,
+        "lowest": table.lowest,
+        "plane": table.plane,
+        "shown_least": least,
+        "shown_greatest": greatest,
+        "view_lines": table.view_lines,
+        "spacing": table.spacing,
     }
     of_integers: dict[str, npt.NDArray[Any]] = {
         "groups": groups,
         "group_cells": cells,
         "piece_starts": table.piece_starts,
         "pieces": table.pieces,
-        "wave_periods": table.waves,
     }
-    names = ("yarn", "bounds", "places_x", "weights_x", "places_y", "weights_y", "wave_size")
-    of_numbers = {name: getattr(table, name) for name in names} | _rules()
-    if table.parallax:
-        least, greatest = map(float, table.shown)
-        numbers |= {"highest": table.highest, "lowest": table.lowest, "plane": table.plane}
-        numbers |= {"shown_least": least, "shown_greatest": greatest, "view_lines": table.view_lines}
-        numbers |= {"spacing": table.spacing}
-        integers |= {"rims": int(table.rims), "areas_row": rows.shape[1] - SEEN_ANGLES * FALL_ROWS}
-        floats = np.column_stack([table.floats[:, [BEND_RADIUS, HALF_LENGTH, AXIS_DROP]], table.crowns])
-        of_numbers |= {"floats": floats.astype(np.float32), "spots": table.spots, "ray_points": ray_points()}
+    floats = np.column_stack([table.floats[:, [BEND_RADIUS, HALF_LENGTH, AXIS_DROP]], table.crowns])
+    of_numbers: dict[str, npt.NDArray[Any]] = {
+        "yarn": table.yarn,
+        "bounds": table.bounds,
+        "floats": floats.astype(np.float32),
+        "spots": table.spots,
+        "ray_points": ray_points(),
+        "gauss_places": GAUSS_PLACES,
+        "gauss_weights": GAUSS_WEIGHTS,
+    }
     grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
     return _Side(integers, numbers, of_integers, of_numbers, rows, grid)
 
@@ -299,8 +269,7 @@ def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> st
 
 def layout_slang(cloth: ClothTables) -> str:
     """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the functions that read it."""
-    values = constants() | (ray_constants() if "view_lines" in cloth.scalars else {})
-    lines = [constants_slang(values, "pipeline.analytic").rstrip()]
+    lines = [constants_slang(constants(), "pipeline.analytic").rstrip()]
     kinds = {name: "int" if isinstance(value, int) else "float" for name, value in cloth.scalars.items()}
     lines += ["", "struct Table {", *(f"    {kind} {name};" for name, kind in kinds.items()), "};", ""]
     lines += ["int integer(int i);", "float number(int i);", ""]
@@ -320,27 +289,18 @@ def layout_slang(cloth: ClothTables) -> str:
 
 def _node_rows(table: SoftNodeTable) -> Float32:
     """Return the rows of all nodes, (nodes, stride, 4)."""
-    count, waves = table.evenly.size, len(table.waves)
+    count = table.evenly.size
     surface = table.nodes.transpose(0, 2, 1).reshape(count, -1)
-    behind, curvatures = len(table.behind_grid) > 0, len(table.falls)
-    angles = table.areas.shape[1]
-    parts = [WAVE_ROW, waves // 2, AZIMUTHS // 2 if behind else 0, curvatures * FALL_ROWS, angles * FALL_ROWS]
-    rows = np.zeros((count, sum(parts), 4), np.float32)
-    ends = np.cumsum(parts)
-    rows[:, 0] = surface[:, :4]
-    rows[:, 1, :3], rows[:, 1, 3] = surface[:, 4:7], table.evenly.ravel()
-    rows[:, 2, :3], rows[:, 3, :3] = surface[:, 7:10], surface[:, 10:13]
-    rows[:, 4:WAVE_ROW] = _horizon_rows(table.mean, table.sharpness)
-    # (blocks, H / TOGETHER, 2 TOGETHER, BLOCK_NODES): cosines and sines of one wave follow each other.
-    of_waves = table.wave_nodes.reshape(-1, waves // TOGETHER, 2 * TOGETHER, BLOCK_NODES)
-    rows[:, ends[0] : ends[1]] = of_waves.transpose(0, 3, 1, 2).reshape(count, -1, 4)
-    if behind:
-        rows[:, ends[1] : ends[2]] = _horizon_rows(table.behind_mean, table.behind_sharpness)
-    falls = table.falls.reshape(curvatures * AZIMUTHS, count)
-    rows[:, ends[2] : ends[3]] = falls.T.reshape(count, -1, 4)
-    areas = table.areas.swapaxes(0, 1).reshape(angles * table.areas.shape[0], count)
-    rows[:, ends[3] :] = areas.T.reshape(count, -1, 4)
-    return rows
+    first = np.zeros((count, 4, 4), np.float32)
+    first[:, 0] = surface[:, :4]
+    first[:, 1, :3], first[:, 1, 3] = surface[:, 4:7], table.evenly.ravel()
+    first[:, 2, :3], first[:, 3, :3] = surface[:, 7:10], surface[:, 10:13]
+    parts = [first, _horizon_rows(table.mean, table.sharpness)]
+    if len(table.behind_grid):
+        parts.append(_horizon_rows(table.behind_mean, table.behind_sharpness))
+    for by_azimuth in (table.falls, table.areas.swapaxes(0, 1)):
+        parts.append(by_azimuth.reshape(-1, count).T.reshape(count, -1, 4))
+    return np.concatenate(parts, axis=1)
 
 
 def _horizon_rows(mean: Float32, sharpness: Float32) -> Float32:
@@ -350,7 +310,7 @@ def _horizon_rows(mean: Float32, sharpness: Float32) -> Float32:
 
 
 def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
-    """Return the groups with their lists of cells, (G, 7), and these cells, (cells, 2)."""
+    """Return the groups with their lists of cells, (G, 5), and these cells, (cells, 2)."""
     ends = int(table.repeat[0])
     starts = table.group_starts.astype(np.int64)
     of_cell = np.repeat(np.arange(len(starts) - 1), starts[1:] - starts[:-1])
@@ -359,15 +319,6 @@ def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     cells = np.stack([of_cell[order] % ends, of_cell[order] // ends], axis=1)
     return np.column_stack([table.groups, first, counts]).astype(np.int32), cells.astype(np.int32)
-
-
-def _rules() -> dict[str, Float32]:
-    """Return places and weights of the rules of Gauss and Legendre, (7, 8), and of the rule of Hermite, (4,)."""
-    own = vars(footprint_nodes)
-    rules = {f"gauss_{part}": own[f"GAUSS_{part.upper()}"] for part in ("places", "weights")}
-    return rules | {
-        f"hermite_{part}": own[f"_HERMITE_{part.upper()}"][: footprint_nodes.HERMITE] for part in ("places", "weights")
-    }
 
 
 def table_files(cloth: ClothTables) -> dict[str, bytes]:

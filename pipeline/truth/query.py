@@ -150,8 +150,11 @@ def _refuse_shapes(queries: Queries, where: str) -> None:
             raise BadInput(where, f"shape of {name}", np.shape(column), f"must be {shape}: all columns have equal rows")
 
 
-def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
-    """Return the fault of each query that has no answer: row -> (column, value, what is allowed)."""
+def faults(queries: Queries, parallax: bool = False) -> dict[int, tuple[str, object, str]]:
+    """Return the fault of each query that has no answer: row -> (column, value, what is allowed).
+
+    With `parallax` a viewer lower than `LOWEST_VIEWER` has none.
+    """
     found: dict[int, tuple[str, object, str]] = {}
 
     def note(rows: Any, name: str, allowed: str) -> None:
@@ -171,17 +174,16 @@ def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
     note((queries.curvature < 0) | (queries.curvature > STEEPEST_CURVATURE), "curvature", allowed)
     curved_behind = (queries.curvature > 0) & (queries.wo[:, 2] < 0)
     note(curved_behind, "curvature", "must be 0 where the viewer is behind the cloth")
+    if parallax:
+        low = np.abs(queries.wo[:, 2]) < LOWEST_VIEWER
+        note(low, "wo", "with parallax a viewer must be within 89 degrees of the normal")
     return found
 
 
 def validate(queries: Queries, where: str = "queries", parallax: bool = False) -> None:
     """Refuse queries that have no answer with a BadInput that names the first and counts the others."""
     _refuse_shapes(queries, where)
-    found = faults(queries)
-    if parallax:
-        allowed = "with parallax a viewer must be within 89 degrees of the normal"
-        for low in np.flatnonzero(np.abs(queries.wo[:, 2]) < LOWEST_VIEWER).tolist():
-            found.setdefault(low, ("wo", queries.wo[low].tolist(), allowed))
+    found = faults(queries, parallax)
     if not found:
         return
     row = min(found)

@@ -14,7 +14,7 @@ const LIMITS = { plane: { tilt: [2, 89], turn: [-180, 180] }, sphere: { tilt: [-
   drape: { tilt: [-35, 60], turn: [-75, 75] } };
 const YARN = { roughness: ["Roughness", 0.05, 1, 0.01, ""], twist: ["Twist", -60, 60, 1, "°"],
   blend: ["Normal’s weight", 0, 1, 0.01, ""] };
-const TILES = { truth: "Truth", map_material: "Map material" };
+const TILES = { truth: "Truth", flat: "Truth, flat footprints", map_material: "Map material" };
 const FRAME = 1000 / 30;
 const MOST_PIXELS = 1.6e6;
 const ERROR_SIZE = 128;
@@ -77,26 +77,27 @@ class Viewer {
       && state.thickness === content.thickness && same("warp") && same("weft");
   }
 
-  // Tiles, as the truth's, show the views of the page with the fabric's own yarns.
-  get tiled() {
+  // Whether there is a tile of a name: they show views of the page with the fabric's own yarns.
+  tiled(name) {
     const { state, content } = this;
-    return state.view !== null && content.views[state.view].size > 0 && this.own;
+    return state.view !== null && name in (content.views[state.view].tiles ?? {}) && this.own;
   }
 
   // The method of a name as it can be drawn in this state, and its label.
   method(name) {
     const { state } = this;
-    if (name in TILES && this.tiled) {
+    if (this.tiled(name)) {
       return { kind: TILE, view: state.view, tile: name, level: this.usual, label: TILES[name] };
     }
     if (name === "selvage" && this.own && this.picture.knows(SELVAGE)) {
       return { kind: SELVAGE, level: this.content.selvage.level, label: "Selvage" };
     }
-    if (name === "point") return { kind: POINT, level: this.usual, label: "One point" };
+    if (name === "point" || !this.picture.knows(NODES)) {
+      return { kind: POINT, level: this.usual, label: "One point" };
+    }
     const wished = name === "truth" ? Math.max(...this.levels) : Number(name) || this.usual;
     const level = this.picture.indexOf(state, wished) === undefined ? this.usual : wished;
-    const flat = name === "flat" || !this.picture.knows(NODES);
-    return { kind: flat ? FLAT : NODES, level, label: `${flat ? "Flat footprints" : "Soft nodes"}, k = ${level}` };
+    return { kind: NODES, level, label: `Soft nodes, k = ${level}` };
   }
 
   get methods() { return [this.method(this.state.left), this.method(this.state.right)]; }
@@ -193,16 +194,21 @@ class Viewer {
   }
 
   label(methods) {
-    const { state } = this;
+    const { state, content } = this;
     ["left", "right"].forEach((side, index) => { byId(`label-${side}`).textContent = methods[index].label; });
-    const lacking = this.tiled ? [] : [state.left, state.right].filter((name) => name in TILES);
-    const names = [...new Set(lacking.map((name) => TILES[name]))].join(" and ");
-    const said = names ? [`${names}: known at the five views alone, of the yarns as they are.`] : [];
-    if ([state.left, state.right].includes("selvage")) {
+    const names = [...new Set([state.left, state.right])];
+    const said = names.filter((name) => name in TILES && !this.tiled(name)).map((name) => {
+      const known = content.views.filter((view) => name in (view.tiles ?? {})).map((view) => view.name);
+      return `${TILES[name]}: known at ${known.join(", ")} alone, of the yarns as they are.`;
+    });
+    if (names.includes("selvage")) {
       if (!this.own) said.push("Selvage: known of the yarns as they are.");
       else if (!this.picture.knows(SELVAGE)) said.push("Selvage: its shader does not compile here.");
     }
-    byId("notice").textContent = said.length ? `${said.join(" ")} Soft nodes are shown instead.` : "";
+    if (names.some((name) => name !== "point" && !this.tiled(name)) && !this.picture.knows(NODES)) {
+      said.push("Soft nodes: their shader does not compile here. One point is shown instead.");
+    } else if (said.length) said.push("Soft nodes are shown instead.");
+    byId("notice").textContent = said.join(" ");
     byId("line").style.left = `${100 * state.wipe}%`;
     const size = (2 * this.content.shapes.spread * state.distance) / Math.min(this.canvas.width, this.canvas.height);
     byId("footprint").textContent = `${rounded(size)} yarns, in the middle`;
@@ -235,8 +241,8 @@ class Viewer {
   }
 
   async measure() {
-    const { state, picture, tiled, job } = this;
-    const view = tiled ? this.content.views[state.view] : null;
+    const { state, picture, job } = this;
+    const view = this.tiled("truth") ? this.content.views[state.view] : null;
     const size = view ? view.size : ERROR_SIZE;
     const [left, right] = this.methods;
     const reference = view ? this.method("truth") : right;
@@ -357,7 +363,6 @@ function makeChoices(viewer, bind) {
     bind.updates.push((state) => { input.checked = state.shape === input.value; });
   }
   const names = [["point", "One point"], ...viewer.levels.map((level) => [String(level), `Soft nodes, k = ${level}`])];
-  names.push(["flat", `Flat footprints, k = ${viewer.usual}`]);
   if (viewer.content.selvage) names.push(["selvage", "Selvage"]);
   names.push(...viewer.content.tiles.map((name) => [name, TILES[name]]));
   for (const side of ["left", "right"]) {
@@ -365,8 +370,10 @@ function makeChoices(viewer, bind) {
     byId(side).addEventListener("change", () => {
       const value = byId(side).value;
       viewer.set({ [side]: value });
-      if (!(value in TILES) || viewer.state.view !== null) return;
-      viewer.go(viewer.content.views.findIndex((view) => view.shape === viewer.state.shape));
+      if (!(value in TILES) || viewer.tiled(value)) return;
+      const known = viewer.content.views.filter((view) => value in view.tiles);
+      const view = known.find(({ shape }) => shape === viewer.state.shape) ?? known[0];
+      viewer.go(viewer.content.views.indexOf(view));
     });
     bind.updates.push((state) => { byId(side).value = state[side]; });
   }
@@ -457,7 +464,7 @@ function listen(viewer) {
 
 async function start() {
   try {
-    const sources = { flat: byId("shader").textContent, seen: byId("seen").textContent, selvage: byId("selvage").textContent };
+    const sources = Object.fromEntries(["points", "nodes", "selvage"].map((name) => [name, byId(name).textContent]));
     const viewer = new Viewer(JSON.parse(byId("content").textContent), sources);
     const updates = [];
     const input = (element, changes) => element.addEventListener("input", () => viewer.set(changes(), true));

@@ -7,7 +7,6 @@ const NODES = 0;
 const POINT = 1;
 const TILE = 2;
 const SELVAGE = 3;
-const FLAT = 4;
 
 function direction(turn, tilt) {
   const [a, b] = [radians(turn), radians(tilt)];
@@ -15,8 +14,7 @@ function direction(turn, tilt) {
 }
 
 class Picture {
-  // `sources`: a shader that draws points, tiles and nodes in footprints of the fabric plane, one that draws nodes in
-  // those of view rays, and one that draws `selvage`.
+  // `sources`: shaders that draw points and tiles, soft nodes, and `selvage`.
   constructor(canvas, sources, content) {
     this.content = content;
     this.sources = sources;
@@ -32,12 +30,12 @@ class Picture {
     this.target = gl.createFramebuffer();
     this.empty = this.texture("tile", new Uint16Array(4), 1);
     this.known = new Map();
-    this.use(FLAT);
+    this.use(POINT);
   }
 
   // Draw by the program of a kind of method; it is compiled when it is first needed.
   use(kind) {
-    const name = { [NODES]: "seen", [SELVAGE]: "selvage" }[kind] ?? "flat";
+    const name = { [NODES]: "nodes", [SELVAGE]: "selvage" }[kind] ?? "points";
     if (!this.programs.has(name)) this.programs.set(name, this.compiled(this.sources[name]));
     this.gl.useProgram(this.programs.get(name));
   }
@@ -196,8 +194,7 @@ class Picture {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(gl.TEXTURE_2D, texture);
       });
-      const drawn = [SELVAGE, FLAT].includes(kind) ? NODES : kind; // their programs have no other nodes
-      gl.bufferData(gl.UNIFORM_BUFFER, this.view(state, drawn, width, height, components), gl.DYNAMIC_DRAW);
+      gl.bufferData(gl.UNIFORM_BUFFER, this.view(state, kind, width, height, components), gl.DYNAMIC_DRAW);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     });
     gl.disable(gl.SCISSOR_TEST);

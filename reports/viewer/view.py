@@ -30,14 +30,14 @@ from pipeline.scenes.shade import colours
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.networks import correction
-from pipeline.shader.tables import PARALLAX, WALLS, ClothTables, Sides, tables, tabulate_sides
+from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import LOWEST_VIEWER, Answers, Queries
 from reports.images.texture import png_bytes
 from reports.options import LEAST_TILE, MOST_TILE
-from reports.viewer.generate import network, shipped
+from reports.viewer.generate import SHADERS, network, shipped
 from reports.viewer.shapes import HALF_ARC, HALF_HEIGHT, VIEW_SPREAD, Seen, Viewpoint, arcs, seen, sphere_radius
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -59,6 +59,11 @@ VIEWS: Final = {
 TILES: Final = ("map_material",)
 """Methods that the page has as pictures at its views, beside the truth."""
 
+FLAT: Final = "flat"
+"""The truth with footprints of the fabric plane, a tile of the view FLAT_VIEW alone."""
+
+FLAT_VIEW: Final = "One yarn"
+
 STILL: Final = "Drape"
 """View of the still picture, for a browser without WebGL 2."""
 
@@ -78,8 +83,8 @@ TWISTED: Final = 30.0
 """Twist of the nodes of yarns without twist, in degrees: the page turns all nodes to the twist that it shows, and finds
 their extent across the yarn from how their fibres turn, which they do not without twist."""
 
-_PRECISION = TruthOptions(relative_error=0.01, parallax=True, walls="rim")
-_OF_PLANE = TruthOptions(relative_error=0.01, parallax=False, walls="left_out")
+_PRECISION = TruthOptions(relative_error=0.01)
+_OF_PLANE = TruthOptions(relative_error=0.01, parallax=False)
 _BRIGHT = 0.8  # linear value that few pixels of the still picture exceed
 
 
@@ -112,9 +117,7 @@ def whole_page(shown: dict[str, object]) -> str:
         "FABRIC": html.escape(str(shown["fabric"]).replace("_", " ")),
         "STILL": str(shown["still"]),
         "STYLE": _text("page.css"),
-        "SHADER": shipped("cloth"),
-        "SEEN": shipped("seen"),
-        "SELVAGE": shipped("selvage"),
+        **{name.upper(): shipped(name) for name in SHADERS},
         # No content can end the element.
         "CONTENT": json.dumps({key: value for key, value in shown.items() if key != "still"}).replace("<", "\\u003c"),
         "SCRIPT": "\n".join(_text(name) for name in SCRIPTS),
@@ -161,7 +164,7 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
         "tables": of_shapes,
         "selvage": _selvage(fabric, of_shapes),
         "grids": grids,
-        "tiles": [*methods, TRUTH] if truth else [],
+        "tiles": [*methods, FLAT, TRUTH] if truth else [],
         "views": [_view(fabric, name, camera, truth, methods) for name, camera in VIEWS.items()],
         "shapes": {
             "spread": VIEW_SPREAD,
@@ -205,7 +208,7 @@ def _nodes(fabric: Fabric, level: int) -> Sides:
     """Return the front of a fabric, of yarns without twist as if they had TWISTED."""
     yarns = {"warp": fabric.warp, "weft": fabric.weft}
     turned = {name: yarn.model_copy(update={"twist": _twist(yarn)}) for name, yarn in yarns.items()}
-    return tabulate_sides(fabric.model_copy(update=turned), level, (PARALLAX, WALLS))
+    return tabulate_sides(fabric.model_copy(update=turned), level, ())
 
 
 def _twist(yarn: Yarn) -> float:
@@ -277,6 +280,8 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
         deviation = np.sqrt(np.square(answers.standard_error.astype(np.float64)) @ np.square(shown))
         tiles = {key: method.predict(fabric, picture.queries) for key, method in methods.items()}
         tiles[TRUTH] = answers.mean
+        if name == FLAT_VIEW:
+            tiles[FLAT] = estimate(fabric, picture.queries, _OF_PLANE, 0).mean
         view["tiles"] = {key: packed(_components(picture, tile).astype(np.float16)) for key, tile in tiles.items()}
         view["standard_error"] = float(np.sqrt(np.square(deviation).mean()) / (answers.mean @ shown).mean())
     return view
@@ -301,7 +306,7 @@ def _components(picture: Seen, values: npt.NDArray[np.floating]) -> Float64:
 def _still(fabric: Fabric) -> tuple[bytes, float]:
     """Return a picture by soft nodes as PNG, and the irradiance at which it is neither dark nor glaring."""
     picture = seen(VIEWS[STILL], STILL_SIZE, fabric.weave.repeat[0])
-    values = read_queries(tabulate(fabric, parallax=True, rims=True), picture.queries).components @ colours(fabric)
+    values = read_queries(tabulate(fabric), picture.queries).components @ colours(fabric)
     irradiance = float(_BRIGHT / max(np.percentile(values.max(axis=1), 97.0), 1e-6))
     pixels = np.zeros((*picture.cloth.shape, 4))
     pixels[picture.cloth, 3] = 1.0

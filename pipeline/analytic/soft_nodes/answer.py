@@ -30,12 +30,17 @@ SMALLEST: Final = np.float32(1e-3)
 """Least deviation of a footprint: a thousandth of a yarn is a point. Smaller ones would fall between the digits of a
 place."""
 
+LONGEST: Final = 48.0
+"""Largest deviation, in yarn spacings, of a footprint that does not cover the cloth evenly across: longer ones see the
+same, up to stripes of yarns almost along them, and would touch thousands of cells."""
+
 _0 = np.float32(0.0)
 
 
 def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32]:
-    """Return what `sum_queries` returns for N queries, the viewer in front."""
-    columns = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo, queries.curvature))
+    """Return what `sum_queries` returns for N queries, the viewer in front and no lower than LOWEST_VIEWER."""
+    looks = queries.raised()
+    columns = (np.ascontiguousarray(column, np.float32) for column in (looks.wi, looks.wo, looks.curvature))
     return sum_queries(table, footprints(queries, SMALLEST), *columns)
 
 
@@ -70,6 +75,18 @@ def sum_queries(
 
 
 @kernel
+def shortened(
+    deviation_x: np.float32, deviation_y: np.float32, correlation: np.float32, narrowest: np.float32
+) -> tuple[np.float32, np.float32, np.float32]:
+    """Return a footprint no longer than `LONGEST` along its own longer axis, as wide as before across."""
+    xx, yy, across = np.float64(deviation_x) ** 2, np.float64(deviation_y) ** 2, np.float64(narrowest) ** 2
+    along = xx + yy - across
+    share = min((max(LONGEST * LONGEST, across) - across) / (along - across), 1.0)
+    x, y = math.sqrt(across + share * max(xx - across, 0.0)), math.sqrt(across + share * max(yy - across, 0.0))
+    return np.float32(x), np.float32(y), np.float32(share * correlation * deviation_x * deviation_y / (x * y))
+
+
+@kernel
 def _rises(table: SoftNodeTable, wo: Float32, bend: np.float32) -> bool:
     """Return whether rays over curved cloth rise again before they have sunk to the least height that is seen."""
     depth = np.float32(table.plane) - table.shown[0]
@@ -96,7 +113,11 @@ def _sum_rows(
         x = np.float64(u[n]) - ends * math.floor(np.float64(u[n]) / ends)
         y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
         dx, dy, rho = deviation_x[n], deviation_y[n], correlation[n]
-        narrowest = min(dx, dy) if rho == _0 else np.float32(narrow_axis(dx, dy, rho))
+        narrowest = min(dx, dy)
+        if rho != _0:
+            narrowest = np.float32(narrow_axis(dx, dy, rho))
+        if max(dx, dy) > LONGEST and narrowest < table.uniform:
+            dx, dy, rho = shortened(dx, dy, rho, narrowest)
         low_i, high_i, turn_i = around(wi[n, 0], wi[n, 1])
         low_o, high_o, turn_o = around(wo[n, 0], wo[n, 1])
         bend_i, bend_o = _0, _0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -34,8 +34,68 @@ _SHORTEST_RUN = np.float32(1e-6)
 _0, _HALF, _1, _2 = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
 
 
+class Sight(NamedTuple):
+    """How a viewer sees heights displaced: azimuth (ex, ey), distance in the plane for each unit of height, T.
+
+    `bent` is 2 kappa T^2 over cloth of curvature kappa.
+    """
+
+    ex: np.float32
+    ey: np.float32
+    run: np.float32
+    bent: np.float32
+
+
 @inlined_fast_kernel
-def _density(x: np.float32, y: np.float32, of_xx: np.float32, of_yy: np.float32, of_xy: np.float32) -> np.float32:
+def sight(ox: np.float32, oy: np.float32, oz: np.float32, bend: np.float32) -> Sight:
+    """Return the sight of a viewer in whose azimuth the cloth has a curvature `bend`."""
+    run = np.sqrt(ox * ox + oy * oy)
+    ex, ey = (ox / run, oy / run) if run > _SHORTEST_RUN else (_1, _0)
+    run = run / oz
+    return Sight(ex, ey, run, _2 * bend * run * run)
+
+
+@inlined_fast_kernel
+def where_seen(table: SoftNodeTable, of: Sight, seen: Float32) -> None:
+    """Write where the viewer sees the fixed nodes, from the corner of their cell, (lines, 2, COLUMNS).
+
+    A node of height h is displaced by d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) towards the viewer (view_rays).
+    """
+    plane = np.float32(table.plane)
+    for line in range(len(seen)):
+        spot, own = table.spots[line], seen[line]
+        for k in range(COLUMNS):
+            over = spot[3, k] - plane
+            shift = over * of.run
+            if of.bent > _0:
+                shift *= _2 / (_1 + np.sqrt(max(_1 + of.bent * over, _0)))
+            own[0, k], own[1, k] = spot[0, k] - shift * of.ex, spot[1, k] - shift * of.ey
+
+
+@inlined_fast_kernel
+def touched(
+    table: SoftNodeTable, of: Sight, dx: np.float32, dy: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """Return the extent around a footprint's centre that it may see: least and greatest x, least and greatest y."""
+    plane = np.float32(table.plane)
+    nearest, farthest = table.shown[0] - plane, table.shown[1] - plane
+    nearest = _2 * nearest * of.run / (_1 + np.sqrt(max(_1 + of.bent * nearest, _0)))
+    farthest = _2 * farthest * of.run / (_1 + np.sqrt(max(_1 + of.bent * farthest, _0)))
+    return (
+        min(nearest * of.ex, farthest * of.ex) - _REACH * dx, max(nearest * of.ex, farthest * of.ex) + _REACH * dx,
+        min(nearest * of.ey, farthest * of.ey) - _REACH * dy, max(nearest * of.ey, farthest * of.ey) + _REACH * dy,
+    )  # fmt: skip
+
+
+@inlined_fast_kernel
+def form(dx: np.float32, dy: np.float32, rho: np.float32) -> tuple[np.float32, np.float32, np.float32]:
+    """Return the numbers of `density` of a footprint."""
+    scale = _1 / (_1 - rho * rho)
+    return _HALF * scale / (dx * dx), _HALF * scale / (dy * dy), -rho * scale / (dx * dy)
+
+
+@inlined_fast_kernel
+def density(x: np.float32, y: np.float32, of_xx: np.float32, of_yy: np.float32, of_xy: np.float32) -> np.float32:
     """Return exp(-(of_xx x^2 + of_xy x y + of_yy y^2))."""
     return remaining(of_xx * x * x + (of_yy * y + of_xy * x) * y)
 
@@ -43,61 +103,43 @@ def _density(x: np.float32, y: np.float32, of_xx: np.float32, of_yy: np.float32,
 @inlined_fast_kernel
 def _add_densities(
     places: Float32, x: np.float32, y: np.float32, of_xx: np.float32, of_yy: np.float32, of_xy: np.float32,
-    density: Float32,
+    found: Float32,
 ) -> None:  # fmt: skip
     """Add the density of a Gaussian around (x, y) at a line of nodes, places (2, COLUMNS)."""
     # Sums first: a loop that stores what it reads is kept from the vector units.
     d0, d1, d2, d3 = (
-        _density(places[0, 0] - x, places[1, 0] - y, of_xx, of_yy, of_xy),
-        _density(places[0, 1] - x, places[1, 1] - y, of_xx, of_yy, of_xy),
-        _density(places[0, 2] - x, places[1, 2] - y, of_xx, of_yy, of_xy),
-        _density(places[0, 3] - x, places[1, 3] - y, of_xx, of_yy, of_xy),
+        density(places[0, 0] - x, places[1, 0] - y, of_xx, of_yy, of_xy),
+        density(places[0, 1] - x, places[1, 1] - y, of_xx, of_yy, of_xy),
+        density(places[0, 2] - x, places[1, 2] - y, of_xx, of_yy, of_xy),
+        density(places[0, 3] - x, places[1, 3] - y, of_xx, of_yy, of_xy),
     )
     d4, d5, d6, d7 = (
-        _density(places[0, 4] - x, places[1, 4] - y, of_xx, of_yy, of_xy),
-        _density(places[0, 5] - x, places[1, 5] - y, of_xx, of_yy, of_xy),
-        _density(places[0, 6] - x, places[1, 6] - y, of_xx, of_yy, of_xy),
-        _density(places[0, 7] - x, places[1, 7] - y, of_xx, of_yy, of_xy),
+        density(places[0, 4] - x, places[1, 4] - y, of_xx, of_yy, of_xy),
+        density(places[0, 5] - x, places[1, 5] - y, of_xx, of_yy, of_xy),
+        density(places[0, 6] - x, places[1, 6] - y, of_xx, of_yy, of_xy),
+        density(places[0, 7] - x, places[1, 7] - y, of_xx, of_yy, of_xy),
     )
-    density[0] += d0
-    density[1] += d1
-    density[2] += d2
-    density[3] += d3
-    density[4] += d4
-    density[5] += d5
-    density[6] += d6
-    density[7] += d7
+    found[0] += d0
+    found[1] += d1
+    found[2] += d2
+    found[3] += d3
+    found[4] += d4
+    found[5] += d5
+    found[6] += d6
+    found[7] += d7
 
 
 @inlined_fast_kernel
 def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -> None:
-    """Write the weights of all nodes: the density of a footprint of rays where the viewer sees each of them.
-
-    A node of height h is displaced by d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) towards the viewer (view_lines).
-    """
-    run = np.sqrt(look.ox * look.ox + look.oy * look.oy)
-    ex, ey = (look.ox / run, look.oy / run) if run > _SHORTEST_RUN else (_1, _0)
-    run = run / look.oz
-    bent, plane = _2 * look.bend_o * run * run, np.float32(table.plane)
-    dx, dy, rho = max(look.dx, np.float32(RESOLVED)), max(look.dy, np.float32(RESOLVED)), look.rho
-    scale = _1 / (_1 - rho * rho)
-    of_xx, of_yy, of_xy = _HALF * scale / (dx * dx), _HALF * scale / (dy * dy), -rho * scale / (dx * dy)
-    nearest, farthest = table.shown[0] - plane, table.shown[1] - plane
-    nearest = _2 * nearest * run / (_1 + np.sqrt(max(_1 + bent * nearest, _0)))
-    farthest = _2 * farthest * run / (_1 + np.sqrt(max(_1 + bent * farthest, _0)))
-    x_low, x_high = min(nearest * ex, farthest * ex) - _REACH * dx, max(nearest * ex, farthest * ex) + _REACH * dx
-    y_low, y_high = min(nearest * ey, farthest * ey) - _REACH * dy, max(nearest * ey, farthest * ey) + _REACH * dy
+    """Write the weights of all nodes: the density of a footprint of rays where the viewer sees each of them."""
+    of = sight(look.ox, look.oy, look.oz, look.bend_o)
+    dx, dy = max(look.dx, np.float32(RESOLVED)), max(look.dy, np.float32(RESOLVED))
+    of_xx, of_yy, of_xy = form(dx, dy, look.rho)
+    x_low, x_high, y_low, y_high = touched(table, of, dx, dy)
     ends, picks, weight, groups = table.repeat[0], table.repeat[1], scratch.lines, table.groups
     weight[:, :] = _0
     seen = scratch.seen
-    for line in range(len(seen)):
-        spot, own = table.spots[line], seen[line]
-        for k in range(COLUMNS):
-            over = spot[3, k] - plane
-            shift = over * run
-            if bent > _0:
-                shift *= _2 / (_1 + np.sqrt(max(_1 + bent * over, _0)))
-            own[0, k], own[1, k] = spot[0, k] - shift * ex, spot[1, k] - shift * ey
+    where_seen(table, of, seen)
     for row in range(math.floor(look.y + y_low), math.floor(look.y + y_high) + 1):
         middle_y = np.float32(look.y - row)
         for column in range(math.floor(look.x + x_low), math.floor(look.x + x_high) + 1):

@@ -111,10 +111,9 @@ class SelvageNetwork(Trainable):
         self.register_buffer("mean", torch.zeros(FEATURES))
         self.register_buffer("scale", torch.ones(FEATURES))
         self.errors = ErrorNetwork(options, FEATURES)
-        self._tables, self._finest = [], []
-        for fabric in fabrics:
-            for level, tables in ((options.level, self._tables), (options.finest, self._finest)):
-                tables.append(tabulate(fabric, level=level, rims=options.rims))
+        levels = (options.level, options.finest)
+        tables = [[tabulate(fabric, level=level, rims=options.rims) for level in levels] for fabric in fabrics]
+        self._tables, self._finest = [own for own, _ in tables], [finest for _, finest in tables]
         self.expect(0)
         if fabrics:
             self._measure(fabrics)

@@ -12,6 +12,7 @@ from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
 from tests.pipeline.truth.cloths import LOPSIDED, OVER, coloured, exchanged_axes, redrawn
 from tests.presets import slow
+from weaves.fabric import load_fabric
 from weaves.surface import surface_at
 
 STRIPES = {"ends": [["red", 3], ["blue", 2]], "picks": [["blue", 1], ["red", 4]]}
@@ -63,6 +64,20 @@ def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, 
     assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < bound
 
 
+@pytest.mark.parametrize("sigma", [(0.1, 0.5), slow((1.5, 6.0))])
+def test_threads_are_those_that_a_grazing_viewer_sees(sigma):
+    """A thread of height h is seen h tan(theta) away, up to three yarns here: the bound is that of steep views."""
+    fabric, random = load_fabric("tartan"), np.random.default_rng(5)
+    asked = draw_queries(QueryOptions(sigma=sigma, max_angle=60.0), fabric.repeat, 3, 0, 40)
+    turn, theta = random.uniform(0.0, 2.0 * math.pi, 40), random.uniform(math.radians(70.0), math.radians(82.0), 40)
+    wo = np.stack([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)], axis=1)
+    asked = asked._replace(wo=wo.astype(np.float32))
+    components = estimate(fabric, asked, TruthOptions(estimator="owen", max_count=1024), 1).mean
+    exact = component_colours(fabric, asked, TruthOptions(relative_error=0.02, max_count=1 << 11), 2)
+    truth, found = (np.einsum("nc,ncx->nx", components, own) for own in (exact.mean, footprint_colours(fabric, asked)))
+    assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < 0.08
+
+
 def test_the_mean_over_the_cloth_does_not_depend_on_the_footprint():
     """Masses are integrals: over a lattice of centres, every size of footprint has the mean of the threads."""
     fabric = coloured("twill_4_4", ends=[["red", 3], ["blue", 1]], picks=[["red", 1], ["blue", 5]])
@@ -109,6 +124,8 @@ def test_ends_and_picks_change_places(behind):
     """A mirror in the diagonal of a cloth without symmetries: the transposed draft, yarns and orders exchanged."""
     own, other = LOPSIDED, redrawn(~OVER.T, swap=True, mirrored=True)
     asked = queries(60, np.random.default_rng(2), 0.4, behind)
+    # Seen from straight above, nodes lie on lines along x in both.
+    asked = asked._replace(wo=np.tile(np.float32([0.36, 0.48, 0.8]), (60, 1)))
     one = footprint_colours(coloured(own, **STRIPES), asked)
     there = footprint_colours(coloured(other, ends=STRIPES["picks"], picks=STRIPES["ends"]), exchanged_axes(asked))
     assert np.ptp(one, axis=0)[2 - 2 * behind :].max() > 0.1

@@ -67,15 +67,16 @@ def test_an_ellipse_is_the_same_after_half_a_turn_and_with_its_axes_exchanged(me
     assert np.abs(own - method(LOPSIDED, QUERIES._replace(angle=QUERIES.angle + right))).max() > 0.1 * own.max()
 
 
-@pytest.mark.parametrize("method", methods.ALL)
+@pytest.mark.parametrize("method", [methods.summed_area, methods.averaged_normals])
 def test_all_components_change_by_one_factor_if_light_and_viewer_do(method):
     """f(wi, wo) A(wo) is reciprocal, of both families, diffuse parts with cosines to the ply: only A(wo) differs. f and
     f' with light and viewer exchanged are parallel vectors of four components. Nothing is left out: points that one of
-    the two does not reach count for neither."""
+    the two does not reach count for neither. View rays that meet walls see rims, which lights do not: methods that know
+    this are not reciprocal. A footprint has to cover the cloth evenly: its rays are those of the viewer alone."""
     cloth = LOPSIDED.model_copy(update={
         "warp": LOPSIDED.warp.model_copy(update={"blend": 1.0}), "weft": LOPSIDED.weft.model_copy(update={"blend": 1.0})
     })  # fmt: skip
-    queries = asked()
+    queries = asked()._replace(sigma=np.full(120, 24.0, np.float32), sigma_minor=np.full(120, 24.0, np.float32))
     there, back = (
         method(cloth, q).astype(np.float64) for q in (queries, queries._replace(wi=queries.wo, wo=queries.wi))
     )

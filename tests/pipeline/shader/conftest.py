@@ -23,7 +23,6 @@ from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import NeumipNetwork
 from pipeline.shader.export_shader import write_shader
 from pipeline.shader.languages import Program, compile_program, slangc
-from pipeline.shader.tables import PARALLAX, PLANE_FOOTPRINTS
 from tests.browser import opened
 from weaves.fabric import load_fabric
 
@@ -48,10 +47,7 @@ def bytes_of(folder):
 
 @pytest.fixture(scope="session")
 def exported(tmp_path_factory):
-    """A function that exports a fabric once, and returns its folder; models take no level.
-
-    Footprints are those of the fabric plane unless kinds say otherwise.
-    """
+    """A function that exports a fabric once, and returns its folder; models take no level."""
     home = tmp_path_factory.mktemp("shaders")
 
     @cache
@@ -59,8 +55,7 @@ def exported(tmp_path_factory):
         if {*languages} - {"onnx"} and slangc() is None:
             pytest.skip("slangc is not installed")
         folder = home / "-".join((name, str(level), *languages, "of", *kinds, Path(model or "soft_nodes").name))
-        of_plane = () if PARALLAX in kinds else (PLANE_FOOTPRINTS,)
-        write_shader(load_fabric(name), folder, model, None if model else level, languages, (*kinds, *of_plane))
+        write_shader(load_fabric(name), folder, model, None if model else level, languages, kinds)
         return folder
 
     return export
@@ -127,8 +122,8 @@ def programs(exported, tmp_path_factory):
     """
 
     @cache
-    def program(model=None, kinds=()):
-        source = exported(CLOTH, 2, "cpp", kinds=kinds, model=model) / "cpp" / "evaluate.cpp"
+    def program(model=None):
+        source = exported(CLOTH, 2, "cpp", model=model) / "cpp" / "evaluate.cpp"
         if shutil.which("g++") is None:
             pytest.skip("g++ is not installed")
         library = tmp_path_factory.mktemp("cpp") / "evaluate.so"
@@ -174,12 +169,6 @@ def answered(page, folder, jobs, source, *options):
 
 
 @pytest.fixture(scope="session")
-def cpp_for(programs):
-    """A function that returns the function of `programs` for the soft nodes of some kinds of queries."""
-    return lambda kinds: programs(kinds=(PARALLAX,) if PARALLAX in kinds else ())
-
-
-@pytest.fixture(scope="session")
 def webgl(exported, tmp_path_factory):
     """A function that runs an entry point of the GLSL ES form on the golden queries of cloths; results as for `cpp`.
 
@@ -195,8 +184,8 @@ def webgl(exported, tmp_path_factory):
         compile_program(slangc(), folder / "slang", program, "glsl", path)
         return path.read_text()
 
-    def call(cloths, half=False, entry="evaluate", model=None, kinds=()):
-        text = source(entry, exported(CLOTH, 2, "glsles", kinds=kinds, model=model))
+    def call(cloths, half=False, entry="evaluate", model=None):
+        text = source(entry, exported(CLOTH, 2, "glsles", model=model))
         columns, results = WIDTHS[entry]
         jobs = []
         for cloth in cloths:

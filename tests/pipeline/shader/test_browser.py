@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.shader.tables import EVERY, PARALLAX
+from pipeline.shader.tables import EVERY
 from tests.pipeline.shader.conftest import ALLOWED, CLOTH, answered, check_answers, job_of, read, worst
 from tests.pipeline.shader.test_evaluate import FEW
 from tests.presets import KINDS, slow
@@ -35,16 +35,10 @@ def test_every_kind_and_directions_drawn_are_answered(webgl, cpp, exported):
         assert off.mean() < 0.01
 
 
-def test_footprints_of_view_rays_are_answered(webgl, exported):
-    cloths = [read(exported(name, kinds=(PARALLAX,))) for name in FEW]
-    for cloth, answers in zip(cloths, webgl(cloths, kinds=(PARALLAX,)), strict=True):
-        check_answers(answers, cloth, ALLOWED["browser"])
-
-
-@pytest.mark.parametrize(("model", "kinds"), [(None, ()), (None, (PARALLAX,)), slow("selvage", ())])
-def test_golden_vectors_are_answered_by_webgpu(exported, tmp_path, model, kinds):
-    source = (exported("gingham", 2, "wgsl", kinds=kinds, model=model) / "wgsl" / "evaluate.wgsl").read_text()
-    cloth = read(exported("voile", kinds=kinds, model=model))
+@pytest.mark.parametrize("model", [None, slow("selvage")])
+def test_golden_vectors_are_answered_by_webgpu(exported, tmp_path, model):
+    source = (exported("gingham", 2, "wgsl", model=model) / "wgsl" / "evaluate.wgsl").read_text()
+    cloth = read(exported("voile", model=model))
     answers = answered("evaluate_wgsl.html", tmp_path, job_of(cloth.buffers, cloth.queries), source, *OPTIONS)
     if answers is None:
         pytest.skip("this browser has no WebGPU")

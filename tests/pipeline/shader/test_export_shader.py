@@ -7,13 +7,14 @@ import subprocess
 import numpy as np
 import pytest
 
+from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES
 from pipeline.shader import languages
 from pipeline.shader.descriptor import Buffer, Descriptor, Networks, PlacedLayer
 from pipeline.shader.languages import LANGUAGES
-from pipeline.shader.tables import PARALLAX, WALLS
 from pipeline.truth.conventions import COMPONENTS
-from tests.pipeline.shader.conftest import CLOTH, FORMAT_PAGE, bytes_of, read
+from tests.pipeline.shader.conftest import FORMAT_PAGE, bytes_of, read
 from tests.presets import KINDS
 from weaves.fabric import load_fabric
 
@@ -30,8 +31,7 @@ def test_a_folder_has_less_than_two_megabytes_with_a_language(exported, every):
     sizes = {language: bytes_of(every / language) for language in LANGUAGES if language != "cuda"}
     nodes = {name: tabulate(load_fabric(name)).evenly.size for name in KINDS}
     assert max(sizes, key=sizes.get) == "cpp" and max(nodes, key=nodes.get) == "crepe"
-    program = bytes_of(exported(CLOTH, 2, "cpp", kinds=(PARALLAX,)) / "cpp")
-    assert bytes_of(exported("crepe", kinds=(PARALLAX, WALLS))) + program < 2_000_000
+    assert bytes_of(exported("crepe")) + sizes["cpp"] < 2_000_000
 
 
 def test_tables_are_those_of_the_fabric(exported):
@@ -52,8 +52,7 @@ def test_tables_are_those_of_the_fabric(exported):
     horizons = node[4:20].reshape(32, 2)
     assert (horizons[:, 0] == table.mean[:, block, lane]).all()
     assert (horizons[:, 1] == table.sharpness[:, block, lane]).all()
-    wave = 13
-    assert (node[20:].reshape(-1, 2)[wave] == table.wave_nodes[block, wave // 4, 2 * (wave % 4) :][:2, lane]).all()
+    assert (node[20:].reshape(SEEN_ANGLES, AZIMUTHS) == table.areas[..., block, lane].T).all()
 
 
 def test_slangc_of_the_search_path_is_found(monkeypatch):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.soft_nodes.features import read_queries
-from pipeline.analytic.soft_nodes.groups import USUAL
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.named import named_method, own_method
 from pipeline.scenes.shade import colours
@@ -17,7 +16,7 @@ from weaves.fabric import load_fabric
 
 pytestmark = pytest.mark.slow
 
-CLOTH, FLAT = load_fabric(FABRIC), "flat"
+CLOTH = load_fabric(FABRIC)
 ENDS = CLOTH.weave.repeat[0]
 
 
@@ -28,9 +27,8 @@ def components(page, method, state="viewer.state"):
 
 
 def expected(fabric, camera, level):
-    """Return the components of soft nodes in Python, (SIZE, SIZE, 4), as the page draws them; the level may be FLAT."""
-    detail = {"level": USUAL} if level == FLAT else {"level": level, "parallax": True, "rims": True}
-    return squared(camera, lambda queries: read_queries(tabulate(fabric, **detail), queries).components)
+    """Return the components of soft nodes in Python, (SIZE, SIZE, 4), as the page draws them."""
+    return squared(camera, lambda queries: read_queries(tabulate(fabric, level=level), queries).components)
 
 
 def expected_of(name, fabric, camera):
@@ -56,7 +54,6 @@ def assert_equal(found, wanted):
 
 PICTURES = [
     ("One yarn", 2, (12, 12)),
-    ("One yarn", FLAT, (12, 12)),
     ("Cloth", 8, (7, 14)),
     ("Horizon", 1, (10, 8)),
     ("Sphere", 2, (12, 12)),
@@ -92,12 +89,15 @@ def test_a_shader_of_selvage_that_does_not_compile_is_named(whole, tmp_path):
         assert said == "Selvage: its shader does not compile here. Soft nodes are shown instead."
 
 
-def test_without_the_shader_of_view_rays_footprints_are_flat(whole, tmp_path):
+def test_without_the_shader_of_soft_nodes_points_are_shown(whole, tmp_path):
     with viewer(whole, tmp_path) as own:
-        own.run("viewer.picture.programs.clear(), viewer.picture.known.clear(), viewer.picture.sources.seen = 'broken'")
+        own.run(
+            "viewer.picture.programs.clear(), viewer.picture.known.clear(), viewer.picture.sources.nodes = 'broken'"
+        )
         own.run("viewer.set({ right: '2' }).then(() => viewer.drawn)")
-        assert own.run("viewer.methods[1].label") == "Flat footprints, k = 2"
-        assert_equal(components(own, 2), expected(CLOTH, VIEWS["Drape"], FLAT))
+        assert own.run("viewer.methods[1].label") == "One point"
+        said = own.run("document.getElementById('notice').textContent")
+        assert said == "Soft nodes: their shader does not compile here. One point is shown instead."
 
 
 @pytest.mark.parametrize("family", ["warp", "weft"])
@@ -122,7 +122,7 @@ def test_one_point_is_the_truth_at_a_point_without_shadows(fresh):
     camera = VIEWS["One yarn"]._replace(tilt=88.0, distance=4.0, light_tilt=80.0)
     picture = seen(camera, SIZE, ENDS)
     small = picture.queries._replace(sigma=0 * picture.queries.u + 2e-3, sigma_minor=0 * picture.queries.u + 2e-3)
-    truth = estimate(CLOTH, small, TruthOptions(relative_error=0.005, parallax=False, walls="left_out"), 0).mean
+    truth = estimate(CLOTH, small, TruthOptions(relative_error=0.005, parallax=False), 0).mean
     found = components(fresh, "point")[picture.lit]
     apart = np.abs(found - truth).sum(axis=1) / truth.sum(axis=1).mean()
     assert np.median(apart) < 0.01 and (apart < 0.05).mean() > 0.9
@@ -155,9 +155,7 @@ def pixels_of(page):
 def encoded(page, picture, side):
     """Return the sRGB values of Python for a square picture."""
     values = np.zeros((side, side, 3))
-    values[picture.lit] = read_queries(tabulate(CLOTH, parallax=True, rims=True), picture.queries).components @ colours(
-        CLOTH
-    )
+    values[picture.lit] = read_queries(tabulate(CLOTH), picture.queries).components @ colours(CLOTH)
     colour = np.minimum(page.run("viewer.content.irradiance") * values, 1.0)
     return np.where(colour <= 0.0031308, 12.92 * colour, 1.055 * np.maximum(colour, 1e-6) ** (1 / 2.4) - 0.055)
 
@@ -253,10 +251,10 @@ def test_the_truth_is_shown_and_errors_are_those_of_python(fresh, whole):
     fresh.run("viewer.go(3), viewer.set({ left: 'truth', right: '2' })")
     camera = VIEWS["Sphere"]
     picture = seen(camera, SIZE, ENDS)
-    truth = estimate(CLOTH, picture.queries, TruthOptions(relative_error=0.01, parallax=True, walls="rim"), 0).mean
+    truth = estimate(CLOTH, picture.queries, TruthOptions(relative_error=0.01), 0).mean
     shown = components(fresh, "truth")[picture.lit]
     assert np.abs(shown - truth).max() < 1e-3 * truth.max()  # half floats
-    model = read_queries(tabulate(CLOTH, parallax=True, rims=True), picture.queries).components
+    model = read_queries(tabulate(CLOTH), picture.queries).components
     values, reference = model @ colours(CLOTH), truth @ colours(CLOTH)
     share = np.sqrt(np.square(values - reference).sum() / picture.cloth.sum() / 3) / (
         reference.sum() / picture.cloth.sum() / 3
@@ -280,9 +278,22 @@ def test_tiles_are_the_answers_of_their_methods(fresh, name):
 def test_where_the_truth_is_not_known_the_page_says_so(fresh):
     fresh.run("viewer.set({ right: 'truth', turn: 3 })")
     assert fresh.run("viewer.method('truth').label") == "Soft nodes, k = 8"
-    assert "Truth: known at the five views alone" in fresh.run("byId('notice').textContent")
+    assert "Truth: known at One yarn, Cloth, Horizon, Sphere, Drape alone" in fresh.run("byId('notice').textContent")
     fresh.run("viewer.go(4), viewer.set({ thickness: 3 })")
-    assert not fresh.run("viewer.tiled")
+    assert not fresh.run("viewer.tiled('truth')")
+
+
+def test_flat_footprints_are_those_of_the_truth_in_the_fabric_plane(fresh):
+    """Its only view is taken when it is chosen elsewhere."""
+    fresh.run("byId('left').value = 'flat', byId('left').dispatchEvent(new Event('change')), viewer.drawn")
+    assert fresh.run("[viewer.state.view, viewer.methods[0].label]") == [0, "Truth, flat footprints"]
+    picture = seen(VIEWS["One yarn"], SIZE, ENDS)
+    shown, rays = (components(fresh, name)[picture.lit] for name in ("flat", "truth"))
+    wanted = estimate(CLOTH, picture.queries, TruthOptions(relative_error=0.01, parallax=False), 0).mean
+    assert np.abs(shown - wanted).max() < 1e-3 * wanted.max()  # half floats
+    assert np.abs(shown - rays).max() > 0.05 * wanted.max()
+    fresh.run("viewer.go(3)")
+    assert "Truth, flat footprints: known at One yarn alone" in fresh.run("byId('notice').textContent")
 
 
 # ---- keys, pointers, the page --------------------------------------------------------------------------------------

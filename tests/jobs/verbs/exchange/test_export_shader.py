@@ -6,8 +6,6 @@ import pytest
 
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.card import write_model
-from pipeline.models.selvage import SelvageOptions
-from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.models.woven import WovenOptions
 from pipeline.shader import export_shader as verb
 from pipeline.shader import languages, soft_nodes, tables
@@ -24,7 +22,7 @@ def test_the_source_needs_no_compiler(twillight, refusal, monkeypatch, tmp_path)
     monkeypatch.setattr(languages, "find_spec", lambda name: None)
     monkeypatch.setattr(shutil, "which", lambda name: None)
     code, said, _ = twillight("export", "gingham", "--shader", "out", "--level", "1")
-    assert code == 0 and "slang, parallax, walls; level 1" in said
+    assert code == 0 and "slang; level 1" in said
     assert json.loads((tmp_path / "out" / "soft_nodes.json").read_text())["languages"] == {}
     complaint = refusal("gingham", "--shader", "out", "--language", "wgsl")
     assert "slangc is needed: pip install --no-deps slangtorch" in complaint
@@ -53,16 +51,10 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(refusal, monke
     options = WovenOptions().model_dump(mode="json", context=IDENTITY)
     write_model(tmp_path / "woven", b"", {"options": options, "version": {"model": 1}})
     refusal(CLOTH, *shader, str(tmp_path / "woven"))
-    assert "selvage was trained on footprints of the fabric plane" in refusal(
-        CLOTH, *shader, "selvage", "--kind", "parallax"
-    )
     monkeypatch.setattr(verb, "no_onnx", lambda: "not installed: onnxscript")
     assert "not installed: onnxscript" in refusal(CLOTH, *shader, "selvage", "--language", "onnx")
     monkeypatch.setattr(verb, "covering_model", lambda *_: object())
     assert "has no shader; soft_nodes, selvage and" in refusal(CLOTH, *shader, "woven")
-    rays = Selvage(SelvageNetwork(SelvageOptions()))
-    monkeypatch.setattr(verb, "covering_model", lambda *_: rays)
-    assert "was trained with parallax" in refusal(CLOTH, *shader, "rays")
     assert not (tmp_path / "x").exists()
 
 

@@ -1,4 +1,4 @@
-"""The sums against the truth: without shadows to the error of their rules, with soft shadows to some per cent."""
+"""The sums against the truth, to some per cent."""
 
 import itertools
 import math
@@ -6,14 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.answer import query_sums, sum_queries
+from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE, SPECULAR
+from pipeline.analytic.soft_nodes.shade import AREA, DIFFUSE, OPEN_DIFFUSE, OPEN_SPECULAR, SPECULAR
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.truth.footprint.mixture import deviations, footprints
+from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from tests.pipeline.truth.cloths import woven
@@ -24,29 +24,9 @@ from weaves.fabric import load_fabric
 COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
 
 
-def bare(table, queries):
-    """Return the components with nothing hidden; the area of gaps has no other."""
-    found, gaps = sum_queries(table, footprints(queries), queries.wi, queries.wo, queries.curvature)
-    assert not gaps.any()
-    area = found[:, :, BARE_AREA].sum(axis=1, keepdims=True)
-    return np.concatenate([found[:, :, BARE_SPECULAR], found[:, :, BARE_DIFFUSE] / math.pi], axis=1) / area
-
-
 def relative_error(found, truth):
     """Return the rms error of a grey fabric's colour over its mean."""
     return math.sqrt(np.mean(((found - truth) @ COLOUR) ** 2)) / np.mean(truth @ COLOUR)
-
-
-@pytest.mark.parametrize("sigma", [(0.05, 0.2), (0.3, 1.0), (3.0, 8.0)], ids=["narrow", "middle", "wide"])
-@pytest.mark.parametrize(
-    ("name", "bound"), [slow("polyester_lining", 0.02), ("cotton_twill", 0.02), slow("satin_8", 0.03)]
-)
-def test_without_shadows_they_are_quadrature(name, bound, sigma):
-    """What is left is the footprint's tail of 1 %, eight nodes across a yarn and a highlight's four places."""
-    fabric = load_fabric(name)
-    queries = draw_queries(QueryOptions(sigma=sigma, max_angle=60.0), fabric.weave.repeat, 3, 0, 48)
-    options = TruthOptions(estimator="quadrature", shadows=False, relative_error=2e-3)
-    assert relative_error(bare(tabulate(fabric), queries), estimate(fabric, queries, options, 1).mean) < bound
 
 
 CASES = {
@@ -63,16 +43,13 @@ CASES = {
     "case", [slow("plain"), "twill", "satin", slow("plain with gaps"), slow("twill with gaps"), "gauze"]
 )
 def test_with_shadows_they_are_some_per_cent_off(case):
-    """Colour RMSE over the mean for narrow, middle and wide footprints; patches hidden almost wholly left out."""
+    """Colour RMSE over the mean for narrow, middle and wide footprints."""
     fabric, bounds = CASES[case]
     table = tabulate(fabric)
     for sigma, bound in zip(((0.06, 0.24), (0.3, 1.0), (3.0, 8.0)), bounds, strict=True):
         queries = draw_queries(QueryOptions(sigma=sigma, max_angle=75.0), fabric.weave.repeat, 7, 0, 80)
         truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
-        features, found, _ = read_queries(table, queries)
-        clear = features[:, 25] > 0.02
-        assert clear.mean() > 0.9
-        assert relative_error(found[clear], truth[clear]) < bound
+        assert relative_error(read_queries(table, queries).components, truth) < bound
 
 
 @pytest.mark.slow
@@ -84,19 +61,6 @@ def test_each_level_errs_less_on_wide_footprints():
     errors = [relative_error(read_queries(tabulate(fabric, level=k), queries)[1], truth) for k in DETAILS]
     assert all(finer < coarser for coarser, finer in itertools.pairwise(errors)), errors
     assert errors[2] < 0.75 * errors[1]
-
-
-@pytest.mark.slow
-def test_what_is_seen_of_patches_almost_hidden():
-    """Of which .2 to 5 % is seen, on satin: nodes placed once, to 2.6 deviations, are off by 5.6 % of the mean."""
-    fabric = load_fabric("satin_8")
-    queries = draw_queries(QueryOptions(sigma=(0.05, 0.25)), fabric.weave.repeat, 7, 0, 6000)
-    reading = read_queries(tabulate(fabric), queries)
-    seen = reading.features[:, 25]
-    few = np.flatnonzero((seen > 0.002) & (seen < 0.05))
-    assert few.size > 100
-    truth = estimate(fabric, queries.take(few), TruthOptions(relative_error=0.01), 1).mean @ COLOUR
-    assert np.abs(reading.components[few] @ COLOUR - truth).mean() < 0.045 * truth.mean()
 
 
 def test_footprints_along_the_axes():
@@ -129,6 +93,20 @@ def test_footprints_at_an_angle(name, bound):
     wrong = relative_error(read_queries(table, queries)[1], truth)
     assert wrong < bound
     assert relative_error(read_queries(table, rounded)[1], truth) > 1.5 * wrong
+
+
+def test_long_footprints_and_low_viewers_are_cut():
+    """A footprint longer than LONGEST and narrow across, or a viewer in the plane, answers as the nearest known one."""
+    table, up = tabulate(load_fabric("denim")), [0.0, 0.0, 1.0]
+    for angle in (0.0, 0.3, math.pi / 2):
+        long = Queries.round([0.3] * 2, [0.4] * 2, [1e4, 48.0], [up] * 2, [[0.6, 0.0, 0.8]] * 2)
+        sums, _ = query_sums(table, long._replace(sigma_minor=np.float32([0.1, 0.1]), angle=np.float32([angle] * 2)))
+        assert np.isfinite(sums).all()
+        if angle != 0.3:
+            np.testing.assert_allclose(sums[0], sums[1], rtol=1e-4, atol=1e-6)
+    low = [[math.cos(x), 0.0, math.sin(x)] for x in (1e-5, 0.01745415)]
+    sums, _ = query_sums(table, Queries.round([0.3] * 2, [0.4] * 2, [0.1] * 2, [up] * 2, low))
+    np.testing.assert_allclose(sums[0], sums[1], rtol=1e-2, atol=1e-6)
 
 
 @pytest.mark.parametrize("width", [1.0, slow(0.7), slow(0.1)])
@@ -171,45 +149,24 @@ def test_sums_of_threads_add_up_to_those_of_the_families(name, sigma):
     assert parts.shape[1] == ends + picks
     added = np.stack([parts[:, :ends].sum(axis=1), parts[:, ends:].sum(axis=1)], axis=1)
     # Weights are not normalised: components are shares of the area.
-    whole /= np.maximum(whole[:, :, BARE_AREA].sum(axis=1) + gaps, 1e-9)[:, None, None]
-    added /= np.maximum(added[:, :, BARE_AREA].sum(axis=1) + own_gaps, 1e-9)[:, None, None]
+    whole /= np.maximum(whole[:, :, AREA].sum(axis=1) + gaps, 1e-9)[:, None, None]
+    added /= np.maximum(added[:, :, AREA].sum(axis=1) + own_gaps, 1e-9)[:, None, None]
     # Horizons are means over the cells of one thread in place of those of all, and regimes end elsewhere.
-    assert (np.sqrt(np.mean((added - whole) ** 2, axis=0)) < 0.05 * whole.mean(axis=0) + 1e-4).all()
+    assert (np.sqrt(np.mean((added - whole) ** 2, axis=0)) < 0.05 * np.abs(whole.mean(axis=0)) + 1e-4).all()
     np.testing.assert_allclose(added.mean(axis=0), whole.mean(axis=0), rtol=0.02, atol=1e-4)
 
 
 SIZES = {"narrow": (0.05, 0.2), "middle": (0.3, 1.0), "wide": (3.0, 8.0)}
-SHAPES = [pytest.param(sigma, stretch, id=f"{name}{', long' if stretch > 1 else ''}")
-          for name, sigma in SIZES.items() for stretch in (1.0, 5.0)]  # fmt: skip
-
-
-@pytest.mark.parametrize(("sigma", "stretch"), SHAPES)
-def test_light_and_viewer_change_places(sigma, stretch):
-    """Bare numerators are reciprocal, diffuse ones where cosines go to the ply; a round footprint's weights are fixed.
-
-    Placed nodes do not depend on the directions either, so that only the order of float32 sums differs.
-    """
-    fabric = woven("cotton_twill", blend=1.0)
-    queries = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=70.0), fabric.weave.repeat, 5, 0, 60)
-    table = tabulate(fabric)
-    there, _ = query_sums(table, queries)
-    back, _ = query_sums(table, queries._replace(wi=queries.wo, wo=queries.wi))
-    for column in (BARE_SPECULAR, BARE_DIFFUSE):
-        size = there[:, :, column].max()
-        np.testing.assert_allclose(back[:, :, column], there[:, :, column], rtol=1e-4, atol=1e-5 * size)
-    assert not np.allclose(
-        back[:, :, AREA], there[:, :, AREA], rtol=1e-2
-    )  # the shares of the area differ: no empty test
 
 
 @pytest.mark.parametrize("sigma", SIZES.values(), ids=SIZES)
-def test_hidden_parts_are_parts(sigma):
-    """Shadows and masking take light away: no sum exceeds its bare one, up to the faint tail of the ramp."""
+def test_shadows_take_light_away(sigma):
+    """No sum exceeds that of what is seen without shadows."""
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=sigma, max_angle=85.0), fabric.weave.repeat, 6, 0, 100)
     sums, _ = query_sums(tabulate(fabric), queries)
-    for seen, whole in ((AREA, BARE_AREA), (DIFFUSE, BARE_DIFFUSE), (SPECULAR, BARE_SPECULAR)):
-        assert (sums[:, :, seen] >= 0.0).all() and (sums[:, :, seen] <= 1.001 * sums[:, :, whole] + 1e-7).all()
+    for lit, whole in ((DIFFUSE, OPEN_DIFFUSE), (SPECULAR, OPEN_SPECULAR)):
+        assert (sums[:, :, lit] >= 0.0).all() and (sums[:, :, lit] <= 1.001 * sums[:, :, whole] + 1e-7).all()
 
 
 def test_straight_from_above_the_whole_cloth_is_seen():
@@ -217,4 +174,4 @@ def test_straight_from_above_the_whole_cloth_is_seen():
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=SIZES["wide"]), fabric.weave.repeat, 6, 0, 100)
     sums, gaps = query_sums(tabulate(fabric), queries._replace(wo=np.tile(np.float32([0.0, 0.0, 1.0]), (100, 1))))
-    np.testing.assert_allclose(sums[:, :, BARE_AREA].sum(axis=1) + gaps, 1.0, atol=1e-3)
+    np.testing.assert_allclose(sums[:, :, AREA].sum(axis=1) + gaps, 1.0, atol=1e-3)
