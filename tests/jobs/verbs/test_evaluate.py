@@ -61,7 +61,7 @@ def test_a_summary_tells_what_was_done(evaluate, tmp_path):
     first = path.read_bytes()
     others = ("--seed", "1"), ("--estimator", "mc"), ("--footprint", "box"), ("--no-parallax",), ("--walls", "left_out")
     for choice in ((), ("--workers", "1"), *others):
-        evaluate(*coarse, *choice, out="deep/result.parquet")
+        assert evaluate(*coarse, *choice, out="deep/result.parquet")[0] == 0
         assert (path.read_bytes() == first) == (not choice or choice[0] == "--workers"), choice
 
 
