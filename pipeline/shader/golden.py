@@ -58,7 +58,7 @@ _FOOTPRINTS = (
 
 
 class Group(NamedTuple):
-    """Golden queries of one kind: how many, the sides of light and viewer, whether the cloth is curved, z of viewers."""
+    """Golden queries of one kind: how many, sides of light and viewer, whether the cloth is curved, z of viewers."""
 
     rows: int
     light: float
@@ -230,11 +230,16 @@ def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits:
     answer = read(queries)
     span = np.maximum(np.ptp(answer, axis=0), np.float32(1e-30))
     change = np.zeros(len(answer))
+    # Places are kept from the corner of a cell: a small one has no more digits there than 1, a large one no fewer.
+    # Digits of heights count for more where rays run farther while they sink than those of the other queries.
+    farther = np.maximum(np.float32(_LEAST_RISE) / np.abs(queries.raised().wo[:, 2]), np.float32(1.0))
+    place = digits * np.spacing(np.float32(1.0)) * farther
     for _ in range(_TRIALS):
         moved = queries._replace(
-            # Sums have places in yarn spacings: a small one keeps no more digits there than 1 does.
-            u=_next(queries.u, rng, digits, 1.0), v=_next(queries.v, rng, digits, 1.0),
-            sigma=_next(queries.sigma, rng, digits), sigma_minor=_next(queries.sigma_minor, rng, digits),
+            u=_moved(queries.u, rng, np.maximum(place, np.spacing(queries.u))),
+            v=_moved(queries.v, rng, np.maximum(place, np.spacing(queries.v))),
+            sigma=_moved(queries.sigma, rng, digits * np.spacing(queries.sigma)),
+            sigma_minor=_moved(queries.sigma_minor, rng, digits * np.spacing(queries.sigma_minor)),
         )  # fmt: skip
         change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
@@ -246,7 +251,6 @@ def turning(queries: Queries, depth: float) -> Mask:
     return np.asarray(square[:, 2] < 2.0 * queries.curvature * (square[:, 0] + square[:, 1]) * depth)
 
 
-def _next(values: Float32, rng: np.random.Generator, digits: int, least: float = 0.0) -> Float32:
-    """Return numbers so many last digits above or below, at random; digits are those of `least` at least."""
-    step = digits * np.spacing(np.maximum(np.abs(values), np.float32(least)))
+def _moved(values: Float32, rng: np.random.Generator, step: Float32) -> Float32:
+    """Return numbers a step above or below, at random."""
     return values + np.where(rng.random(len(values)) < 0.5, -step, step)
