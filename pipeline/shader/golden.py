@@ -43,18 +43,19 @@ _TRIALS = 4
 _DIGITS_OF_LINES = 32  # what is seen on a view line is found by steps: it loses digits in single precision
 _LEAST_RISE = 0.05  # of light and viewer
 _LEAST_CURVATURE = 0.01
-# Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow, wide,
-# wider than the repeat; thin ellipses, long and short, and thick ones; such as are shortened.
+# Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow and wide;
+# thin ellipses, long and short, and thick ones; wider than the repeat, and so long that they are shortened.
 _FOOTPRINTS = (
     ((0.01, 0.1), (1.0, 1.0)),
     ((0.1, 0.25), (1.0, 1.0)),
     ((0.25, 0.6), (1.0, 1.0)),
-    ((0.6, 8.0), (1.0, 1.0)),
     ((0.1, 0.7), (1.6, 6.0)),
     ((0.75, 2.0), (4.0, 8.0)),
     ((0.4, 3.0), (1.1, 2.5)),
+    ((0.6, 8.0), (1.0, 1.0)),
     ((60.0, 1000.0), (200.0, 1000.0)),
 )
+_ON_FIXED_NODES = _FOOTPRINTS[-2:]  # the others place nodes where low rays have lost most of their digits
 
 
 class Group(NamedTuple):
@@ -203,7 +204,8 @@ def lobes_of(sides: Sides, looks: Queries) -> Lobes:
 def _candidates(repeat: tuple[int, int], group: Group, rng: np.random.Generator) -> Queries:
     """Return twice as many queries as a group has, footprints of every kind by turns, anywhere in the repeat."""
     count = 2 * group.rows
-    kinds = np.array(_FOOTPRINTS)[np.arange(count) % len(_FOOTPRINTS)]
+    footprints = np.array(_FOOTPRINTS if group.rise[0] >= _LEAST_RISE else _ON_FIXED_NODES)
+    kinds = footprints[np.arange(count) % len(footprints)]
     drawn = np.exp(np.log(kinds[:, :, 0]) + rng.random((count, 2)) * np.log(kinds[:, :, 1] / kinds[:, :, 0]))
     sigma, ratio = drawn[:, 0], drawn[:, 1]
     place = rng.random((count, 2)) * repeat
@@ -231,9 +233,7 @@ def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits:
     span = np.maximum(np.ptp(answer, axis=0), np.float32(1e-30))
     change = np.zeros(len(answer))
     # Places are kept from the corner of a cell: a small one has no more digits there than 1, a large one no fewer.
-    # Digits of heights count for more where rays run farther while they sink than those of the other queries.
-    farther = np.maximum(np.float32(_LEAST_RISE) / np.abs(queries.raised().wo[:, 2]), np.float32(1.0))
-    place = digits * np.spacing(np.float32(1.0)) * farther
+    place = digits * np.spacing(np.float32(1.0))
     for _ in range(_TRIALS):
         moved = queries._replace(
             u=_moved(queries.u, rng, np.maximum(place, np.spacing(queries.u))),
