@@ -55,7 +55,7 @@ _FOOTPRINTS = (
     ((0.6, 8.0), (1.0, 1.0)),
     ((60.0, 1000.0), (200.0, 1000.0)),
 )
-_ON_FIXED_NODES = _FOOTPRINTS[-2:]  # the others place nodes where low rays have lost most of their digits
+_ON_FIXED_NODES = _FOOTPRINTS[-2:]  # nodes that others place where low rays meet yarns have lost most of their digits
 
 
 class Group(NamedTuple):
