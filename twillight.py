@@ -176,8 +176,8 @@ def to_rgb(
     queries : Queries
         Their N queries: light from behind takes other colours.
     bounces : 1 or "all"
-        All adds the light that yarns give to each other: up to a quarter more for white cloth. The first call for a
-        cloth takes seconds, and colours change nothing of it.
+        One leaves out the light that yarns give to each other, up to a fifth of that of white cloth. The first call
+        for a cloth takes seconds for it, and colours change nothing of it.
 
     Returns
     -------
@@ -188,7 +188,7 @@ def to_rgb(
     --------
     >>> queries = Queries.round(u=[0.5], v=[0.5], sigma=[0.1], wi=[[0.6, 0, 0.8]], wo=[[0, 0, 1]])
     >>> denim = load_fabric("denim")
-    >>> to_rgb(denim, [[0.0, 0.0, 1.0, 0.0]], queries)[0].tolist() == list(denim.warp.diffuse_rgb)
+    >>> to_rgb(denim, [[0.0, 0.0, 1.0, 0.0]], queries, bounces=1)[0].tolist() == list(denim.warp.diffuse_rgb)
     True
     """
     from pipeline.scenes.shade import shade

@@ -27,7 +27,7 @@ def true_rows(names, splits, rows=200):
     for name, split in itertools.product(names, splits):
         fabric = load_fabric(name)
         queries = draw_queries(QueryOptions(sigma=(0.3, 8.0)), fabric.weave.repeat, len(split), 0, rows)
-        yield name, split, 0, queries, estimate(fabric, queries, TruthOptions(estimator="node_table"), 1)
+        yield name, split, 0, queries, estimate(fabric, queries, TruthOptions(), 1)
 
 
 def executed(path, folder):

@@ -20,7 +20,7 @@ _ROWS: Final = 8
 _SAMPLED: Final = ("mc", "r2")
 """Estimators with the kernels of `owen`."""
 
-_FALLBACK: Final = ("node_table", "quadrature")
+_FALLBACK: Final = ("node_table", "owen")
 """Estimators that answer queries outside the domain of a method."""
 
 _LONGEST_FIRST: Final = ("node_table", "quadrature", "soft_nodes", "owen")
@@ -43,13 +43,15 @@ class KernelGroup(NamedTuple):
         from weaves.fabric import load_fabric, preset_names
 
         fabric = load_fabric(preset_names()[0])
-        # Rotated footprints call kernels that round ones do not.
+        # Rotated footprints call kernels that round ones do not; tables know no narrow ones, seen from the side.
         kinds = [QueryOptions(), QueryOptions(stretch=4.0)] if self.name == "auto" else [QueryOptions()]
+        kinds = [QueryOptions(sigma=(4.0, 8.0), max_angle=60.0)] if self.name == "node_table" else kinds
         with announced(ready):
             for kind in kinds:
                 queries = draw_queries(kind, fabric.weave.repeat, 0, 0, _ROWS)
                 if self.model is None:
                     options = {"estimator": self.name, "min_count": 32, "max_count": 32}
+                    options |= {"walls": "left_out"} if self.name == "quadrature" else {}
                     estimate(fabric, queries, TruthOptions.model_validate(options), 0)
                 else:
                     for method in load_methods(self.model):

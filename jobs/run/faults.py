@@ -16,7 +16,7 @@ from jobs.plan.task import Stage, Task
 from jobs.recipe.recipe import Recipe
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.reasons import CHANGED, NEVER, reasons
+from jobs.run.reasons import CHANGED, NEVER_MADE, reasons
 from jobs.run.receipt import Product, Receipt
 from pipeline.cores import cores
 from pipeline.fingerprint import file_sha256
@@ -174,10 +174,10 @@ def _explained(found: Sequence[Fault], tasks: Sequence[Task], ledger: Ledger) ->
         return list(found)
     why, result = reasons(tasks, ledger), []
     for fault in found:
-        reason = why.get(fault.task.id, NEVER) if fault.task else NEVER
+        reason = why.get(fault.task.id, NEVER_MADE) if fault.task else NEVER_MADE
         if reason.startswith(CHANGED) and (fault.never_run or fault.kind == "outdated"):
             fault = fault._replace(kind="outdated", why=f"it was made before; {reason}")
-        elif fault.never_run and reason != NEVER:
+        elif fault.never_run and reason != NEVER_MADE:
             fault = fault._replace(why=f"{fault.why}; {reason}")
         result.append(fault)
     return result

@@ -9,7 +9,7 @@ from jobs.plan.task import Task
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import Receipt
 
-NEVER: Final = "never made"
+NEVER_MADE: Final = "never made"
 """Reason of a task that has no predecessor."""
 
 ELSEWHERE: Final = "taken from another data set"
@@ -50,7 +50,7 @@ def _changed(task: Task, before: Sequence[Receipt]) -> str:
     now = Receipt.of(task, {}, 0.0)
     lists = [receipt.changes(now) for receipt in before if receipt.identity]
     if not lists:
-        return "made before; its receipt does not say from what" if before else NEVER
+        return "made before; its receipt does not say from what" if before else NEVER_MADE
     changes = min(lists, key=len)
     more = f" and {len(changes) - _MOST_KEYS} more" if len(changes) > _MOST_KEYS else ""
     return f"{CHANGED}{', '.join(changes[:_MOST_KEYS])}{more}"

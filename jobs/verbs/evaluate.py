@@ -36,6 +36,8 @@ class TruthFlags:
     footprint: Annotated[str | None, Parameter(help="gaussian or box.")] = None
     frame: Annotated[str | None, Parameter(help="Normal of the cosines inside the yarns: ply or macro.")] = None
     normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None
+    parallax: Annotated[bool | None, Parameter(help="Footprints are patches of view rays, or of the plane.")] = None
+    walls: Annotated[str | None, Parameter(help="What a ray sees that meets a yarn's end: rim or left_out.")] = None
 
 
 def _truth_options(chosen: dict[str, Any]) -> TruthOptions:

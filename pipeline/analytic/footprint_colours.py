@@ -21,7 +21,7 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
 from pipeline.analytic.soft_nodes.seen_areas import angle_of, write_areas
 from pipeline.analytic.soft_nodes.shade import DIFFUSE, SPECULAR
-from pipeline.analytic.soft_nodes.wide import RESOLVED, density, form, sight, touched, where_seen
+from pipeline.analytic.soft_nodes.wide import RESOLVED, Sight, density, form, sight, touched, where_seen
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.footprint.mixture import (
@@ -45,6 +45,9 @@ _CHUNK: Final = 4096  # queries whose sums are held at a time
 _FAINT: Final = 1e-6  # share of the light by which threads count in any case
 _TINY: Final = 1e-30
 _0 = np.float32(0.0)
+
+Patch = tuple[float, float, np.float32, np.float32, np.float32]
+"""Centre of a footprint, deviations along x and y, and their correlation."""
 
 
 class Threads(NamedTuple):
@@ -189,14 +192,16 @@ def weighed_colours(
         low, high, turn = around(wo[row, 0], wo[row, 1])
         step, part = angle_of(wo[row, 2])
         write_areas(table.areas, low, high, turn, step, part, areas)
-        where_seen(table, sight(wo[row, 0], wo[row, 1], wo[row, 2], _0), seen)
+        towards = sight(wo[row, 0], wo[row, 1], wo[row, 2], _0)
+        where_seen(table, towards, seen)
         if narrowest >= table.uniform:
             _fold_seen(table, warp, 0, u[row], dx, of_lines, seen, masses[0], sums[0])
             _fold_seen(table, weft, 1, v[row], dy, of_lines, seen, masses[1], sums[1])
         else:
             if max(dx, dy) > LONGEST:
                 dx, dy, rho = shortened(dx, dy, rho, narrowest)
-            _add_cells(table, warp, weft, u[row], v[row], dx, dy, rho, wo[row], of_lines, seen, masses, sums)
+            patch = np.float64(u[row]), np.float64(v[row]), dx, dy, rho
+            _add_cells(table, (warp, weft), patch, towards, of_lines, seen, masses, sums)
         _weigh(warp, masses[0], sums[0], weights[row, :ends], found[row, 0])
         _weigh(weft, masses[1], sums[1], weights[row, ends:], found[row, 1])
     return found
@@ -204,18 +209,23 @@ def weighed_colours(
 
 @kernel
 def _add_cells(
-    table: SoftNodeTable, warp: Threads, weft: Threads, u: np.float32, v: np.float32, dx: np.float32, dy: np.float32,
-    rho: np.float32, wo: Float32, areas: Float32, seen: Float32, masses: tuple[Float64, Float64],
+    table: SoftNodeTable,
+    threads: tuple[Threads, Threads],
+    patch: Patch,
+    towards: Sight,
+    areas: Float32,
+    seen: Float32,
+    masses: tuple[Float64, Float64],
     sums: tuple[Float64, Float64],
-) -> None:  # fmt: skip
+) -> None:
     """Write what a footprint sees of each thread, and the same times its colour, cell by cell."""
     for family in range(2):
         masses[family][:], sums[family][:] = 0.0, 0.0
+    x, y, dx, dy, rho = patch
     ends, picks = len(masses[0]), len(masses[1])
     dx, dy = max(dx, np.float32(RESOLVED)), max(dy, np.float32(RESOLVED))
     of_xx, of_yy, of_xy = form(dx, dy, rho)
-    x_low, x_high, y_low, y_high = touched(table, sight(wo[0], wo[1], wo[2], _0), dx, dy)
-    x, y = np.float64(u), np.float64(v)
+    x_low, x_high, y_low, y_high = touched(table, towards, dx, dy)
     for row in range(math.floor(y + y_low), math.floor(y + y_high) + 1):
         for column in range(math.floor(x + x_low), math.floor(x + x_high) + 1):
             middle_x, middle_y = np.float32(x - column), np.float32(y - row)
@@ -231,10 +241,8 @@ def _add_cells(
                         at_x, at_y = seen[line, 0, k] - middle_x, seen[line, 1, k] - middle_y
                         share = table.spots[line, 2, k] * max(areas[line, k], np.float32(_HIDDEN))
                         total += share * density(at_x, at_y, of_xx, of_yy, of_xy)
-                if family == WARP:
-                    _add_thread(warp.colours, column, end, total, masses[0], sums[0])
-                else:
-                    _add_thread(weft.colours, row, pick, total, masses[1], sums[1])
+                copy, thread = (column, end) if family == WARP else (row, pick)
+                _add_thread(threads[family].colours, copy, thread, total, masses[family], sums[family])
 
 
 @kernel

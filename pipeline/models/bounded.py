@@ -52,7 +52,7 @@ class Bounded(Around):
     def __init__(self, method: Method) -> None:
         super().__init__(method, "bounded")
         domain: Domain | None = getattr(method, "domain", None)
-        self._tables = soft_tables(USUAL, False, False, domain.rays[1] if domain else True)
+        self._tables = soft_tables(USUAL, False, False, domain.rims if domain else True)
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method, and tabulate the fabric."""

@@ -19,10 +19,11 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import field_validator
 
 from pipeline.models.method import faults, refuse_other
 from pipeline.shards.queries import QueryOptions
-from pipeline.truth.options import TruthOptions
+from pipeline.truth.options import USUAL_WALLS, TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -51,6 +52,12 @@ class Domain(Frozen):
     yarns: dict[str, tuple[float, float]]
     """Range of each parameter over the yarns of all trained fabrics, and of the optical thickness."""
 
+    @field_validator("physics")
+    @classmethod
+    def _of_the_plane(cls, physics: dict[str, Any]) -> dict[str, Any]:
+        """Complete the card of an earlier version, which knows the fabric plane alone and says nothing of it."""
+        return {"parallax": False, "walls": USUAL_WALLS[False]} | physics
+
     @classmethod
     def of(cls, about: Mapping[str, Any], fabrics: Sequence[Fabric]) -> Domain:
         """Return the domain of a data set, from its manifest's `about` and the fabrics trained on."""
@@ -72,12 +79,9 @@ class Domain(Frozen):
         return frozenset(kind for kind, there in trained.items() if there)
 
     @property
-    def rays(self) -> tuple[bool, bool]:
-        """Two truths: footprints were patches of view rays, and those that meet a wall see a rim.
-
-        Data sets of earlier versions do not say so.
-        """
-        return bool(self.physics.get("parallax", False)), self.physics.get("walls") == "rim"
+    def rims(self) -> bool:
+        """True if view rays that meet a wall see a rim."""
+        return bool(self.physics["walls"] == "rim")
 
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
         """Return which queries on a fabric lie outside the ranges trained on, (N,); all of them if its yarns do.

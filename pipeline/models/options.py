@@ -44,8 +44,6 @@ class Design(Frozen):
 
     fixed: ClassVar[tuple[str, ...]] = ()
     """Names of the choices of its design that are no options; identities and cards state them beside the options."""
-    newer: ClassVar[tuple[str, ...]] = ()
-    """Options that identities leave out at their defaults: trainings of earlier versions keep theirs."""
 
     @model_validator(mode="before")
     @classmethod
@@ -59,11 +57,9 @@ class Design(Frozen):
     def _identified(self, dump: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
         """Return the options; as an identity with all choices of the design."""
         content: dict[str, Any] = dump(self)
-        if info.context != IDENTITY:
-            return content
-        usual = [key for key in self.newer if getattr(self, key) == type(self).model_fields[key].default]
-        content |= {key: getattr(self, key) for key in self.fixed}
-        return {key: value for key, value in content.items() if key not in usual}
+        if info.context == IDENTITY:
+            content |= {key: getattr(self, key) for key in self.fixed}
+        return content
 
 
 class Options(Design):

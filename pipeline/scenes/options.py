@@ -25,9 +25,9 @@ class PixelOptions(Frozen):
     """Standard deviation of the pixel's Gaussian, in pixels."""
     largest_sigma: float = Field(default=32.0, ge=1, le=1e6)
     """Footprints are cut here, in yarn spacings; a Gaussian of one repeat already is the repeat's average to 4e-16."""
-    largest_angle: float = Field(default=88.0, gt=0, le=89.9)
-    """Most grazing view of the cloth, in degrees to the normal: beyond, the truth needs too many points. A view shows
-    no cloth there, and the plane ends with the last whole row. In a scene such rays are tilted up to it, for the
+    largest_angle: float = Field(default=88.0, gt=0, le=89.0)
+    """Most grazing view of the cloth, in degrees to the normal: beyond, a footprint is seen through many yarns. A view
+    shows no cloth there, and the plane ends with the last whole row. In a scene such rays are tilted up to it, for the
     light alone: coverage is that of the ray itself. So are those that an interpolated normal would show the wrong side
     of the cloth."""
 

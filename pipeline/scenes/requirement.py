@@ -20,7 +20,7 @@ from weaves.validation import Frozen
 
 _RARE = 5e-4  # share of the queries beyond either end of a range
 _ROUND = 1.05  # ratio of a footprint's axes up to which it counts as round
-_STEEPEST = 89.9  # degrees
+_STEEPEST = 89.0  # degrees: the truth knows no lower viewers, what lies beyond falls back
 
 
 class Requirement(Frozen):

@@ -43,8 +43,8 @@ _TRIALS = 4
 _DIGITS_OF_LINES = 32  # what is seen on a view line is found by steps: it loses digits in single precision
 _LEAST_RISE = 0.05  # of light and viewer
 _LEAST_CURVATURE = 0.01
-# Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow and wide;
-# thin ellipses, long and short, and thick ones; wider than the repeat, and so long that they are shortened.
+# Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow and
+# wide; thin ellipses, long and short, and thick ones; wider than the repeat, and so long that they are shortened.
 _FOOTPRINTS = (
     ((0.01, 0.1), (1.0, 1.0)),
     ((0.1, 0.25), (1.0, 1.0)),
@@ -59,7 +59,7 @@ _ON_FIXED_NODES = _FOOTPRINTS[-2:]  # nodes that others place where low rays mee
 
 
 class Group(NamedTuple):
-    """Golden queries of one kind: how many, sides of light and viewer, whether the cloth is curved, z of viewers."""
+    """Golden queries of one kind: their number, sides of light and viewer, whether cloth is curved, z of viewers."""
 
     rows: int
     light: float

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -73,16 +74,17 @@ def truth_answerer(fabric: Fabric, options: TruthOptions, seed: int) -> Answerer
             key = bool(sides[row, 0]), bool(sides[row, 1])
             if key not in met:
                 met.add(key)
-                # A wide footprint and a narrow one, for they may use different tables.
-                wi, wo = (np.repeat(w[row : row + 1], 2, axis=0) for w in (queries.wi, queries.wo))
-                centre, widths = np.zeros(2, np.float32), np.array([1.0, 0.1], np.float32)
+                # A wide footprint and a narrow one, for they may use different tables; seen from straight above or
+                # beneath, where every table knows it.
+                wi, wo = (np.float32([[0, 0, np.sign(w[row, 2])]] * 2) for w in (queries.wi, queries.wo))
+                centre, widths = np.zeros(2, np.float32), np.array([1.0, 0.12], np.float32)
                 estimate(fabric, Queries.round(centre, centre, widths, wi, wo), options, seed, 0)
 
     def answer(queries: Queries, first: int) -> Answers:
         return estimate(fabric, queries, options, seed, first)
 
     about = {"version": versions.TRUTH, "truth": options.model_dump(mode="json"), "seed": seed}
-    return Answerer(answer, about, faults, prepare, errors=True)
+    return Answerer(answer, about, partial(faults, parallax=options.parallax), prepare, errors=True)
 
 
 class Summary:

@@ -90,8 +90,8 @@ class Queries(NamedTuple):
         if not low.any():
             return self
         flat, wo = self.wo[low, :2].astype(np.float64), self.wo.copy()
-        wo[low, :2] = flat * (math.sqrt(1.0 - _RAISED**2) / np.linalg.norm(flat, axis=1, keepdims=True))
-        wo[low, 2] = np.copysign(_RAISED, wo[low, 2])
+        wo[low, :2] = flat * (math.sqrt(1.0 - LOWEST_VIEWER**2) / np.linalg.norm(flat, axis=1, keepdims=True))
+        wo[low, 2] = np.copysign(LOWEST_VIEWER, wo[low, 2])
         return self._replace(wo=wo)
 
     def take(self, index: npt.NDArray[np.integer] | Mask | slice) -> Queries:
@@ -137,8 +137,6 @@ HIDDEN_SHARE = 1e-3
 LOWEST_VIEWER = math.cos(math.radians(89.0))
 """Least cosine of a viewer with parallax: a lower one sees a footprint through many yarns."""
 
-_RAISED = 1.0001 * LOWEST_VIEWER  # above it in single precision, too
-
 STEEPEST_CURVATURE = 1.0
 """Largest curvature: a cylinder as thick as two yarn spacings."""
 
@@ -152,8 +150,11 @@ def _refuse_shapes(queries: Queries, where: str) -> None:
             raise BadInput(where, f"shape of {name}", np.shape(column), f"must be {shape}: all columns have equal rows")
 
 
-def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
-    """Return the fault of each query that has no answer: row -> (column, value, what is allowed)."""
+def faults(queries: Queries, parallax: bool = False) -> dict[int, tuple[str, object, str]]:
+    """Return the fault of each query that has no answer: row -> (column, value, what is allowed).
+
+    With `parallax` a viewer lower than `LOWEST_VIEWER` has none.
+    """
     found: dict[int, tuple[str, object, str]] = {}
 
     def note(rows: Any, name: str, allowed: str) -> None:
@@ -173,17 +174,16 @@ def faults(queries: Queries) -> dict[int, tuple[str, object, str]]:
     note((queries.curvature < 0) | (queries.curvature > STEEPEST_CURVATURE), "curvature", allowed)
     curved_behind = (queries.curvature > 0) & (queries.wo[:, 2] < 0)
     note(curved_behind, "curvature", "must be 0 where the viewer is behind the cloth")
+    if parallax:
+        low = np.abs(queries.wo[:, 2]) < LOWEST_VIEWER
+        note(low, "wo", "with parallax a viewer must be within 89 degrees of the normal")
     return found
 
 
 def validate(queries: Queries, where: str = "queries", parallax: bool = False) -> None:
     """Refuse queries that have no answer with a BadInput that names the first and counts the others."""
     _refuse_shapes(queries, where)
-    found = faults(queries)
-    if parallax:
-        allowed = "with parallax a viewer must be within 89 degrees of the normal"
-        for low in np.flatnonzero(np.abs(queries.wo[:, 2]) < LOWEST_VIEWER).tolist():
-            found.setdefault(low, ("wo", queries.wo[low].tolist(), allowed))
+    found = faults(queries, parallax)
     if not found:
         return
     row = min(found)

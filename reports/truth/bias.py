@@ -1,8 +1,9 @@
 """The bias of the tabulated answers: what `node_table` gets wrong on the average over many patches.
 
 A table's horizons and nodes are the same for every query, so that its errors need not cancel as those of random points
-do. The bias of a component is <table - reference> / <reference> over queries of the default distribution, with the
-light in front of the cloth or, its z reversed, behind; the reference is `owen`, whose own errors cancel in the mean.
+do. The bias of a component is <table - reference> / <reference> over the queries of the default distribution that the
+table answers, with the light in front of the cloth or, its z reversed, behind; the reference is `owen`, whose own
+errors cancel in the mean.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from typing import Annotated, Final, Literal
 import numpy as np
 
 from pipeline.compiled.arrays import Float64
+from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
+from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
 from reports.truth.accuracy import FABRICS, default_queries, fixed
 from reports.truth.row_records import RowRecords
@@ -30,6 +33,7 @@ SIDES: Final = ("light in front", "light behind")
 _ROWS = 4000
 _REFERENCE = 1 << 13
 _SEED = 22
+_TABLE: Final = TruthOptions(estimator="node_table")
 
 
 @dataclass(frozen=True)
@@ -58,15 +62,16 @@ class Bias:
 
 
 def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = _REFERENCE) -> Iterator[Bias]:
-    """Measure every component on so many queries of every preset and side; `reference` is a power of two."""
-    for fabric, queries in default_queries(fabrics, rows, _SEED):
+    """Measure every component, of so many queries of every preset and side; `reference` is a power of two."""
+    for fabric, drawn in default_queries(fabrics, rows, _SEED):
+        queries = drawn.take(FINE.knows(cloth_side(fabric, _TABLE), columns_of(drawn)))
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             lit = queries._replace(wi=queries.wi * np.array([1.0, 1.0, sign], np.float32))
             truth = estimate(fabric, lit, fixed("owen", reference), _SEED + 1).mean.astype(np.float64)
-            found = estimate(fabric, lit, TruthOptions(estimator="node_table"), _SEED).mean.astype(np.float64)
+            found = estimate(fabric, lit, _TABLE, _SEED).mean.astype(np.float64)
             for component, one, other in zip(COMPONENTS, found.T, truth.T, strict=True):
                 value, error = bias_of(one, other)
-                yield Bias(fabric.name, side, component, value, error, rows)
+                yield Bias(fabric.name, side, component, value, error, len(lit.u))
 
 
 def bias_of(found: Float64, truth: Float64) -> tuple[float, float]:

@@ -53,8 +53,8 @@ _SOLID: Final = Ranges(width=(1.0, 1.0), **_OPTICS)
 _OPEN: Final = Ranges(width=(0.6, 0.95), **_OPTICS)
 _NARROW: Final = Ranges(width=(0.2, 0.6), **_OPTICS)
 
-_RAYS: Final = TruthOptions(parallax=True)
-_RIMS: Final = TruthOptions(parallax=True, walls="rim")
+_LEFT_OUT: Final = TruthOptions(walls="left_out")
+_PLANE: Final = TruthOptions(parallax=False)
 
 CLASSES: Final = {
     "solid": (_SOLID, QueryOptions(sigma=_SIGMA), TruthOptions()),
@@ -63,11 +63,9 @@ CLASSES: Final = {
     "curved": (_OPEN, QueryOptions(sigma=_SIGMA, curvature=(0.001, 0.3)), TruthOptions()),
     "light behind": (_OPEN, QueryOptions(sigma=_SIGMA, behind=1.0), TruthOptions()),
     "rotated footprints": (_OPEN, QueryOptions(sigma=_SIGMA, stretch=16.0), TruthOptions()),
-    "view rays, solid": (_SOLID, QueryOptions(sigma=_SIGMA, max_angle=85.0), _RAYS),
-    "view rays, rotated footprints": (_OPEN, QueryOptions(sigma=_SIGMA, stretch=16.0, max_angle=85.0), _RAYS),
-    "rims, solid": (_SOLID, QueryOptions(sigma=_SIGMA, max_angle=85.0), _RIMS),
-    "rims, narrow yarns": (_NARROW, QueryOptions(sigma=_SIGMA, max_angle=85.0), _RIMS),
-    "rims, light behind": (_OPEN, QueryOptions(sigma=_SIGMA, behind=1.0, max_angle=85.0), _RIMS),
+    "walls left out": (_OPEN, QueryOptions(sigma=_SIGMA, stretch=16.0), _LEFT_OUT),
+    "fabric plane": (_OPEN, QueryOptions(sigma=_SIGMA, behind=0.3, stretch=16.0), _PLANE),
+    "fabric plane, curved": (_OPEN, QueryOptions(sigma=_SIGMA, curvature=(0.001, 0.3)), _PLANE),
 }
 """Classes of cloth, queries and physics."""
 
@@ -159,7 +157,7 @@ def samples(
             size, doubt = (np.linalg.norm(values[:, :4], axis=1) for values in (exact.mean, exact.error))
             decided = doubt <= np.maximum(_PRECISE * size, precise.absolute_error)
             for name in estimators:
-                if physics.parallax and name == "quadrature":
+                if name == "quadrature" and physics.walls == "rim":
                     continue
                 known = decided
                 if name == "node_table":

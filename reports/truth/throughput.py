@@ -40,7 +40,7 @@ from pipeline.truth.node_table.kernels import (
     reflected,
 )
 from pipeline.truth.node_table.tables import FINE
-from pipeline.truth.options import EstimatorName, TruthOptions
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from reports.measure.timing import quartiles, set_threads
 from reports.truth.accuracy import FABRICS, fixed
@@ -51,6 +51,7 @@ from weaves.surface import surface_at
 _REPEATS = 5
 _TURNS = 15  # of one thread and two
 _SEED = 20
+_TRAINING: Final = TruthOptions(relative_error=0.05, min_count=64, max_count=1024)  # as the recipes' training rows
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,8 @@ def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate
     yield from _points()
     for name in fabrics:
         yield from _queries(load_fabric(name), rows)
-    fabric, options = load_fabric(fabrics[0]), TruthOptions(estimator="node_table")
-    yield _threads_compared("queries", fabric, lambda queries: estimate(fabric, queries, options, _SEED), 4 * rows)
+    fabric = load_fabric(fabrics[0])
+    yield _threads_compared("queries", fabric, lambda queries: estimate(fabric, queries, _TRAINING, _SEED), 4 * rows)
     yield from _models(fabric)
     yield _memory(fabric, rows)
 
@@ -170,9 +171,8 @@ def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
     model = cloth_side(fabric, TruthOptions())
     FINE.table(model, False)
     built = time.perf_counter() - start
-    settings: tuple[tuple[EstimatorName, float], ...] = (("node_table", 0.01), ("auto", 0.02), ("auto", 0.01))
-    for estimator, error in settings:
-        options = TruthOptions(estimator=estimator, relative_error=error, max_count=1 << 14)
+    for options in (_TRAINING, *(TruthOptions(relative_error=error, max_count=1 << 14) for error in (0.02, 0.01))):
+        error = options.relative_error
         answers = estimate(fabric, queries, options, _SEED)
         size, doubt = (np.linalg.norm(v, axis=1) for v in (answers.mean, answers.standard_error))
         lit = size > 1e-3
@@ -181,7 +181,7 @@ def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
         yield _rate(
             partial(estimate, fabric, queries, options, _SEED),
             lambda answers: len(answers.count),
-            f"queries, {estimator}" + (f" at {error:.0%}" if estimator == "auto" else ""),
+            f"queries, auto at {error:.0%}",
             fabric.name,
             "queries/s",
             f"{reached:.0%} state {error:.0%} or less; median {np.median(doubt[lit] / size[lit]):.2%}; "
@@ -232,13 +232,11 @@ def _models(fabric: Fabric) -> Iterator[Rate]:
 
 def _memory(fabric: Fabric, rows: int) -> Rate:
     """Return what the peak of memory grows by for ten times as many queries, answered in chunks as shards are."""
-    options = TruthOptions(estimator="node_table")
 
     def peak(total: int) -> int:
         for start in range(0, total, rows):
-            estimate(
-                fabric, draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, start, rows), options, _SEED, start
-            )
+            queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, start, rows)
+            estimate(fabric, queries, _TRAINING, _SEED, start)
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
     few, many = peak(2 * rows), peak(20 * rows)

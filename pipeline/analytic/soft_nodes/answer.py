@@ -76,7 +76,7 @@ def sum_queries(
 
 @kernel
 def shortened(
-    deviation_x: float, deviation_y: float, correlation: float, narrowest: float
+    deviation_x: np.float32, deviation_y: np.float32, correlation: np.float32, narrowest: np.float32
 ) -> tuple[np.float32, np.float32, np.float32]:
     """Return a footprint no longer than `LONGEST` along its own longer axis, as wide as before across."""
     xx, yy, across = np.float64(deviation_x) ** 2, np.float64(deviation_y) ** 2, np.float64(narrowest) ** 2
@@ -113,7 +113,9 @@ def _sum_rows(
         x = np.float64(u[n]) - ends * math.floor(np.float64(u[n]) / ends)
         y = np.float64(v[n]) - picks * math.floor(np.float64(v[n]) / picks)
         dx, dy, rho = deviation_x[n], deviation_y[n], correlation[n]
-        narrowest = min(dx, dy) if rho == _0 else np.float32(narrow_axis(dx, dy, rho))
+        narrowest = min(dx, dy)
+        if rho != _0:
+            narrowest = np.float32(narrow_axis(dx, dy, rho))
         if max(dx, dy) > LONGEST and narrowest < table.uniform:
             dx, dy, rho = shortened(dx, dy, rho, narrowest)
         low_i, high_i, turn_i = around(wi[n, 0], wi[n, 1])

@@ -10,7 +10,6 @@ from pipeline.models.options import TextureOptions
 class NeumipOptions(TextureOptions):
     """One offset texture, one feature pyramid and one small decoder for each fabric [Kuznetsov2021NeuMIP]."""
 
-    newer: ClassVar[tuple[str, ...]] = ("ignore_curvature",)
     any_physics: ClassVar[bool] = True
     seconds: ClassVar[tuple[float, float]] = (1.6e-5, 2e-6)
 

@@ -66,7 +66,7 @@ class SelvageOptions(Options):
 
     @property
     def rims(self) -> bool:
-        """Whether view rays that meet a wall see a rim."""
+        """True if view rays that meet a wall see a rim."""
         return self.walls == "rim"
 
     @property

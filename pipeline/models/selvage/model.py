@@ -111,10 +111,9 @@ class SelvageNetwork(Trainable):
         self.register_buffer("mean", torch.zeros(FEATURES))
         self.register_buffer("scale", torch.ones(FEATURES))
         self.errors = ErrorNetwork(options, FEATURES)
-        self._tables, self._finest = [], []
-        for fabric in fabrics:
-            for level, tables in ((options.level, self._tables), (options.finest, self._finest)):
-                tables.append(tabulate(fabric, level=level, rims=options.rims))
+        levels = (options.level, options.finest)
+        tables = [[tabulate(fabric, level=level, rims=options.rims) for level in levels] for fabric in fabrics]
+        self._tables, self._finest = [own for own, _ in tables], [finest for _, finest in tables]
         self.expect(0)
         if fabrics:
             self._measure(fabrics)
@@ -425,7 +424,7 @@ class Adaptive(_OverNodes, Around):
         result, errors = self._selvage.with_errors(fabric, queries)
         too_far = errors[:, OWN] > self.error
         # The fallback sees rims: what is left of another meaning of walls stays with the finest nodes.
-        finer = too_far & ((errors[:, FINEST] <= self.error) | (not all(self._selvage.options.rays)))
+        finer = too_far & ((errors[:, FINEST] <= self.error) | (not self._selvage.options.rims))
         left = too_far & ~finer
         if finer.any():
             result[finer] = self.nodes.predict(fabric, queries.take(finer))

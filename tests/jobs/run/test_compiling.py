@@ -15,10 +15,9 @@ def names(tasks):
 
 
 def test_a_task_asks_for_what_it_uses_alone(tasks):
-    training_rows = [t for t in tasks if t.stage == "generate" and t.shard.truth.estimator == "node_table"]
-    assert names(training_rows) == {"node_table"}
+    assert names(task for task in tasks if task.stage == "generate") == {"auto"}
     assert names(task for task in tasks if task.stage in ("train", "report")) <= {"soft_nodes"}
-    assert names(t for t in tasks if t.title == "extremes of prefiltered") == {"quadrature", "prefiltered"}
+    assert names(t for t in tasks if t.title == "extremes of prefiltered") == {"owen", "prefiltered"}
 
 
 def test_each_group_is_compiled_once_whatever_the_options_and_not_again_in_its_process(tasks):

@@ -1,7 +1,7 @@
 import pytest
 
 from jobs.run.ledger import Ledger
-from jobs.run.reasons import NEVER, reasons
+from jobs.run.reasons import NEVER_MADE, reasons
 from tests.jobs import fake_stages as fake
 
 
@@ -14,7 +14,7 @@ def ledger(tmp_path):
 @pytest.mark.parametrize(
     ("before", "now", "why"),
     [
-        ([], {}, NEVER),
+        ([], {}, NEVER_MADE),
         ([{}], {}, None),
         ([{"seconds": 0.01}], {"seconds": 0.02, "breaks": True}, "changed: breaks False → True, seconds 0.01 → 0.02"),
         # The most similar one counts.

@@ -59,7 +59,8 @@ def test_a_summary_tells_what_was_done(evaluate, tmp_path):
     assert float(cells[3].replace(",", "")) == pytest.approx(table["count"].to_numpy().mean(), rel=0.01)
     # The same command writes the same bytes on any number of threads; another seed, estimator or footprint does not.
     first = path.read_bytes()
-    for choice in ((), ("--workers", "1"), ("--seed", "1"), ("--estimator", "mc"), ("--footprint", "box")):
+    others = ("--seed", "1"), ("--estimator", "mc"), ("--footprint", "box"), ("--no-parallax",), ("--walls", "left_out")
+    for choice in ((), ("--workers", "1"), *others):
         evaluate(*coarse, *choice, out="deep/result.parquet")
         assert (path.read_bytes() == first) == (not choice or choice[0] == "--workers"), choice
 

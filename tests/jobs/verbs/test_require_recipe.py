@@ -40,15 +40,18 @@ def test_truth_and_measurements_are_those_of_the_general_recipe(tmp_path):
     assert own.models[1].options.counts == [2] and [fabric.name for fabric in own.fabrics] == ["denim"]
 
 
+MACRO = {"frame": "macro", "parallax": False, "walls": "left_out"}
+
+
 def _with_macro(options, **more):
     """Return measurements whose truth has cosines to the macro normal."""
-    truths = {k: getattr(options, k).model_copy(update={"frame": "macro"}) for k in ("truth", "frame_truth")}
+    truths = {k: getattr(options, k).model_copy(update=MACRO) for k in ("truth", "frame_truth")}
     return options.model_copy(update=truths | more)
 
 
 def test_physics_and_stated_errors_of_a_truth_are_kept(tmp_path):
-    truth = TruthOptions(estimator="owen", relative_error=0.01, max_count=8192, frame="macro")
-    training = TruthOptions(relative_error=0.3, frame="macro")
+    truth = TruthOptions(estimator="owen", relative_error=0.01, max_count=8192, **MACRO)
+    training = TruthOptions(relative_error=0.3, **MACRO)
     dataset = QUICK.dataset.model_copy(update={"truth": truth, "training_truth": training})
     bench = _with_macro(QUICK.bench, scenes=_with_macro(QUICK.bench.scenes))
     general = dataclasses.replace(QUICK, dataset=dataset, models=QUICK.models[1:2], bench=bench)

@@ -13,11 +13,11 @@ from pipeline.truth.options import TruthOptions
 
 
 @lru_cache(maxsize=64)
-def soft_table(fabric, level=2, behind=False):
+def soft_table(fabric, level=2, behind=False, rims=True):
     """Return a table with grids of a quarter of the usual size: as exact in all that is compared here, and cheaper."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(nodes, "_GRID_BYTES", 1 << 18)
-        return nodes.tabulate(fabric, level=level, behind=behind)
+        return nodes.tabulate(fabric, level=level, behind=behind, rims=rims)
 
 
 @lru_cache(maxsize=32)
@@ -31,14 +31,14 @@ def _clusters(fabric, clusters):
 _maps = lru_cache(maxsize=32)(prefiltered.tabulate)
 
 
-def soft_nodes(fabric, queries, level=2):
-    return features.read_queries(soft_table(fabric, level), queries).components
+def soft_nodes(fabric, queries, level=2, rims=True):
+    return features.read_queries(soft_table(fabric, level, rims=rims), queries).components
 
 
-def soft_nodes_behind(fabric, queries):
+def soft_nodes_behind(fabric, queries, rims=True):
     """Return components and transparency with the light mirrored to the other side, (N, 5)."""
     return features.read_behind(
-        soft_table(fabric, behind=True), queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
+        soft_table(fabric, behind=True, rims=rims), queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
     )
 
 
@@ -46,8 +46,9 @@ def summed_area(fabric, queries):
     return answer.answer(_clusters(fabric, 64), queries)
 
 
-def points(fabric, queries, count=256):
-    return exact_points.sample_points(cloth_side(fabric, TruthOptions()), queries, count, 3, True)
+def points(fabric, queries, count=256, rims=True):
+    options = TruthOptions(walls="rim" if rims else "left_out")
+    return exact_points.sample_points(cloth_side(fabric, options), queries, count, 3, True)
 
 
 def averaged_normals(fabric, queries):

@@ -48,12 +48,12 @@ def test_all_bounces_are_added_to_the_values_and_leave_the_density(mi, few_walks
     """Light of the table, in front; the cosines of the mixture draw where it shines already."""
     fabric, sigma, theta, phi = CONFIGURATIONS["front"]
     properties = {"type": "twillight", "fabric": fabric, "sigma": sigma}
-    one, every = mi.load_dict(properties), mi.load_dict({**properties, "bounces": "all"})
+    one, every = mi.load_dict({**properties, "bounces": 1}), mi.load_dict(properties)
     viewer, light = unit(theta, phi), unit(40.0, 200.0)
     si, context = interaction(mi, viewer.tolist()), mi.BSDFContext()
     (before, pdf), (after, same) = (bsdf.eval_pdf(context, si, light.tolist()) for bsdf in (one, every))
     query = Queries.round([0.62], [0.57], [sigma], [light], [viewer])
-    later = shade(load_fabric(fabric), np.zeros((1, 4)), query, "all")[0]
+    later = shade(load_fabric(fabric), np.zeros((1, 4)), query)[0]
     assert later.min() > 0.0 and later.max() > 1e-3
     np.testing.assert_allclose(number(after) - number(before), later, rtol=1e-3, atol=1e-6)
     np.testing.assert_array_equal(number(same), number(pdf))

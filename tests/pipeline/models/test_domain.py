@@ -30,8 +30,6 @@ def test_what_was_taught_is_answered():
     wide = Domain.of({"queries": WIDE.model_dump()}, FABRICS)
     wide.refuse(draw_queries(WIDE, (4, 4), 1, 0, 32), "m")
     assert PLAIN.kinds == frozenset() and wide.kinds == {"behind", "stretch", "curvature"}
-    rays = Domain.of({"truth": {"parallax": True, "walls": "rim"}}, FABRICS).rays
-    assert rays == (True, True) and PLAIN.rays == (False, False)
     assert not PLAIN.out_of_domain(DENIM, one(light=89.99, viewer=89.99)).any()
     PLAIN.refuse_fabric(DENIM, "m")
     PLAIN.refuse_truth(TruthOptions(relative_error=0.1), "m")
@@ -55,7 +53,18 @@ def test_what_was_not_taught_is_refused_by_name(options, message):
     with pytest.raises(BadInput, match=r"denim: roughness = 0.9.*0.16 to 0.55"):
         PLAIN.refuse_fabric(woven("denim", warp={"roughness": 0.9}), "m")
     with pytest.raises(BadInput, match=r"truth: frame = 'macro'.*frame = 'ply'"):
-        PLAIN.refuse_truth(TruthOptions(frame="macro"), "m")
+        of_plane = Domain.of({"truth": {"parallax": False}}, FABRICS)
+        of_plane.refuse_truth(TruthOptions(frame="macro", parallax=False), "m")
+
+
+def test_cards_that_say_nothing_of_view_rays_are_of_the_fabric_plane():
+    card = PLAIN.model_dump()
+    old = {name: value for name, value in card["physics"].items() if name not in ("parallax", "walls")}
+    earlier = Domain.model_validate(card | {"physics": old})
+    assert PLAIN.rims and not earlier.rims
+    earlier.refuse_truth(TruthOptions(parallax=False), "m")
+    with pytest.raises(BadInput, match=r"truth: parallax = True.*parallax = False"):
+        earlier.refuse_truth(TruthOptions(), "m")
 
 
 def one(sigma=1.0, minor=None, light=10.0, viewer=10.0, curvature=0.0):
@@ -93,7 +102,7 @@ def test_large_footprints_are_known_where_training_saw_the_average_of_the_repeat
     assert NARROW.out_of_domain(load_fabric("satin_8"), huge).all()
     asked = NARROW.within(DENIM, huge)
     np.testing.assert_allclose([asked.sigma, asked.sigma_minor], 3.0, rtol=1e-6)
-    truth = TruthOptions(estimator="quadrature", relative_error=1e-4)
+    truth = TruthOptions(estimator="quadrature", walls="left_out", relative_error=1e-4)
     found, reference = (estimate(DENIM, queries, truth, 0).mean for queries in (asked, huge))
     np.testing.assert_allclose(found, reference, rtol=2e-3)
 

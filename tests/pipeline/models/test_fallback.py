@@ -16,6 +16,9 @@ from tests.pipeline.truth.cloths import fixed, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
+DENIM = load_fabric("denim")
+ROUGH = woven("denim", warp={"roughness": 1.0})
+
 
 def mixed(count=60):
     """Queries of every kind: ellipses, curvature, light from behind; every third one seen from behind."""
@@ -71,7 +74,7 @@ def test_coverage_is_the_methods_own_up_to_its_curvature_and_that_of_a_few_rays_
     assert (fallback.coverage(fabric, low) == 0).all() and (fallback.coverage(fabric, flat) == 1).all()
 
 
-def test_what_no_form_stands_for_is_answered_by_quadrature():
+def test_what_no_form_stands_for_is_answered_by_the_fallback():
     fabric, queries = load_fabric("voile"), mixed()
     fallback = Fallback(FakeMethod(), ())
     strange = fallback.out_of_domain(fabric, queries)
@@ -82,6 +85,22 @@ def test_what_no_form_stands_for_is_answered_by_quadrature():
     # Asked for 10 % of each answer's length, and an absolute error where it is dark.
     wrong, size = (np.linalg.norm(part, axis=1) for part in (found[strange] - reference, reference))
     assert np.median(wrong / size) < 0.1 and wrong.sum() < 0.1 * size.sum()
+
+
+def test_viewers_too_low_for_the_truth_are_tilted_up():
+    """On either side of the cloth, to the same azimuth; others keep their bits."""
+    queries = mixed()
+    low = queries._replace(wo=queries.wo * np.float32([1, 1, 1e-4]))
+    low.wo[:10] = queries.wo[:10]
+    low.wo[:] /= np.linalg.norm(low.wo, axis=1, keepdims=True)
+    raised = low.raised()
+    np.testing.assert_array_equal(raised.wo[:10], low.wo[:10])
+    assert np.isfinite(fallback_answers(DENIM, low, 3)).all()
+    np.testing.assert_array_equal(fallback_answers(DENIM, low, 3), fallback_answers(DENIM, raised, 3))
+    degrees = np.degrees(np.arccos(np.abs(raised.wo[10:, 2])))
+    np.testing.assert_allclose(degrees, 89.0, atol=1e-3)
+    assert (np.sign(raised.wo) == np.sign(low.wo)).all()
+    np.testing.assert_allclose(raised.wo[10:, 0] * low.wo[10:, 1], raised.wo[10:, 1] * low.wo[10:, 0], atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["denim", slow("voile")])
@@ -102,11 +121,7 @@ def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name, selvage):
         assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
 
 
-DENIM = load_fabric("denim")
-ROUGH = woven("denim", warp={"roughness": 1.0})
-
-
-def test_yarns_unlike_those_trained_on_are_answered_by_quadrature():
+def test_yarns_unlike_those_trained_on_are_left_to_the_fallback():
     fallback, queries = fallback_of(DENIM, {}), draw_queries(QueryOptions(sigma=(0.5, 1.0)), (4, 4), 3, 0, 20)
     assert not fallback.out_of_domain(DENIM, queries).any() and fallback.out_of_domain(ROUGH, queries).all()
     np.testing.assert_array_equal(fallback.predict(ROUGH, queries), fallback_answers(ROUGH, queries, 0))
@@ -139,7 +154,7 @@ def test_what_stands_in_is_the_truth_of_ellipses_on_flat_and_on_curved_cloth(tur
     assert np.sqrt(np.square(wrong).sum(axis=1).mean()) < bound * reference.sum(axis=1).mean()
 
 
-def test_beyond_the_ranges_trained_on_quadrature_answers_and_within_them_the_method():
+def test_beyond_the_ranges_trained_on_the_fallback_answers_and_within_them_the_method():
     fabric = load_fabric("voile")
     fallback = fallback_of(fabric, {"queries": {"sigma": [0.3, 1.0], "max_angle": 60.0}})
     queries = draw_queries(QueryOptions(sigma=(0.05, 32.0)), fabric.weave.repeat, 5, 0, 400)
@@ -177,7 +192,7 @@ def test_plain_queries_are_the_methods_alone(rows):
     assert fallback.bytes_stored(fabric) == sums.bytes_stored(fabric)
 
 
-def test_cloth_steeper_than_was_taught_is_quadratures():
+def test_cloth_steeper_than_was_taught_is_left_to_the_fallback():
     """The scenes' drape bends up to 1 a yarn; `curved` knows up to .5, and refuses beyond."""
     about, options = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}, SMALL["curved"]
     network = CurvedNetwork(options, DENIM.weave.repeat)

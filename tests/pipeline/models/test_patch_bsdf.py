@@ -109,8 +109,9 @@ def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name, 
     """A z-test at LEVEL of light that is no longer in the lobes' shares, against even directions."""
     for table, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
         monkeypatch.setattr(bounces, table, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
-    one, count, wi = bsdf_of(name), 20_000, sphere(80, 160)
-    every, queries, looks = PatchBSDF(one.fabric, bounces="all"), looks_of(name, len(wi), wi), looks_of(name, count)
+    count, wi = 20_000, sphere(80, 160)
+    one, every = (PatchBSDF(load_fabric(CONFIGURATIONS[name][0]), bounces=number) for number in (1, "all"))
+    queries, looks = looks_of(name, len(wi), wi), looks_of(name, count)
     first, even = (bsdf.eval(queries) @ LUMINANCE for bsdf in (one, every))
     scattered = even.mean() * 4.0 * math.pi
     assert scattered > 1.005 * first.mean() * 4.0 * math.pi

@@ -22,7 +22,7 @@ from weaves.fabric import load_fabric
 def test_ellipses_are_answered_as_such(options, bound, clusters):
     """RMSE of the colour over the mean; asked for the round footprint of equal area half as much again at least."""
     fabric = load_fabric("cotton_twill")
-    kinds = QueryOptions(sigma=(0.25, 0.6), max_angle=60.0, stretch=5.0)
+    kinds = QueryOptions(sigma=(0.25, 0.6), max_angle=60.0, stretch=8.0)
     queries = draw_queries(kinds, fabric.weave.repeat, 9, 0, 96)
     truth = truth_of(fabric, queries)
     method = clusters if options.model == clusters.name else load_methods(options)[0]

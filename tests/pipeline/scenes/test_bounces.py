@@ -35,17 +35,17 @@ def few_walks(monkeypatch):
 
 
 def test_all_bounces_are_added_to_the_first():
-    """By default nothing is; a channel that no yarn reflects gets no light, and a white one most."""
+    """By default; a channel that no yarn reflects gets no light, and a white one most."""
     components, queries = np.random.default_rng(1).random((2, 4)), _queries()
-    once, every = shade(CLOTH, components, queries), shade(CLOTH, components, queries, "all")
+    once, every = shade(CLOTH, components, queries, 1), shade(CLOTH, components, queries)
     added = every - once
-    assert added == pytest.approx(shade(CLOTH, NONE, queries, "all"))
+    assert added == pytest.approx(shade(CLOTH, NONE, queries))
     assert (added[:, 2] == 0.0).all() and (added[:, 0] > 2.0 * added[:, 1]).all() and (added[:, 1] > 0.0).all()
 
 
 def test_colours_change_no_table(few_walks):
     for albedo in (0.2, 0.4, 0.8):
-        shade(woven("denim", diffuse=(albedo,) * 3), NONE, _queries(), "all")
+        shade(woven("denim", diffuse=(albedo,) * 3), NONE, _queries())
     assert len(few_walks) == 1
 
 

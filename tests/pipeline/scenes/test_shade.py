@@ -22,7 +22,7 @@ def test_shade_applies_each_colour_to_its_component():
     fabric = denim.model_copy(update={"weft": denim.weft.model_copy(update={"diffuse_transmission": (0.1, 0.2, 0.3)})})
     yarns, sides = (fabric.warp, fabric.weft), ("diffuse_rgb", "diffuse_transmission_rgb")
     expected = [[getattr(yarn, name) for name in ("specular_rgb", side) for yarn in yarns] for side in sides]
-    rgb = shade(fabric, np.tile(np.eye(4), (2, 1)), lit(np.repeat([1.0, -1.0], 4)))
+    rgb = shade(fabric, np.tile(np.eye(4), (2, 1)), lit(np.repeat([1.0, -1.0], 4)), bounces=1)
     assert rgb.reshape(2, 4, 3) == pytest.approx(np.array(expected))
     assert np.array([colours(fabric), colours(fabric, transmitted=True)]) == pytest.approx(np.array(expected))
     assert fabric.warp.diffuse_rgb != fabric.weft.diffuse_rgb
@@ -36,7 +36,7 @@ def test_footprints_of_a_check_take_the_colours_of_their_own_threads():
     places = np.array([1.0, 3.0, 5.0, 2.0])
     size = np.array([0.1, 0.1, 0.1, 50.0])
     queries = lit(np.ones(4))._replace(u=places, sigma=size, sigma_minor=size)
-    rgb = shade(fabric, np.tile([0.0, 0.0, 1.0, 0.0], (4, 1)), queries)
+    rgb = shade(fabric, np.tile([0.0, 0.0, 1.0, 0.0], (4, 1)), queries, bounces=1)
     assert rgb[:, 0] == pytest.approx([0.8, 0.0, 0.8, 0.4], abs=1e-3)
     assert colours(fabric)[2] == pytest.approx([0.4] * 3)
 

@@ -150,10 +150,19 @@ def test_what_stops_a_thread_stops_everything(case):
     """The table knows nothing of tiny footprints: the first such row in the file is named, whoever meets it first."""
     case.options = OPTIONS.model_copy(update={"estimator": "node_table"})
     columns = query_columns()
-    columns["sigma"] = np.where(np.isin(np.arange(ROWS), [150, 250]), 0.001, 1.0)
+    columns["sigma"] = np.where(np.isin(np.arange(ROWS), [150, 250]), 0.001, 32.0)
     with pytest.raises(BadInput, match="row 150"):
         case.write(columns).run(chunk=10, threads=4)
     assert not list(case.out.parent.iterdir())
+
+
+def test_viewers_too_low_for_parallax_are_bad_rows(case):
+    columns = query_columns(30)
+    for axis, value in zip("xyz", (0.9999, 0.0, 0.01414), strict=True):
+        columns[f"wo_{axis}"][[7, 9]] = value
+    with pytest.raises(BadInput, match=r"row 7, .*within 89 degrees of the normal"):
+        case.write(columns).run()
+    assert case.run(skip_bad=True).bad == 2
 
 
 @pytest.mark.parametrize("row_group_size", [10, 1000])

@@ -39,10 +39,16 @@ def equal_queries(wi, wo, sigma=2.0, rows=1, centre=(0.3, 0.7)):
     return Queries.round(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
 
 
+def answering(estimator, **options):
+    """Return options of an estimator; of `quadrature`, which knows no rims, those of the fabric plane."""
+    plane = {"parallax": False} if estimator == "quadrature" else {}
+    return TruthOptions(estimator=estimator, **plane | options)
+
+
 def fixed(count, estimator="owen", **options):
     """Return options that spend this number of points on each query."""
     limits = {"relative_error": 1e-9, "absolute_error": 0.0, "min_count": count, "max_count": count}
-    return TruthOptions(estimator=estimator, **limits | options)
+    return answering(estimator, **limits | options)
 
 
 LOPSIDED = woven("denim", ("#.#", "##.", ".##"), {"width": 0.8, "twist": 20.0}, {"bend": 35.0, "relief": 1.2})

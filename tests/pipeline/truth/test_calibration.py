@@ -5,8 +5,7 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.calibration import FRONT_FACTORS, SAMPLED, calibrate
 from pipeline.truth.cloth import Raw
 from pipeline.truth.estimator import ESTIMATORS, estimate, uncalibrated
-from pipeline.truth.options import TruthOptions
-from tests.pipeline.truth.cloths import fixed
+from tests.pipeline.truth.cloths import answering, fixed
 from weaves.fabric import load_fabric
 
 
@@ -19,9 +18,8 @@ def test_a_hidden_patch_has_no_error():
 @pytest.mark.parametrize("estimator", list(ESTIMATORS))
 def test_every_answer_has_a_stage_and_both_errors(estimator):
     fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 5, 0, 40)
-    raw = uncalibrated(fabric, queries, TruthOptions(estimator=estimator, max_count=1024), 1)
-    answers = estimate(fabric, queries, TruthOptions(estimator=estimator, max_count=1024), 1)
+    queries = draw_queries(QueryOptions(sigma=(1.0, 32.0), max_angle=75.0), fabric.weave.repeat, 5, 0, 40)
+    raw, answers = (call(fabric, queries, answering(estimator, max_count=1024), 1) for call in (uncalibrated, estimate))
     assert np.isin(raw.stage, list(FRONT_FACTORS)).all()
     np.testing.assert_array_equal(answers.mean, raw.mean[:, :4].astype(np.float32))
     assert (answers.bound >= answers.standard_error).all()

@@ -13,7 +13,7 @@ from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.node_table.tables import NOT_REFINED, NodeTable
 from pipeline.truth.options import EstimatorName, Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows
-from tests.pipeline.truth.cloths import along_cylinders, cylinder_answers, cylinders, fixed, woven
+from tests.pipeline.truth.cloths import along_cylinders, answering, cylinder_answers, cylinders, fixed, woven
 
 ROUND = cylinders(twist=20.0, roughness=0.4, blend=0.6).model_copy(update={"optical_thickness": 0.8})
 ASKED = along_cylinders(viewer=1.2)
@@ -48,7 +48,7 @@ def test_answers_are_exact_within_the_errors_they_state(estimator):
     """3 of 1,000 lie beyond their bounds; the rms error is at most about that of the standard errors, and 1 %. For a
     table without refinement cylinders are the worst cloth: all borders of shadows lie alike, across nodes. Without the
     neighbour's shadow diffuse light would be 17 % off."""
-    options = TruthOptions(estimator=estimator, relative_error=0.005, max_count=1 << 14)
+    options = answering(estimator, relative_error=0.005, max_count=1 << 14)
     answers = estimate(ROUND, ASKED, options, 1)
     dark = answers.mean == 0.0
     found = of_warp(answers.mean, answers.transparency)
@@ -110,8 +110,8 @@ def test_tables_converge_with_their_nodes():
 def test_a_lamp_at_the_eye_lights_all_that_is_seen(estimator):
     """Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction."""
     fabric = woven("cotton_twill", blend=0.0)
-    queries = draw_queries(QueryOptions(sigma=(0.3, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 40)
-    options = TruthOptions(estimator=estimator, max_count=256)
+    queries = draw_queries(QueryOptions(sigma=(1.5, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 40)
+    options = answering(estimator, max_count=256)
     found = estimate(fabric, queries._replace(wi=queries.wo), options, 1).mean[:, 2:].sum(axis=1)
     # Tables interpolate the horizon of light and viewer alike: a node is seen and lit, or neither.
     np.testing.assert_allclose(found * math.pi, queries.wo[:, 2], rtol=2e-3)

@@ -26,7 +26,7 @@ TWILL = load_fabric("denim")
 class Scaled(FakeMethod):
     """A coarse truth times a factor, but for what `spoil` does to it."""
 
-    truth = TruthOptions(estimator="quadrature", relative_error=0.1)
+    truth = TruthOptions(estimator="quadrature", parallax=False, relative_error=0.1)
 
     def __init__(self, factor=1.0, setting="", spoil=lambda answers, queries: answers):
         self.factor, self.setting, self.spoil = factor, setting, spoil
@@ -73,7 +73,7 @@ def test_closed_forms():
 
 def test_viewers_too_low_for_parallax_have_no_truth(monkeypatch):
     """They are answered, and not compared; lights that graze are."""
-    monkeypatch.setattr(Scaled, "truth", TruthOptions(estimator="owen", parallax=True, min_count=32, max_count=32))
+    monkeypatch.setattr(Scaled, "truth", TruthOptions(estimator="owen", min_count=32, max_count=32))
 
     def predict(method, fabric, queries, seed=0):
         low = queries.wo[:, 2] < LOWEST_VIEWER

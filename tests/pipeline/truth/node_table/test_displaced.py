@@ -15,7 +15,7 @@ from pipeline.truth.options import TruthOptions
 from tests.pipeline.truth.cloths import LOPSIDED, direction, equal_queries
 from weaves.fabric import load_fabric
 
-RAYS = TruthOptions(parallax=True)
+RAYS = TruthOptions(walls="left_out")
 
 
 def _weights(fabric, sigma, minor, angle, degrees):

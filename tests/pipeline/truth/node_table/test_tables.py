@@ -11,16 +11,16 @@ from weaves.fabric import load_fabric
 DENIM = load_fabric("denim")
 
 
-def _table(line=FINE_LINE):
-    return NodeTable(lambda cells: 4, 4, line)
+def _table(line=FINE_LINE, nodes=32):
+    return NodeTable(lambda cells: nodes, 4, line)
 
 
 def _columns(rows=6):
-    return columns_of(draw_queries(QueryOptions(), DENIM.weave.repeat, 5, 0, rows))
+    return columns_of(draw_queries(QueryOptions(sigma=(0.5, 32.0), max_angle=60.0), DENIM.weave.repeat, 5, 0, rows))
 
 
 def test_a_table_is_built_once_and_again_only_for_light_from_behind():
-    cloth, table = cloth_side(DENIM, TruthOptions()), _table()
+    cloth, table = cloth_side(DENIM, TruthOptions()), _table(nodes=4)
     front = table.table(cloth, False)
     assert table.table(cloth, False) is front
     both = table.table(cloth, True)
@@ -31,7 +31,7 @@ def test_a_table_is_built_once_and_again_only_for_light_from_behind():
 @pytest.mark.parametrize("options", [{"frame": "macro"}, {"shadows": False}], ids=str)
 def test_other_models_than_the_default_are_unknown(options):
     assert _table().knows(cloth_side(DENIM, TruthOptions()), _columns()).all()
-    assert not _table().knows(cloth_side(DENIM, TruthOptions(**options)), _columns()).any()
+    assert not _table().knows(cloth_side(DENIM, TruthOptions(parallax=False, **options)), _columns()).any()
 
 
 def test_curved_cloth_and_tiny_footprints_are_unknown():

@@ -16,7 +16,7 @@ from pipeline.truth.options import TruthOptions
 from tests.pipeline.truth.cloths import cylinders, direction, woven
 from tests.presets import slow
 
-RIMS = TruthOptions(parallax=True, walls="rim")
+RIMS = TruthOptions()
 
 
 def _table(fabric, nodes=32, azimuths=128):

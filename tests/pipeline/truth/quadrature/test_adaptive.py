@@ -11,12 +11,12 @@ from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows, quadrature_rows
 from pipeline.truth.quadrature.rules import rectangles
-from tests.pipeline.truth.cloths import direction, equal_queries, fixed, woven
+from tests.pipeline.truth.cloths import answering, direction, equal_queries, fixed, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
 CUT, NEVER = 2, 9  # level from which on lines are cut; the second is never reached
-FINE = TruthOptions(estimator="quadrature", relative_error=3e-4, absolute_error=0.0, max_count=1 << 15)
+FINE = answering("quadrature", relative_error=3e-4, absolute_error=0.0, max_count=1 << 15)
 
 
 @pytest.mark.parametrize("name", ["polyester_lining", "satin_8", "herringbone", "silk_shantung", "basket"])
@@ -41,7 +41,7 @@ def _specular_errors(roughness, split):
     """Return rms errors of the specular part with 4, 8, 16 nodes an axis; plain weave, one repeat, no shadows."""
     fabric = woven("polyester_lining", roughness=roughness)
     pairs = [((30, 30), (30, 210)), ((40, 10), (35, 100)), ((20, 70), (45, 300)), ((10, 0), (25, 160))]
-    model = cloth_side(fabric, TruthOptions(shadows=False))
+    model = cloth_side(fabric, TruthOptions(parallax=False, shadows=False))
     wi, wo = (np.array([direction(*pair[k]) for pair in pairs], np.float32) for k in (0, 1))
     columns = columns_of(equal_queries((0, 0, 1), (0, 0, 1), rows=4)._replace(wi=wi, wo=wo))
     limits = Limits(1e-15, 0.0, 32, 1 << 30)
@@ -89,7 +89,7 @@ def test_it_agrees_with_sampled_estimates(case):
     _, name, changes, options, queries = case
     fabric = woven(name, **changes)
     own = estimate(fabric, queries, FINE.model_copy(update=options), 1)
-    sampled = estimate(fabric, queries, fixed(1 << 17, **options), 2)
+    sampled = estimate(fabric, queries, fixed(1 << 17, parallax=False, **options), 2)
     allowed = stats.t.ppf(1 - 5e-5, 15) * sampled.standard_error + own.bound + 1e-7
     assert (np.abs(own.mean - sampled.mean) <= allowed).all()
     spread = stats.t.ppf(1 - 5e-5, 15) * sampled.transparency_standard_error + own.transparency_bound + 1e-7
@@ -105,7 +105,7 @@ def test_cutting_lines_at_shadow_edges_pays():
     exact = integrate_rows(model, columns, first_cells(model.front), Limits(1e-12, 0.0, 32, 1 << 30), CUT, 4, 5)[0]
     limits = Limits(1e-12, 0.0, 32, 8192)
     cut, _, used, _ = integrate_rows(model, columns, first_cells(model.front), limits, CUT, 1, 5)
-    owen = estimate(fabric, queries, fixed(8192, "auto"), 1)
+    owen = estimate(fabric, queries, fixed(8192, "auto", parallax=False), 1)
     size = np.linalg.norm(exact[:, :4], axis=1)
     first, second = (np.mean(np.linalg.norm(m[:, :4] - exact[:, :4], axis=1) / size) for m in (cut, owen.mean))
     assert used.mean() < 8192 * 1.1 and first < 0.5 * second
@@ -132,7 +132,7 @@ def test_stated_bounds_cover_the_true_error(rows):
 @pytest.mark.parametrize("footprint", ["gaussian", "box"])
 def test_extremes_stay_finite_and_not_negative(sigma, footprint):
     fabric = woven("silk_charmeuse", roughness=0.01)
-    options = TruthOptions(estimator="quadrature", footprint=footprint, max_count=512)
+    options = answering("quadrature", footprint=footprint, max_count=512)
     for theta in (0.0, 89.9):
         queries = equal_queries(direction(theta, 13), direction(60.0, 200), sigma, rows=2, centre=(1e6 + 0.3, -1e6))
         answers = estimate(fabric, queries, options, 1)

@@ -47,10 +47,12 @@ def test_exchanged_colours_add_up_to_both():
 
 @pytest.mark.parametrize(("minor", "angle"), [(0.7, 0.0), (0.25, 0.6)])
 def test_diffuse_colours_are_those_of_an_integral_on_a_lattice(minor, angle):
-    """Viewer and light straight above, no shadows: a diffuse share is w_d n_z + 1 - w_d on the area in the plane."""
+    """Viewer and light straight above, where nothing hides anything.
+
+    A diffuse share is w_d n_z + 1 - w_d on the area in the plane."""
     fabric = coloured("gauze", ends=[["red", 3], ["blue", 2]], picks=[["blue", 1], ["red", 1]])
     asked = queries([0.4, 2.9], [1.3, 0.2], 0.7, (0.0, 0.0, 1.0), minor=minor, angle=angle)
-    options = TruthOptions(relative_error=0.001, max_count=2**18, shadows=False)
+    options = TruthOptions(relative_error=0.001, max_count=2**18)
     found = component_colours(fabric, asked, options, 1)
     step = (np.arange(900) + 0.5) / 900 * 9.0 - 4.5
     for row in range(2):
