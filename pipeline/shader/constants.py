@@ -117,7 +117,6 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     },
     visibility: {"NARROWINGS": "_NARROWINGS", "STRIP_POINTS": "_STRIP_POINTS"},
     line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING"},
-    query: {"RAISED": "_RAISED"},
     mixture: {"LITTLE": "_LITTLE", "WIDEST": "_WIDEST"},
 }  # fmt: skip
 

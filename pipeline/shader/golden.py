@@ -43,18 +43,19 @@ _TRIALS = 4
 _DIGITS_OF_LINES = 32  # what is seen on a view line is found by steps: it loses digits in single precision
 _LEAST_RISE = 0.05  # of light and viewer
 _LEAST_CURVATURE = 0.01
-# Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow, wide,
-# wider than the repeat; thin ellipses, long and short, and thick ones; such as are shortened.
+# Deviations of the longer axis, and ratios of the axes, of one kind of footprint after another: points, narrow and
+# wide; thin ellipses, long and short, and thick ones; wider than the repeat, and so long that they are shortened.
 _FOOTPRINTS = (
     ((0.01, 0.1), (1.0, 1.0)),
     ((0.1, 0.25), (1.0, 1.0)),
     ((0.25, 0.6), (1.0, 1.0)),
-    ((0.6, 8.0), (1.0, 1.0)),
     ((0.1, 0.7), (1.6, 6.0)),
     ((0.75, 2.0), (4.0, 8.0)),
     ((0.4, 3.0), (1.1, 2.5)),
+    ((0.6, 8.0), (1.0, 1.0)),
     ((60.0, 1000.0), (200.0, 1000.0)),
 )
+_ON_FIXED_NODES = _FOOTPRINTS[-2:]  # nodes that others place where low rays meet yarns have lost most of their digits
 
 
 class Group(NamedTuple):
@@ -203,7 +204,8 @@ def lobes_of(sides: Sides, looks: Queries) -> Lobes:
 def _candidates(repeat: tuple[int, int], group: Group, rng: np.random.Generator) -> Queries:
     """Return twice as many queries as a group has, footprints of every kind by turns, anywhere in the repeat."""
     count = 2 * group.rows
-    kinds = np.array(_FOOTPRINTS)[np.arange(count) % len(_FOOTPRINTS)]
+    footprints = np.array(_FOOTPRINTS if group.rise[0] >= _LEAST_RISE else _ON_FIXED_NODES)
+    kinds = footprints[np.arange(count) % len(footprints)]
     drawn = np.exp(np.log(kinds[:, :, 0]) + rng.random((count, 2)) * np.log(kinds[:, :, 1] / kinds[:, :, 0]))
     sigma, ratio = drawn[:, 0], drawn[:, 1]
     place = rng.random((count, 2)) * repeat
@@ -230,11 +232,14 @@ def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits:
     answer = read(queries)
     span = np.maximum(np.ptp(answer, axis=0), np.float32(1e-30))
     change = np.zeros(len(answer))
+    # Places are kept from the corner of a cell: a small one has no more digits there than 1, a large one no fewer.
+    place = digits * np.spacing(np.float32(1.0))
     for _ in range(_TRIALS):
         moved = queries._replace(
-            # Sums have places in yarn spacings: a small one keeps no more digits there than 1 does.
-            u=_next(queries.u, rng, digits, 1.0), v=_next(queries.v, rng, digits, 1.0),
-            sigma=_next(queries.sigma, rng, digits), sigma_minor=_next(queries.sigma_minor, rng, digits),
+            u=_moved(queries.u, rng, np.maximum(place, np.spacing(queries.u))),
+            v=_moved(queries.v, rng, np.maximum(place, np.spacing(queries.v))),
+            sigma=_moved(queries.sigma, rng, digits * np.spacing(queries.sigma)),
+            sigma_minor=_moved(queries.sigma_minor, rng, digits * np.spacing(queries.sigma_minor)),
         )  # fmt: skip
         change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
@@ -246,7 +251,6 @@ def turning(queries: Queries, depth: float) -> Mask:
     return np.asarray(square[:, 2] < 2.0 * queries.curvature * (square[:, 0] + square[:, 1]) * depth)
 
 
-def _next(values: Float32, rng: np.random.Generator, digits: int, least: float = 0.0) -> Float32:
-    """Return numbers so many last digits above or below, at random; digits are those of `least` at least."""
-    step = digits * np.spacing(np.maximum(np.abs(values), np.float32(least)))
+def _moved(values: Float32, rng: np.random.Generator, step: Float32) -> Float32:
+    """Return numbers a step above or below, at random."""
     return values + np.where(rng.random(len(values)) < 0.5, -step, step)

@@ -59,11 +59,6 @@ VIEWS: Final = {
 TILES: Final = ("map_material",)
 """Methods that the page has as pictures at its views, beside the truth."""
 
-FLAT: Final = "flat"
-"""The truth with footprints of the fabric plane, a tile of the view FLAT_VIEW alone."""
-
-FLAT_VIEW: Final = "One yarn"
-
 STILL: Final = "Drape"
 """View of the still picture, for a browser without WebGL 2."""
 
@@ -83,6 +78,7 @@ TWISTED: Final = 30.0
 """Twist of the nodes of yarns without twist, in degrees: the page turns all nodes to the twist that it shows, and finds
 their extent across the yarn from how their fibres turn, which they do not without twist."""
 
+_FLAT, _FLAT_VIEW = "flat", "One yarn"  # tile of the truth with footprints of the fabric plane, and its view
 _PRECISION = TruthOptions(relative_error=0.01)
 _OF_PLANE = TruthOptions(relative_error=0.01, parallax=False)
 _BRIGHT = 0.8  # linear value that few pixels of the still picture exceed
@@ -164,7 +160,7 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
         "tables": of_shapes,
         "selvage": _selvage(fabric, of_shapes),
         "grids": grids,
-        "tiles": [*methods, FLAT, TRUTH] if truth else [],
+        "tiles": [*methods, _FLAT, TRUTH] if truth else [],
         "views": [_view(fabric, name, camera, truth, methods) for name, camera in VIEWS.items()],
         "shapes": {
             "spread": VIEW_SPREAD,
@@ -280,8 +276,8 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
         deviation = np.sqrt(np.square(answers.standard_error.astype(np.float64)) @ np.square(shown))
         tiles = {key: method.predict(fabric, picture.queries) for key, method in methods.items()}
         tiles[TRUTH] = answers.mean
-        if name == FLAT_VIEW:
-            tiles[FLAT] = estimate(fabric, picture.queries, _OF_PLANE, 0).mean
+        if name == _FLAT_VIEW:
+            tiles[_FLAT] = estimate(fabric, picture.queries, _OF_PLANE, 0).mean
         view["tiles"] = {key: packed(_components(picture, tile).astype(np.float16)) for key, tile in tiles.items()}
         view["standard_error"] = float(np.sqrt(np.square(deviation).mean()) / (answers.mean @ shown).mean())
     return view
