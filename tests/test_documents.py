@@ -143,7 +143,7 @@ def test_models_are_listed_with_what_they_know():
     for names, *cells, rays in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|" + 4 * r" (.+?) \|" + "$", text, re.M):
         kinds = {kind for kind, cell in zip(("behind", "stretch", "curvature"), cells, strict=True) if cell == "yes"}
         known |= dict.fromkeys(re.findall(r"`(\w+)`", names), kinds)
-        of_rays |= dict.fromkeys(re.findall(r"`(\w+)`", names), (rays.startswith("learnt"), rays.startswith("with")))
+        of_rays |= dict.fromkeys(re.findall(r"`(\w+)`", names), (rays.startswith("learnt"), rays.startswith("yes")))
     fields = {name: options.model_fields for name, options in CLASSES.items()}
     assert of_rays == {name: (CLASSES[name].any_physics, "parallax" in fields[name]) for name in CLASSES}
     assert known == {name: set(options().kinds) for name, options in CLASSES.items()}

@@ -450,7 +450,7 @@ def footprints() -> list[Finding]:
 def _queries(fabric: Fabric) -> tuple[Queries, Queries, Columns]:
     """Return queries near the origin, the same a million yarns away, and their numbers by name."""
     repeat = np.array(fabric.weave.repeat)
-    angles = [(0.0, 0.0), (60.0, 30.0), (89.9, 20.0), (20.0, 89.9), (120.0, 45.0), (45.0, 120.0)]
+    angles = [(0.0, 0.0), (60.0, 30.0), (89.9, 20.0), (20.0, 88.9), (120.0, 45.0), (45.0, 120.0)]
     size, light, viewer, turn = np.array(
         [(s * repeat.max(), *pair, t) for s in (1e-4, 1e-2, 1.0, 1e2, 1e4) for pair in angles for t in (40.0, 180.0)]
     ).T

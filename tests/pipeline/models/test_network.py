@@ -38,7 +38,8 @@ def test_restored_weights_answer_alike_also_at_extremes(model):
     assert found.shape == (108, 4) and found.dtype == np.float32
     assert np.isfinite(found).all() and (found >= 0).all()
     by_centre = found.reshape(3, 9, 4, 4)
-    np.testing.assert_array_equal(by_centre[:, :, 0::2], by_centre[:, :, 1::2])
+    # Some processors sum a row's products in another order by its place in the batch: a few roundings.
+    np.testing.assert_allclose(by_centre[:, :, 0::2], by_centre[:, :, 1::2], rtol=1e-5, atol=1e-7)
     assert np.ptp(by_centre[0], axis=1).max() > 0
     np.testing.assert_allclose(by_centre[2], by_centre[2][:, :1].repeat(4, 1), rtol=1e-4, atol=1e-6)
     alone = (Selvage if model == "selvage" else NetworkMethod)(network)
