@@ -76,7 +76,7 @@ def truth_answerer(fabric: Fabric, options: TruthOptions, seed: int) -> Answerer
                 met.add(key)
                 # A wide footprint and a narrow one, for they may use different tables; seen from straight above or
                 # beneath, where every table knows it.
-                wi, wo = (np.float32([[0, 0, np.sign(w[row, 2])]] * 2) for w in (queries.wi, queries.wo))
+                wi, wo = (np.array([[0.0, 0.0, np.sign(w[row, 2])]] * 2, np.float32) for w in (queries.wi, queries.wo))
                 centre, widths = np.zeros(2, np.float32), np.array([1.0, 0.12], np.float32)
                 estimate(fabric, Queries.round(centre, centre, widths, wi, wo), options, seed, 0)
 
