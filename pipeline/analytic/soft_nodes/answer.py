@@ -35,6 +35,7 @@ LONGEST: Final = 48.0
 same, up to stripes of yarns almost along them, and would touch thousands of cells."""
 
 _0 = np.float32(0.0)
+_TINY = 1e-12  # keeps a quotient finite
 
 
 def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32]:
@@ -81,7 +82,7 @@ def shortened(
     """Return a footprint no longer than `LONGEST` along its own longer axis, as wide as before across."""
     xx, yy, across = np.float64(deviation_x) ** 2, np.float64(deviation_y) ** 2, np.float64(narrowest) ** 2
     along = xx + yy - across
-    share = min((max(LONGEST * LONGEST, across) - across) / (along - across), 1.0)
+    share = min((max(LONGEST * LONGEST, across) - across) / max(along - across, _TINY), 1.0)
     x, y = math.sqrt(across + share * max(xx - across, 0.0)), math.sqrt(across + share * max(yy - across, 0.0))
     return np.float32(x), np.float32(y), np.float32(share * correlation * deviation_x * deviation_y / (x * y))
 

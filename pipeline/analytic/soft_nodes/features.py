@@ -49,6 +49,7 @@ from pipeline.analytic.soft_nodes.shade import (
 )
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel
+from pipeline.truth.footprint.mixture import footprints
 from pipeline.truth.geometry.heightfield import ALPHA, BEND, BETA, RADIUS, SIN_TWIST
 from pipeline.truth.query import Queries
 
@@ -162,7 +163,9 @@ def cloth_features(table: SoftNodeTable) -> Float32:
 def read_queries(table: SoftNodeTable, queries: Queries) -> Reading:
     """Read N queries, light and viewer in front; cloth is curved only if the table knows it."""
     found, gaps = query_sums(table, queries)
-    size = np.sqrt(np.maximum(queries.sigma, SMALLEST) * np.maximum(queries.sigma_minor, SMALLEST))
+    # Of the footprint that kernels see, whose correlation has a limit.
+    *_, x, y, correlation = footprints(queries, SMALLEST)
+    size = np.sqrt(x * y * np.sqrt((_1 - correlation) * (_1 + correlation)))
     wi, wo = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo))
     reading = Reading(*(np.empty((len(wi), width), np.float32) for width in (FEATURES, 4, 4)))
     twists = np.arcsin(np.clip(table.yarn[:, SIN_TWIST], -1.0, 1.0))
