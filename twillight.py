@@ -93,7 +93,7 @@ def evaluate(fabric: Fabric, queries: Queries, *, seed: int = 0, **options: Any)
         Seed of the random numbers, 0 <= seed < 2^64; the same seed gives the same numbers.
     **options
         Options of the truth that are not to have their defaults, such as ``relative_error=0.005`` or
-        ``estimator="quadrature"``; all are in `pipeline.truth.options.TruthOptions`.
+        ``estimator="owen"``; all are in `pipeline.truth.options.TruthOptions`.
 
     Returns
     -------

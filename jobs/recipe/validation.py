@@ -19,7 +19,6 @@ from pipeline.truth.options import (
     RAYS_RESOLVED,
     TABLE_CELLS,
     TABLE_SIGMA,
-    USUAL_WALLS,
     TruthOptions,
     seen_distance,
     steepness,
@@ -35,7 +34,8 @@ MOST_SHARDS: Final = 250_000
 """Most shards of a data set, each a task: 2 * 10^9 rows by default. The manifest then has 60 MB."""
 
 _PLAIN = TruthOptions()
-_LEARNT = ("frame", "normaliser", "parallax", "shadows", "walls")  # physics that not every model can learn
+# Physics that not every model can learn. A model without an option for walls is measured against any.
+_LEARNT = ("frame", "normaliser", "parallax", "shadows")
 
 
 def validate_recipe(recipe: Recipe, where: str) -> None:
@@ -193,14 +193,17 @@ def _check_models(recipe: Recipe, where: str) -> None:
     drawn = [kind for kind, there in kinds.items() if there]
     if recipe.bench.bounds and kinds["curvature"]:
         raise BadInput(where, "bench.bounds", True, "the bound does not know queries with curvature")
+    if recipe.bench.bounds and not truth.parallax:
+        raise BadInput(
+            where, "bench.bounds", True, "the bound knows view rays alone, not dataset.truth.parallax = false"
+        )
     for index, model in enumerate(recipe.models):
         options = model.options
         for kind in (kind for kind in drawn if kind not in options.kinds):
             allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
             raise BadInput(where, f"models.{index}.name", options.name, allowed)
         for name in () if options.any_physics else (name for name in _LEARNT if not hasattr(options, name)):
-            own = USUAL_WALLS[truth.parallax] if name == "walls" else getattr(_PLAIN, name)
-            if (value := getattr(truth, name)) != own:
+            if (value := getattr(truth, name)) != (own := getattr(_PLAIN, name)):
                 allowed = f"{options.name} (models.{index}) knows {name} = {own!r} only"
                 raise BadInput(where, f"dataset.truth.{name}", value, allowed)
         for name in ("footprint", "parallax", "walls"):

@@ -29,7 +29,7 @@ WHERE = "evaluate"
 class TruthFlags:
     """Options of the truth on the command line; None: the default of `pipeline.truth.options.TruthOptions`."""
 
-    estimator: Annotated[str | None, Parameter(help="Estimator of the truth: auto, quadrature, owen, mc, …")] = None
+    estimator: Annotated[str | None, Parameter(help="Estimator of the truth: auto, owen, r2, mc, …")] = None
     relative_error: Annotated[float | None, Parameter(help="Relative error at which an estimate stops.")] = None
     absolute_error: Annotated[float | None, Parameter(help="Absolute error at which it stops, in 1/sr.")] = None
     max_count: Annotated[int | None, Parameter(help="Most points of a row, a power of 2.")] = None

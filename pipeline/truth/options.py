@@ -93,7 +93,7 @@ class TruthOptions(Frozen):
     parallax: bool = True
     """True if a footprint is a patch of view rays: its density belongs to the points where they cross the reference
     plane (`pipeline.truth.geometry.pieces`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
-    which heights displace nothing [Chen2024Woven]. `quadrature` knows it with walls left out."""
+    which heights displace nothing [Chen2024Woven]. `quadrature` knows it for Gaussians with walls left out."""
     walls: Walls = "rim"
     """Meaning of a view ray that meets the step between two floats: it sees the rim of the yarn above, so that the mean
     over all places does not depend on the footprint, or it does not count. Without parallax it is `left_out`."""
@@ -133,7 +133,7 @@ class TruthOptions(Frozen):
     @model_validator(mode="after")
     def _rays_have_one_model(self) -> TruthOptions:
         if self.parallax and (self.frame == "macro" or not self.shadows):
-            raise ValueError("parallax needs frame 'ply' and shadows: a view ray ends at the first point that it meets")
+            raise ValueError("parallax needs frame 'ply' and shadows; say parallax = false for others")
         if self.parallax and self.estimator == "quadrature":
             known = self.walls == "left_out", self.footprint == "gaussian", self.normaliser == "visible"
             if not all(known):

@@ -63,7 +63,7 @@ CLASSES: Final = {
     "curved": (_OPEN, QueryOptions(sigma=_SIGMA, curvature=(0.001, 0.3)), TruthOptions()),
     "light behind": (_OPEN, QueryOptions(sigma=_SIGMA, behind=1.0), TruthOptions()),
     "rotated footprints": (_OPEN, QueryOptions(sigma=_SIGMA, stretch=16.0), TruthOptions()),
-    "walls left out": (_OPEN, QueryOptions(sigma=_SIGMA, stretch=16.0), _LEFT_OUT),
+    "walls left out": (_OPEN, QueryOptions(sigma=_SIGMA, behind=0.3, stretch=16.0), _LEFT_OUT),
     "fabric plane": (_OPEN, QueryOptions(sigma=_SIGMA, behind=0.3, stretch=16.0), _PLANE),
     "fabric plane, curved": (_OPEN, QueryOptions(sigma=_SIGMA, curvature=(0.001, 0.3)), _PLANE),
 }

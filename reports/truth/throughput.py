@@ -126,7 +126,7 @@ def _points() -> Iterator[Rate]:
     yield _rate(
         lambda: estimate(fabric, few, exact, _SEED),
         lambda answers: answers.count.sum(),
-        "points, sampled with exact visibility",
+        "points, by traced view rays",
         fabric.name,
         "points/s",
         "float64",

@@ -34,7 +34,6 @@ from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import LOWEST_VIEWER, Answers, Queries
 from reports.images.texture import png_bytes
 from reports.options import LEAST_TILE, MOST_TILE
 from reports.viewer.generate import SHADERS, network, shipped
@@ -271,7 +270,7 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
     if size:
         ends = fabric.weave.repeat[0]
         picture = seen(camera, size, ends)
-        answers = _truth(fabric, picture.queries)
+        answers = estimate(fabric, picture.queries.raised(), _PRECISION, 0)
         shown = colours(fabric)
         deviation = np.sqrt(np.square(answers.standard_error.astype(np.float64)) @ np.square(shown))
         tiles = {key: method.predict(fabric, picture.queries) for key, method in methods.items()}
@@ -281,15 +280,6 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
         view["tiles"] = {key: packed(_components(picture, tile).astype(np.float16)) for key, tile in tiles.items()}
         view["standard_error"] = float(np.sqrt(np.square(deviation).mean()) / (answers.mean @ shown).mean())
     return view
-
-
-def _truth(fabric: Fabric, queries: Queries) -> Answers:
-    """Return what a camera sees; footprints of the fabric plane where the viewer is too low for view rays."""
-    low = queries.wo[:, 2] < LOWEST_VIEWER
-    rays = estimate(fabric, queries.take(~low), _PRECISION, 0)
-    answers = estimate(fabric, queries.take(low), _OF_PLANE, 0)
-    place = np.argsort(np.concatenate([np.flatnonzero(~low), np.flatnonzero(low)]))
-    return Answers(*(np.concatenate(columns)[place] for columns in zip(rays, answers, strict=True)))
 
 
 def _components(picture: Seen, values: npt.NDArray[np.floating]) -> Float64:

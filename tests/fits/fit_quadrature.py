@@ -44,7 +44,7 @@ def fit_highlight() -> None:
             yarns = {key: getattr(fabric, key).model_copy(update={"roughness": alpha}) for key in ("warp", "weft")}
             fabric = fabric.model_copy(update=yarns)
             queries = draw_queries(QueryOptions(sigma=(20.0, 40.0), max_angle=45.0), fabric.weave.repeat, 19, 0, 40)
-            cloth, columns = cloth_side(fabric, TruthOptions(shadows=False)), columns_of(queries)
+            cloth, columns = cloth_side(fabric, TruthOptions(parallax=False, shadows=False)), columns_of(queries)
             # Kinks would hide the rate, so lines are cut from level 1 on.
             *rules, exact = (by_rules(cloth, columns, 1, level)[:, :2] for level in (1, 2, 3, 5))
             for level, specular in enumerate(rules, 1):
@@ -64,7 +64,7 @@ def fit_safety(rows: int) -> None:
     for name in ("polyester_lining", "satin_8", "gauze"):
         fabric = load_fabric(name)
         columns = columns_of(draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, 18, 0, rows))
-        cloth = cloth_side(fabric, TruthOptions())
+        cloth = cloth_side(fabric, TruthOptions(walls="left_out"))
         exact = by_rules(cloth, columns, 2, 5)
         for tolerance in (0.02, 0.003):
             options = TruthOptions(relative_error=tolerance, absolute_error=0.0, max_count=1 << 14)

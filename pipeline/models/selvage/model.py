@@ -11,7 +11,7 @@ Within a wished error (`Adaptive`) each query gets the cheapest of three answers
 
     1  soft nodes corrected by the network        estimated by the network
     2  the finest soft nodes                      estimated by the network
-    3  the fallback, sums over a node table       not estimated: the answer of what is left, with rims
+    3  the fallback, a node table or samples      not estimated: the answer of what is left, with rims
 
 Errors are root mean squares over many queries, relative to a grey cloth's colour: single errors may be larger. Light
 from behind has no estimate; the finest soft nodes answer it, and all that the network is not trained for.

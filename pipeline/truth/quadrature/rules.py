@@ -153,7 +153,7 @@ def _cut(axis: Axis, lean: Lean, low: float, high: float, pieces: Float64) -> in
             stop = high if everywhere else min(high, middle + after)
             # On a round yarn a ray's place changes by up to sqrt(1 + slope^2) times the arc.
             number = math.ceil((stop - start) * math.sqrt(1.0 + lean.slope**2) / (_RESOLVED * axis.sigma))
-            number = min(number, CUTS - count)
+            number = min(number, CUTS // max(1, int(last - first) + 1))
             for k in range(number):
                 pieces[count, 0] = start + (stop - start) * k / number
                 pieces[count, 1] = start + (stop - start) * (k + 1) / number
