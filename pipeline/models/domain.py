@@ -23,7 +23,7 @@ from pydantic import field_validator
 
 from pipeline.models.method import faults, refuse_other
 from pipeline.shards.queries import QueryOptions
-from pipeline.truth.options import USUAL_WALLS, TruthOptions
+from pipeline.truth.options import WALLS_OF_PLANE, TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -56,7 +56,7 @@ class Domain(Frozen):
     @classmethod
     def _of_the_plane(cls, physics: dict[str, Any]) -> dict[str, Any]:
         """Complete the card of an earlier version, which knows the fabric plane alone and says nothing of it."""
-        return {"parallax": False, "walls": USUAL_WALLS[False]} | physics
+        return {"parallax": False, "walls": WALLS_OF_PLANE} | physics
 
     @classmethod
     def of(cls, about: Mapping[str, Any], fabrics: Sequence[Fabric]) -> Domain:

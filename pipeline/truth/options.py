@@ -26,8 +26,8 @@ TABLE_SIGMA: Final = 1.25 / 32
 FEWEST_NODES: Final = 24
 """Nodes on a yarn spacing of the truth's fine table, at least."""
 
-USUAL_WALLS: Final[dict[bool, Walls]] = {True: "rim", False: "left_out"}
-"""The meaning of `walls` unless it is given, with and without parallax."""
+WALLS_OF_PLANE: Final[Walls] = "left_out"
+"""The meaning of `walls` without parallax."""
 
 RAYS_RESOLVED: Final[dict[Walls, float]] = {"left_out": 0.7, "rim": 2.5}
 """Smallest standard deviation of a footprint of view rays that `node_table` resolves, over `seen_distance`."""
@@ -41,7 +41,7 @@ that it states, because rays go on below the gaps."""
 def with_usual_walls(options: Any) -> Any:
     """Return options in which `walls` is that of the fabric plane if they have no parallax and do not say."""
     if isinstance(options, dict) and options.get("parallax") is False and "walls" not in options:
-        return options | {"walls": USUAL_WALLS[False]}
+        return options | {"walls": WALLS_OF_PLANE}
     return options
 
 

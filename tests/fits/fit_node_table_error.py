@@ -78,11 +78,11 @@ def main(fabrics: int = 10, queries: int = 500, points: int = 32768) -> None:
     """Print both constants as fitted and in use."""
     population = Population(count=fabrics, seed=77, plain=WILD, twill=WILD, satin=WILD)
     many = {"min_count": points, "max_count": points}
-    converged = TruthOptions(estimator="owen", relative_error=1e-9, absolute_error=0.0, **many)
+    converged = TruthOptions(estimator="owen", parallax=False, relative_error=1e-9, absolute_error=0.0, **many)
     columns = []
     for fabric in population_fabrics(population):
         drawn = draw_queries(QueryOptions(sigma=(0.1, 50.0)), fabric.weave.repeat, 78, 0, queries)
-        answers = estimate(fabric, drawn, TruthOptions(estimator="node_table"), 1)
+        answers = estimate(fabric, drawn, TruthOptions(estimator="node_table", parallax=False), 1)
         exact = estimate(fabric, drawn, converged, 2)
         mean, error = answers.mean.astype(np.float64), answers.standard_error.astype(np.float64)
         wrong, reference = (np.linalg.norm(v, axis=1) for v in (mean - exact.mean, exact.standard_error))
