@@ -1,6 +1,7 @@
 """What all tests share: one cache of compiled kernels, the lane of programs that are started, the order."""
 
 import os
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,18 @@ so that no core waits for one at the end."""
 
 QUICK = "not slow and not faults and not external"
 """The lane of `make test`, whose number of tests has a budget."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _few_walks():
+    """Make small tables of light between yarns: the usual ones take seconds. Tests of their accuracy make their own."""
+    from pipeline.analytic.bounces.table import bounce_table
+    from pipeline.scenes import bounces
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
+            patch.setattr(bounces, name, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
+        yield
 
 
 def pytest_itemcollected(item):

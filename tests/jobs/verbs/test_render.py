@@ -10,9 +10,7 @@ import pytest
 import jobs.verbs.render
 import jobs.verbs.show
 from jobs.cli import main
-from pipeline.analytic.bounces.table import bounce_table
 from pipeline.models.named import named_method
-from pipeline.scenes import bounces
 from pipeline.scenes.options import SceneOptions
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.options import TruthOptions
@@ -115,9 +113,8 @@ def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
     assert changed[(number == 1) | (number == 2)].mean() > 0.9 and not changed[(number == 0) | (number > 2)].any()
 
 
-def test_all_bounces_make_white_cloth_brighter(render, tmp_path, monkeypatch):
+def test_all_bounces_make_white_cloth_brighter(render, tmp_path):
     """Silk of albedo .85 lacks a sixth of its light with one bounce; the file says which it has."""
-    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
     (tmp_path / "white.toml").write_text(woven("silk_charmeuse", specular=(0.0,) * 3, diffuse=(0.85,) * 3).to_toml())
     light = {}
     for number in ("1", "all"):

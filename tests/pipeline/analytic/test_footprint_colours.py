@@ -55,7 +55,7 @@ def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, 
     """RMSE of the colour over its mean square, against the exact shares, which err by less than a quarter of the bound.
     Components are those of the truth in both."""
     fabric = coloured(name, **STRIPES)
-    asked = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=75.0), fabric.repeat, 3, 0, 64)
+    asked = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=75.0), fabric.repeat, 3, 0, 24)
     components = estimate(fabric, asked, TruthOptions(estimator="owen", max_count=1024), 1).mean
     exact = component_colours(fabric, asked, TruthOptions(relative_error=0.006, max_count=1 << 13), 2)
     colours = exact.mean, footprint_colours(fabric, asked)

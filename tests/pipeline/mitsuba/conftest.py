@@ -1,14 +1,10 @@
 """Variants of Mitsuba, of which the scalar one works everywhere and the other one needs LLVM; worn cloth."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
-from pipeline.analytic.bounces.table import bounce_table
 from pipeline.mitsuba.register import register
 from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
-from pipeline.scenes import bounces
 from pipeline.scenes.variant import llvm_works, mitsuba
 
 NEEDS_LLVM = pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
@@ -42,13 +38,6 @@ def hits_of(viewer, count=1, uv=UV, **other):
 
 def worn_of(fabric, sigma=0.3, **other):
     return Worn(ClothOptions(fabric=fabric, sigma=sigma, **other))
-
-
-@pytest.fixture
-def few_walks(monkeypatch):
-    """Make small tables of light between yarns."""
-    for name, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
-        monkeypatch.setattr(bounces, name, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
 
 
 @pytest.fixture

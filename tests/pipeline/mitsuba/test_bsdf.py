@@ -44,7 +44,7 @@ def test_values_and_densities_are_those_of_the_cloth(mi, name):
         np.testing.assert_array_equal(number(bsdf.pdf(context, si, light)), number(pdf))
 
 
-def test_all_bounces_are_added_to_the_values_and_leave_the_density(mi, few_walks):
+def test_all_bounces_are_added_to_the_values_and_leave_the_density(mi):
     """Light of the table, in front; the cosines of the mixture draw where it shines already."""
     fabric, sigma, theta, phi = CONFIGURATIONS["front"]
     properties = {"type": "twillight", "fabric": fabric, "sigma": sigma}
@@ -123,7 +123,7 @@ def test_bad_properties_end_in_one_sentence(scalar, plugin, properties, words):
     ("names", "cells", "nodes", "samples"),
     [(("front", "gauze", "behind"), 11, 24, 20_000), slow(tuple(CONFIGURATIONS), 21, 32, 500_000)],
 )
-def test_mitsubas_chi_square_test(llvm, few_walks, names, cells, nodes, samples):
+def test_mitsubas_chi_square_test(llvm, names, cells, nodes, samples):
     """LEVEL for all configurations together, by Sidak; few cells make the quadrature of densities exact enough. Light
     straight through is a delta lobe and left out. Mitsuba's adapter drops samples without weight. Here they count: the
     density does not know which light is in shadow."""

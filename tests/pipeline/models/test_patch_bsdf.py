@@ -1,14 +1,12 @@
 import math
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.bounces.table import bounce_table
 from pipeline.models.named import named_method
 from pipeline.models.patch_bsdf import PatchBSDF
-from pipeline.scenes import bounces
 from pipeline.scenes.shade import shade
 from pipeline.truth.query import Queries
 from tests.directions import sphere, unit
@@ -105,10 +103,8 @@ def test_weights_have_the_integral_of_eval_as_their_mean():
 
 
 @pytest.mark.parametrize("name", ["front", slow("voile"), slow("grazing"), slow("behind")])
-def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name, monkeypatch):
+def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name):
     """A z-test at LEVEL of light that is no longer in the lobes' shares, against even directions."""
-    for table, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
-        monkeypatch.setattr(bounces, table, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
     count, wi = 20_000, sphere(80, 160)
     one, every = (PatchBSDF(load_fabric(CONFIGURATIONS[name][0]), bounces=number) for number in (1, "all"))
     queries, looks = looks_of(name, len(wi), wi), looks_of(name, count)
@@ -200,9 +196,8 @@ def test_bad_settings_are_refused():
         bsdf.pdf(looks_of("front", 3), bsdf.lobes(looks_of("front", 2)))
 
 
-def test_all_bounces_are_those_of_the_cloth(monkeypatch):
+def test_all_bounces_are_those_of_the_cloth():
     """What a method answers changes nothing of them; another number of bounces is refused."""
-    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
     denim, up = load_fabric("denim"), np.float32([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
     queries = Queries.round(np.array([0.3, 0.7]), np.array([0.2, 0.9]), np.array([0.1, 3.0]), up[::-1], up)
     one, every = (PatchBSDF(denim, "prefiltered", bounces=number) for number in (1, "all"))

@@ -4,7 +4,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.analytic.bounces.table import bounce_table
 from pipeline.scenes import bounces
 from pipeline.scenes import picture as pictures
 from pipeline.scenes.frame import render
@@ -159,13 +158,7 @@ def test_samples_soften_silhouettes(table):
     assert nine.mean() == pytest.approx(one.mean(), rel=0.03)
 
 
-@pytest.fixture
-def few_walks(monkeypatch):
-    """Make small tables of light between yarns."""
-    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
-
-
-def test_all_bounces_add_the_light_of_the_table_to_what_faces_the_lamp(table, few_walks):
+def test_all_bounces_add_the_light_of_the_table_to_what_faces_the_lamp(table):
     """The layers of the diffuse light, each by its family; gaps, highlights and what is no cloth stay as they were."""
     once = replace(table, options=OPTIONS.model_copy(update={"bounces": 1}))
     one, more = (whole(loaded, layers=True)[0] for loaded in (once, table))

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.analytic.bounces.table import bounce_table
 from pipeline.models.fallback import Fallback
 from pipeline.scenes import bounces
 from pipeline.scenes.options import SceneOptions
@@ -119,9 +118,8 @@ def test_silhouettes_have_the_truths_light_and_an_error_of_their_own(tmp_path):
     assert errors[0] < 0.1 and errors[1] == pytest.approx(np.sqrt(np.square(1 - cloth.coverage.astype(float)).mean()))
 
 
-def test_all_bounces_are_those_of_the_table_for_the_truth_and_for_methods(monkeypatch, tmp_path):
+def test_all_bounces_are_those_of_the_table_for_the_truth_and_for_methods(tmp_path):
     """Stored once: a frame is that of one bounce and, for the same colours, the same light more."""
-    monkeypatch.setattr(bounces, "_TABLES", bounces.PerFabric(lambda fabric: bounce_table(fabric, 1 << 10)))
     loaded = SCENES.options.model_copy(update={"bounces": "all"})
     small = SCENES.model_copy(update={"size": (16, 12)})
     for name, options in (("one", small), ("all", small.model_copy(update={"options": loaded}))):
