@@ -18,7 +18,7 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from weaves.errors import BadInput
 from weaves.validation import Frozen
 
-LARGEST_REPEAT = 128
+LARGEST_REPEAT = 256
 """Most ends, and most picks, of a repeat."""
 
 Bools = npt.NDArray[np.bool_]

@@ -14,7 +14,7 @@ from jobs.terminal import Terminal, print_lines
 from jobs.verbs.parameters import NOTHING, FabricName, Local, given
 from pipeline.atomic import atomic_write
 from reports.exports.export import export
-from weaves.draft_files.read import read_draft
+from weaves.draft_files.read import DraftThreads, cut_out, read_draft
 from weaves.draft_files.to_fabric import fabric_of
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -36,6 +36,8 @@ def import_draft(
     out: Annotated[Local, Parameter(help="Fabric file to write, ending in .toml.")],
     like: Annotated[str, Parameter(help="Fabric whose yarns give what a draft does not state.")] = "cotton_twill",
     name: Annotated[str | None, Parameter(help="Name of the fabric; default: that of the draft file.")] = None,
+    ends: Annotated[str, Parameter(help="Part of the draft, first and last end, such as 1-96; default: all.")] = "",
+    picks: Annotated[str, Parameter(help="Part of the draft, first and last pick; default: all.")] = "",
     warp: Annotated[YarnFlags, Parameter(name="--warp")] = YarnFlags(),
     weft: Annotated[YarnFlags, Parameter(name="--weft")] = YarnFlags(),
 ) -> None:
@@ -47,6 +49,7 @@ def import_draft(
         raise BadInput("import", "--out", str(out), "a path that ends in .toml is needed")
     # First: reading the colours of a fabric loads much, which a damaged draft need not wait for.
     file = read_draft(draft)
+    file = cut_out(file, _part(ends, "--ends", file.ends), _part(picks, "--picks", file.picks))
     yarns = load_fabric(like)
     own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", draft.stem).strip("_")[:60] or "draft"
     drafted = fabric_of(file, yarns, own, str(draft), {"warp": given(warp), "weft": given(weft)})
@@ -55,6 +58,16 @@ def import_draft(
     print_lines(f"{out}: fabric {own} from the draft {file.title!r}{program}")
     for heading, sentences in (("Read:", drafted.read), ("Assumed:", drafted.assumed)):
         print_lines(heading, *(f"- {sentence}" for sentence in sentences))
+
+
+def _part(text: str, flag: str, threads: DraftThreads) -> tuple[int, int] | None:
+    """Return the first and the last thread of a part, from the command line."""
+    if not text:
+        return None
+    sides, most = re.fullmatch(r"([0-9]{1,6})-([0-9]{1,6})", text), len(threads.colours)
+    if not sides or not 1 <= int(sides[1]) <= int(sides[2]) <= most:
+        raise BadInput("import", flag, text, f"FIRST-LAST is needed, from 1-1 to 1-{most}")
+    return int(sides[1]), int(sides[2])
 
 
 def export_fabric(

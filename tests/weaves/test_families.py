@@ -43,9 +43,9 @@ LOOM = {"threading": (1,), "tie_up": ((1, 0),), "treadling": (1,)}
     ("family", "numbers", "key"),
     [
         (Twill, {"over": (3, 1), "under": 1}, "under"),
-        (Twill, {"over": (50, 20), "under": (50, 20)}, "over"),
+        (Twill, {"over": (100, 40), "under": (100, 40)}, "over"),
         (Twill, {"family": "broken_twill", "over": 2, "under": 1}, "over"),
-        (Herringbone, {"over": 64, "under": 2}, "width"),
+        (Herringbone, {"over": 3, "under": 3, "width": 129}, "width"),
         (Satin, {"ends": 6, "move": 3}, "move = 3: .*6 ends allow none; try 5 or 7 ends"),
         (Satin, {"ends": 8, "move": 2}, "8 ends allow 3, 5"),
         (Rib, {"ends": 1, "picks": 1}, "picks"),

@@ -11,7 +11,7 @@ import math
 import warnings
 import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -63,6 +63,16 @@ class DraftFile:
     """Sentences on what could not be used."""
 
 
+def cut_out(draft: DraftFile, ends: tuple[int, int] | None, picks: tuple[int, int] | None) -> DraftFile:
+    """Return a part of a draft: its first and last end, its first and last pick, counted from 1; None: all of them."""
+    parts = []
+    for threads, limits in ((draft.ends, ends), (draft.picks, picks)):
+        first, last = limits or (1, len(threads.colours))
+        parts.append((slice(first - 1, last), replace(threads, colours=threads.colours[first - 1 : last])))
+    (over_ends, own_ends), (over_picks, own_picks) = parts
+    return replace(draft, warp_over=draft.warp_over[over_picks, over_ends], ends=own_ends, picks=own_picks)
+
+
 def read_draft(path: Path) -> DraftFile:
     """Read a draft file.
 
@@ -79,7 +89,7 @@ def read_draft(path: Path) -> DraftFile:
     with warnings.catch_warnings(record=True) as noted:
         warnings.simplefilter("always")
         pattern = reader(content, where)
-    remarks = [one_line(f"{note.message}", 160) for note in noted]
+    remarks = list(dict.fromkeys(one_line(f"{note.message}", 160) for note in noted))
     return _draft_file(pattern, path, remarks)
 
 

@@ -24,6 +24,9 @@ from weaves.validation import validated
 NARROWEST_YARN: Final = 0.05
 """Least width of a yarn, in yarn spacings."""
 
+LONG_REPEAT: Final = 128
+"""Threads of a longer repeat are searched for a shorter one, of which the last is not whole."""
+
 MOST_SOURCE: Final = 2000
 """Most letters of a fabric's `source`."""
 
@@ -98,13 +101,14 @@ def _repeat(over: Bools, where: str, read: list[str], assumed: list[str]) -> Boo
         lines = np.ascontiguousarray(np.moveaxis(over, axis, 0))
         numbers = np.array(numbered([line.tobytes() for line in lines])[0])
         period = smallest_period(numbers)
-        if period > LARGEST_REPEAT:  # a last repeat that is not whole, as at a selvedge
+        if period > LONG_REPEAT:  # a last repeat that is not whole, as at a selvedge
             shifts = range(1, min(LARGEST_REPEAT, len(numbers) // 2) + 1)
             period = next((p for p in shifts if np.array_equal(numbers[p:], numbers[:-p])), period)
             if period > LARGEST_REPEAT:
-                allowed = f"at most {LARGEST_REPEAT} are allowed"
+                allowed = f"at most {LARGEST_REPEAT} are allowed; choose a part by --{threads} 1-{LARGEST_REPEAT}"
                 raise BadInput(where, "", f"{section} repeats after {period} {threads}", allowed)
-            assumed.append(f"The last {len(numbers) % period} {threads} do not fill a repeat and are left out.")
+            if rest := len(numbers) % period:
+                assumed.append(f"The last {rest} {threads} do not fill a repeat and are left out.")
         periods.append(period)
     read.append(f"Structure: {ends} ends and {picks} picks; it repeats after {periods[1]} ends and {periods[0]} picks.")
     return over[: periods[0], : periods[1]]

@@ -46,11 +46,21 @@ def _parts(text: Any) -> Any:
     return [part.strip() for part in text.split(",")] if isinstance(text, str) else text
 
 
-Sets = Annotated[dict[Thread, Annotated[tuple[Count, ...], BeforeValidator(_parts)]], BeforeValidator(_filled)]
-Colours = Annotated[dict[Thread, Thread], BeforeValidator(_filled)]
+def _filled_parts(text: Any) -> Any:
+    """Split at commas and leave out empty items, as in ``2=,1``."""
+    parts = _parts(text)
+    if not isinstance(text, str) or all(parts):
+        return parts
+    warnings.warn("Some entries have empty items, as in 2=,1: they are left out.", stacklevel=1)
+    return [part for part in parts if part]
+
+
+Numbers = Annotated[tuple[Count, ...], BeforeValidator(_filled_parts)]
+Sets = Annotated[dict[Thread, Numbers], BeforeValidator(_filled)]
+Colours = Annotated[dict[Thread, Count], BeforeValidator(_filled)]
 Lengths = Annotated[dict[Thread, Length], BeforeValidator(_filled)]
 Table = Annotated[
-    dict[Annotated[int, Field(ge=1, le=65536)], Annotated[tuple[Level, Level, Level], BeforeValidator(_parts)]],
+    dict[Annotated[int, Field(ge=0, le=65536)], Annotated[tuple[Level, Level, Level], BeforeValidator(_parts)]],
     BeforeValidator(_filled),
 ]
 
@@ -96,7 +106,7 @@ class _Wif(BaseModel):
     color_palette: Annotated[_Palette, Filled] = _Palette()
     color_table: Table = {}
     threading: Sets = {}
-    tieup: Sets = {}
+    tieup: Annotated[dict[Count, Numbers], BeforeValidator(_filled)] = {}
     treadling: Sets = {}
     liftplan: Sets = {}
     warp_colors: Colours = {}
@@ -126,11 +136,17 @@ def wif_pattern(text: str, where: str) -> PatternData:
         key = " ".join([section_name(str(section)), *(str(key) for key in keys[:1])])
         raise BadInput(where, key, first["input"], first["msg"]) from error
     _refuse_missing(wif, where)
+    _count_from_one(wif)
+    _complete_colours(wif, where)
     yarns: dict[str, Any] = {axis: _yarns_of(wif, axis, where) for axis in ("warp", "weft")}
     # The reader takes the number of tied treadles for the last of them.
     wif.weaving.treadles = max([wif.weaving.treadles or 0, *wif.tieup])
-    if not wif.liftplan and (most := max(max(used) for used in wif.treadling.values())) > wif.weaving.treadles:
-        raise BadInput(where, "", f"[TREADLING] uses treadle {most}", f"[TIEUP] ends at {wif.weaving.treadles}")
+    if not wif.liftplan:
+        used = {treadle for treadles in wif.treadling.values() for treadle in treadles if treadle}
+        if untied := sorted(used - {treadle for treadle, shafts in wif.tieup.items() if any(shafts)}):
+            numbers = ", ".join(map(str, untied))
+            warnings.warn(f"[TIEUP] ties nothing to treadle {numbers} of [TREADLING]: it lifts nothing.", stacklevel=1)
+        wif.weaving.treadles = max([wif.weaving.treadles, *used])
     return _pattern(wif, yarns, where)
 
 
@@ -157,7 +173,7 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
         raise BadInput(where, "", "has no section [WIF]", "a draft in the Weaving Information File format is needed")
     if len(kept) > MOST_ENTRIES or sum(map(len, kept)) > MOST_USED:
         raise BadInput(where, "", f"has {len(kept):,} lines", f"at most {MOST_ENTRIES:,} with {MOST_USED:,} letters")
-    parser = ConfigParser(interpolation=None, allow_no_value=True, strict=False)
+    parser = ConfigParser(interpolation=None, allow_no_value=True, strict=False, inline_comment_prefixes=(";",))
     try:
         parser.read_string("\n".join(kept))
     except ParsingError as error:
@@ -177,15 +193,36 @@ def _refuse_missing(wif: _Wif, where: str) -> None:
             if not any(any(numbers) for numbers in sets.values()):
                 needed = "[TIEUP] and [TREADLING], or [LIFTPLAN], are needed"
                 raise BadInput(where, "", f"{name} is missing or empty, and so is [LIFTPLAN]", needed)
+
+
+def _count_from_one(wif: _Wif) -> None:
+    """Count treadles and shafts from 1: some programs count them from 0, where WIF means none."""
+    treadling = {} if wif.liftplan else wif.treadling
+    if not wif.liftplan and 0 in wif.tieup:
+        wif.tieup = {treadle + 1: shafts for treadle, shafts in wif.tieup.items()}
+        wif.treadling = {pick: tuple(t + 1 for t in treadles) for pick, treadles in treadling.items()}
+        warnings.warn("[TIEUP] counts treadles from 0; they are counted from 1 here.", stacklevel=1)
+    lifts = "liftplan" if wif.liftplan else "tieup"
+    if any(0 in shafts for shafts in wif.threading.values()) and any(0 in s for s in getattr(wif, lifts).values()):
+        for name in ("threading", lifts):
+            setattr(wif, name, {key: tuple(s + 1 for s in shafts) for key, shafts in getattr(wif, name).items()})
+        warnings.warn("[THREADING] counts shafts from 0; they are counted from 1 here.", stacklevel=1)
+
+
+def _complete_colours(wif: _Wif, where: str) -> None:
+    """Give colours to a draft without any, and a range to a palette without one; BadInput if they do not agree."""
     if not wif.color_table:
-        raise BadInput(where, "", "[COLOR TABLE] is missing or empty", "the colours of the yarns are needed")
+        wif.color_table, wif.color_palette.range = {1: (32, 32, 32), 2: (255, 255, 255)}, (0, 255)
+        wif.warp_colors, wif.weft_colors, wif.warp.color, wif.weft.color = {}, {}, (1,), (2,)
+        warnings.warn("[COLOR TABLE] is missing or empty: the ends are dark, the picks white.", stacklevel=1)
     if wif.color_palette.range is None:
-        raise BadInput(where, "", "[COLOR PALETTE] Range is missing", "the range of the colours is needed")
+        brightest = max(level for levels in wif.color_table.values() for level in levels)
+        wif.color_palette.range = 0, next(most for most in (255, 999, 65535) if brightest <= most)
+        stated = f"0 to {wif.color_palette.range[1]} is taken"
+        warnings.warn(f"[COLOR PALETTE] states no Range: {stated}.", stacklevel=1)
     least, most = wif.color_palette.range
     if least >= most:
         raise BadInput(where, "[COLOR PALETTE] Range", (least, most), "the first number must be less than the second")
-    if missing := set(range(1, max(wif.color_table))) - set(wif.color_table):
-        raise BadInput(where, "", f"[COLOR TABLE] has no colour {min(missing)}", "colours 1, 2, 3, … are needed")
     for index, levels in wif.color_table.items():
         if not all(least <= level <= most for level in levels):
             allowed = f"numbers from {least} to {most}, the range of [COLOR PALETTE], are needed"
@@ -196,14 +233,18 @@ def _yarns_of(wif: _Wif, axis: str, where: str) -> WarpWeftData:
     """Return the numbers of an axis, its colours checked, with the defaults without which lengths are dropped."""
     yarns: _Yarns = getattr(wif, axis)
     colours: dict[int, int] = getattr(wif, f"{axis}_colors")
-    known = f"[COLOR TABLE] has the colours 1 to {len(wif.color_table)}"
+    known = f"[COLOR TABLE] has {len(wif.color_table)} colours, {min(wif.color_table)} to {max(wif.color_table)}"
     for thread, colour in colours.items():
-        if colour > len(wif.color_table):
+        if colour not in wif.color_table:
             raise BadInput(where, f"{section_name(f'{axis}_colors')} {thread}", colour, known)
     sets = wif.threading if axis == "warp" else wif.liftplan or wif.treadling
     threads = max([yarns.threads or 0, *sets])
-    section, default = section_name(axis), yarns.color[0] if yarns.color else 0
-    if not 1 <= default <= len(wif.color_table):
+    section, default = section_name(axis), yarns.color[0] if yarns.color else -1
+    if yarns.threads and max(sets) > yarns.threads:
+        warnings.warn(
+            f"{section} states {yarns.threads} threads, the draft has {max(sets)}: all are read.", stacklevel=1
+        )
+    if default not in wif.color_table:
         # Most programs state no default where each thread has a colour of its own.
         if not colours or set(colours) != set(range(1, len(colours) + 1)):
             stated = f"Color = {default}" if yarns.color else "no Color"
