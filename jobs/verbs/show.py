@@ -1,32 +1,44 @@
 """`twillight show`: a fabric's drawdown and yarns on the terminal, and its pictures.
 
-Pictures are a lit swatch, the drawdown (also in colours), height and normals as PNG; maps of the geometry are EXR.
+Pictures are a lit swatch and the drawdown, also in colours, as PNG. Maps of the geometry are PNG and EXR.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
 from cyclopts import Parameter
 
-from jobs.terminal import print_lines, print_table
+from jobs.terminal import Terminal, print_lines, print_table
 from jobs.verbs.parameters import FabricName, Local
 from pipeline.atomic import atomic_write
 from pipeline.scenes.catalogue import load_scene
+from pipeline.truth.options import TABLE_CELLS
 from reports.images import tiles
 from reports.images.exr import write_exr
 from weaves.colour_order import ColourOrder
+from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import GAP, surface_maps
 from weaves.yarn import Yarn
 
 TEXELS_PER_YARN: Final = 64
+"""Texels of the maps across a yarn, at most."""
+
+MOST_TEXELS: Final = 2048
+"""Texels of a side of the maps, at most: they take 36 bytes each."""
 
 SWATCH_SIZE: Final = "384x288"
 """Width and height of the picture of a swatch."""
+
+SWATCH_METHOD: Final = "selvage"
+"""Method of a swatch."""
+
+METHOD_OF_MANY_CELLS: Final = "point_sampled:4"
+"""Method of a swatch with more than `TABLE_CELLS` different cells: tables of others grow with them."""
 
 LEAST_YARNS: Final = 48
 """Yarns across a swatch, at least."""
@@ -41,40 +53,55 @@ _UNITS: Final = {"width": "yarn spacings", "bend": "degrees", "twist": "degrees"
 def show(
     fabric: FabricName,
     *,
-    out: Annotated[
-        Local | None, Parameter(help="Folder for pictures, a lit swatch among them, as PNG and EXR.")
-    ] = None,
+    out: Annotated[Local | None, Parameter(help="Folder for pictures: drawdown and lit swatch.")] = None,
+    maps: Annotated[bool, Parameter(help="Also height and normals, as PNG and EXR.", negative="")] = False,
+    size: Annotated[str, Parameter(help="WIDTHxHEIGHT of the swatch in pixels.")] = SWATCH_SIZE,
 ) -> None:
     """Print a fabric, and write its pictures if a folder is given."""
     cloth = load_fabric(fabric)
+    if out is None and (maps or size != SWATCH_SIZE):
+        raise BadInput("show", "--out", "", "a folder is needed for pictures")
     _print_fabric(cloth)
     if out is not None:
-        print_lines(*write_pictures(cloth, out), write_swatch(fabric, cloth, out))
+        with Terminal().status("pictures"):
+            paths = [*write_pictures(cloth, out), *(write_maps(cloth, out) if maps else [])]
+            paths.append(write_swatch(fabric, cloth, out, size))
+        print_lines(*paths)
 
 
 def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
-    """Write a fabric's pictures into a folder and return their paths.
+    """Write the drawdown, in black and in colours, into a folder and return the paths."""
+    return _drawn(fabric, folder, tiles.drawdown, tiles.colours)
+
+
+def _drawn(fabric: Fabric, folder: Path, *draws: Callable[[Fabric], bytes]) -> list[Path]:
+    paths = [folder / f"{fabric.name}-{draw.__name__}.png" for draw in draws]
+    for path, draw in zip(paths, draws, strict=True):
+        atomic_write(path, draw(fabric))
+    return paths
+
+
+def write_maps(fabric: Fabric, folder: Path) -> list[Path]:
+    """Write height and normals as pictures, and the geometry as EXR, into a folder and return the paths.
 
     The EXR holds one repeat, first pick at the bottom, first end on the left: height in yarn spacings, normal and fibre
     tangent as X (along the weft), Y (along the warp) and Z, the yarn (0 warp, 1 weft, 2 gap), and A = 0 in gaps.
     """
-    paths = []
-    for draw in (tiles.drawdown, tiles.colours, tiles.height, tiles.normals):
-        paths.append(folder / f"{fabric.name}-{draw.__name__}.png")
-        atomic_write(paths[-1], draw(fabric))
-    surface = surface_maps(fabric, TEXELS_PER_YARN)
+    paths = _drawn(fabric, folder, tiles.height, tiles.normals)
+    texels = min(TEXELS_PER_YARN, MOST_TEXELS // max(fabric.weave.repeat))
+    surface = surface_maps(fabric, texels)
     solid = surface.yarn != GAP
     channels = {"A": solid, "height": np.where(solid, surface.height, 0.0), "yarn": surface.yarn}
     for axis, name in enumerate("XYZ"):
         channels[f"normal.{name}"] = surface.normal[..., axis]
         channels[f"tangent.{name}"] = surface.tangent[..., axis]
     paths.append(folder / f"{fabric.name}-maps.exr")
-    about: dict[str, str | int | float] = {"fabric": fabric.name, "texels_per_yarn": TEXELS_PER_YARN}
+    about: dict[str, str | int | float] = {"fabric": fabric.name, "texels_per_yarn": texels}
     write_exr(paths[-1], {name: plane[::-1] for name, plane in channels.items()}, about)
     return paths
 
 
-def write_swatch(name: str, fabric: Fabric, folder: Path) -> Path:
+def write_swatch(name: str, fabric: Fabric, folder: Path, size: str) -> Path:
     """Write a picture of a lit swatch, the scene ``swatch`` with at least one and a half repeats; return its path."""
     from jobs.verbs.render import dressed, look, make
 
@@ -83,8 +110,9 @@ def write_swatch(name: str, fabric: Fabric, folder: Path) -> Path:
     scene = dressed(load_scene("swatch"), [name])
     cloths = {key: cloth.model_copy(update={"yarns": (yarns, yarns)}) for key, cloth in scene.cloths.items()}
     path = folder / f"{fabric.name}-swatch.png"
-    how = look(size=SWATCH_SIZE, samples=1, directions=8, tone="srgb", exposure=0.0)
-    make(scene.model_copy(update={"cloths": cloths}), "selvage", 1, how, path)
+    method = SWATCH_METHOD if fabric.weave.different_cells() <= TABLE_CELLS else METHOD_OF_MANY_CELLS
+    how = look(size=size, samples=1, directions=8, tone="srgb", exposure=0.0)
+    make(scene.model_copy(update={"cloths": cloths}), method, 1, how, path)
     return path
 
 

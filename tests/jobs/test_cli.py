@@ -31,9 +31,8 @@ def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
     assert code == 0 and "generate     0       0       14" in text and not list(tmp_path.iterdir())
 
 
-def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path, monkeypatch):
-    monkeypatch.setattr(jobs.verbs.show, "SWATCH_SIZE", "32x24")
-    code, text, _ = twillight("show", "denim", "--out", "shown")
+def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path):
+    code, text, _ = twillight("show", "denim", "--out", "shown", "--maps", "--size", "32x24")
     kinds = ("drawdown.png", "colours.png", "height.png", "normals.png", "maps.exr", "swatch.png")
     names = [f"denim-{kind}" for kind in kinds]
     assert code == 0 and all(name in text for name in names)

@@ -78,8 +78,7 @@ def test_the_layers_of_an_exr_sum_to_its_colour_and_say_what_they_are(render, tm
 @pytest.mark.slow
 def test_a_swatch_of_a_fabric_shows_its_colours_and_its_repeat(monkeypatch, tmp_path):
     """Denim's swatch is the scene `swatch` with denim; a satin of more threads than a swatch has gets more yarns."""
-    monkeypatch.setattr(jobs.verbs.show, "SWATCH_SIZE", "32x24")
-    path = jobs.verbs.show.write_swatch("denim", load_fabric("denim"), tmp_path)
+    path = jobs.verbs.show.write_swatch("denim", load_fabric("denim"), tmp_path, "32x24")
     assert path == tmp_path / "denim-swatch.png"
     assert main(["render", "swatch", "--fabric", "denim", "--size", "32x24", "--out", str(tmp_path / "a.png")]) == 0
     assert path.read_bytes() == (tmp_path / "a.png").read_bytes()
@@ -89,7 +88,7 @@ def test_a_swatch_of_a_fabric_shows_its_colours_and_its_repeat(monkeypatch, tmp_
     (tmp_path / "wide.toml").write_text(wide.to_toml())
     made = []
     monkeypatch.setattr(jobs.verbs.render, "make", lambda scene, *_: made.append(scene))
-    jobs.verbs.show.write_swatch(str(tmp_path / "wide.toml"), wide, tmp_path)
+    jobs.verbs.show.write_swatch(str(tmp_path / "wide.toml"), wide, tmp_path, "32x24")
     assert made[0].cloths["swatch"].yarns == (150.0, 150.0)
 
 
