@@ -1,7 +1,7 @@
 """A cloth's yarns and the walls between them as a binary PLY.
 
-Lengths are in yarn spacings: x along the weft, y along the warp, z up. Every vertex has the diffuse colour of its yarn
-as 8-bit sRGB, those of the walls `WALL`.
+Lengths are in yarn spacings: x along the weft, y along the warp, z up. Every vertex has the diffuse colour of its end
+or pick as 8-bit sRGB, those of the walls `WALL`.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 import trimesh
 
 from pipeline.atomic import atomic_path
-from reports.images.tiles import hex_colour
+from reports.images.tiles import encoded
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.mesh import repeat_mesh
 
-WALL: Final = "#202020"
+WALL: Final = (32, 32, 32)
 MOST_TRIANGLES: Final = 50_000_000
 """More are refused: the file would have a gigabyte, and the work in memory ten."""
 
@@ -44,13 +44,21 @@ def write_mesh(fabric: Fabric, path: Path, vertices: int = 64, repeats: int = 1)
         raise BadInput("export", "vertices", vertices, allowed)
     with atomic_path(path) as temporary:
         meshes = repeat_mesh(fabric, vertices, (repeats, repeats))
-        colours = [hex_colour(fabric.warp.diffuse_rgb), hex_colour(fabric.weft.diffuse_rgb), WALL]
+        colours = [np.tile(np.uint8(WALL), (len(meshes.walls.vertices), 1))]
+        for axis, (mesh, dyed) in enumerate(zip(meshes[:2], fabric.thread_colours(), strict=True)):
+            # A vertex belongs to the thread of its triangles: it may lie on the border of two.
+            thread = np.zeros(len(mesh.vertices), np.intp)
+            thread[mesh.faces] = np.floor(mesh.vertices[mesh.faces, axis].mean(axis=1, keepdims=True))
+            colours.insert(axis, encoded(dyed.diffuse)[thread % len(dyed.diffuse)])
         start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
         whole = trimesh.Trimesh(
             vertices=np.concatenate([mesh.vertices for mesh in meshes]),
             faces=np.concatenate([mesh.faces + first for mesh, first in zip(meshes, start[:-1], strict=True)]),
-            vertex_colors=np.repeat([[*bytes.fromhex(c[1:]), 255] for c in colours], np.diff(start), axis=0),
+            vertex_colors=np.concatenate(colours),
             process=False,  # merging or reordering vertices would take the walls' edges from them
         )
         temporary.write_bytes(trimesh.exchange.ply.export_ply(whole, encoding="binary"))
-    return f"{path}: {len(whole.faces):,} triangles; lengths in yarn spacings, z up"
+    of_weave, of_colours = np.array(fabric.weave.repeat), np.array(fabric.repeat)
+    most = int((of_colours // of_weave).max())
+    part = f", part of a pattern that repeats after {most} repeats of the weave" if repeats < most else ""
+    return f"{path}: {len(whole.faces):,} triangles{part}; lengths in yarn spacings, z up"

@@ -80,6 +80,26 @@ def test_the_file_holds_the_mesh_in_the_colours_of_its_yarns(twillight, tmp_path
     assert (tmp_path / "deep" / "cloth.ply").read_bytes() == first
 
 
+def test_every_end_and_pick_has_its_own_colour(twillight, tmp_path):
+    """Four dark and four light threads on a weave of four: a mesh of one repeat has not all of them, and says so."""
+    for repeats, shown in ((1, 1), (3, 2)):
+        code, text, _ = twillight("export", "houndstooth", "--mesh", "c.ply", "--vertices", "4", "--repeats", repeats)
+        assert code == 0 and ("part of a pattern that repeats after 2 repeats" in text) == (repeats == 1)
+        places, colours, faces = read_ply(tmp_path / "c.ply")
+        threads = load_fabric("houndstooth").thread_colours()
+        for axis, mesh in enumerate(repeat_mesh(load_fabric("houndstooth"), 4, (repeats, repeats))[:2]):
+            count = len(mesh.vertices)
+            inside = np.abs(mesh.vertices[:, axis] - np.rint(mesh.vertices[:, axis])) > 1e-3
+            thread = np.floor(places[:count, axis]).astype(int) % 8
+            np.testing.assert_allclose(
+                colours[:count, :3][inside], _srgb(threads[axis].diffuse[thread])[inside], atol=0.6
+            )
+            own, faces = faces[: len(mesh.faces)], faces[len(mesh.faces) :] - count
+            assert (np.ptp(colours[:count][own].astype(int), axis=1) == 0).all()
+            assert len(np.unique(colours[:count], axis=0)) == shown
+            places, colours = places[count:], colours[count:]
+
+
 def _srgb(linear):
     """Encode as IEC 61966-2-1 does, in 8 bits."""
     linear = np.asarray(linear)
