@@ -44,7 +44,7 @@ def write_mesh(fabric: Fabric, path: Path, vertices: int = 64, repeats: int = 1)
         raise BadInput("export", "vertices", vertices, allowed)
     with atomic_path(path) as temporary:
         meshes = repeat_mesh(fabric, vertices, (repeats, repeats))
-        colours = [np.tile(np.uint8(WALL), (len(meshes.walls.vertices), 1))]
+        colours = [np.tile(np.array(WALL, np.uint8), (len(meshes.walls.vertices), 1))]
         for axis, (mesh, dyed) in enumerate(zip(meshes[:2], fabric.thread_colours(), strict=True)):
             # A vertex belongs to the thread of its triangles: it may lie on the border of two.
             thread = np.zeros(len(mesh.vertices), np.intp)
