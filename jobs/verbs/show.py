@@ -34,9 +34,6 @@ MOST_TEXELS: Final = 2048
 SWATCH_SIZE: Final = "384x288"
 """Width and height of the picture of a swatch."""
 
-SWATCH_METHOD: Final = "selvage"
-"""Method of a swatch."""
-
 METHOD_OF_MANY_CELLS: Final = "point_sampled:4"
 """Method of a swatch with more than `TABLE_CELLS` different cells: tables of others grow with them."""
 
@@ -110,7 +107,7 @@ def write_swatch(name: str, fabric: Fabric, folder: Path, size: str) -> Path:
     scene = dressed(load_scene("swatch"), [name])
     cloths = {key: cloth.model_copy(update={"yarns": (yarns, yarns)}) for key, cloth in scene.cloths.items()}
     path = folder / f"{fabric.name}-swatch.png"
-    method = SWATCH_METHOD if fabric.weave.different_cells() <= TABLE_CELLS else METHOD_OF_MANY_CELLS
+    method = "selvage" if fabric.weave.different_cells() <= TABLE_CELLS else METHOD_OF_MANY_CELLS
     how = look(size=size, samples=1, directions=8, tone="srgb", exposure=0.0)
     make(scene.model_copy(update={"cloths": cloths}), method, 1, how, path)
     return path

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from reports.images.exr import RGB, Exr
 from weaves.colour import LUMINANCE, linear_rgb
 from weaves.fabric import Fabric
-from weaves.surface import GAP, surface_maps
+from weaves.surface import GAP, ClothSurface, surface_at
 
 EXPOSURE: Final = 1.6
 """Factor on linear values before they are shown."""
@@ -87,7 +87,8 @@ def overview(exrs: Sequence[Exr], columns: int) -> bytes:
 
 def drawdown(fabric: Fabric) -> bytes:
     """Return the drawdown, warp over in black, the first pick at the bottom."""
-    cells = np.where(_tiled(fabric.weave.warp_over, 1), 35, 250).astype(np.uint8)
+    picks, ends = (np.arange(CELLS) % count for count in fabric.weave.warp_over.shape)
+    cells = np.where(fabric.weave.warp_over[picks][::-1, ends], 35, 250).astype(np.uint8)
     grey = cells.repeat(CELL_PIXELS, axis=0).repeat(CELL_PIXELS, axis=1)
     lines = np.arange(len(grey)) % CELL_PIXELS == 0
     grey[lines], grey[:, lines] = 190, 190
@@ -109,18 +110,18 @@ def colours(fabric: Fabric) -> bytes:
 
 def height(fabric: Fabric) -> bytes:
     """Return the height map, black to white from the lowest to the highest point; gaps are black."""
-    surface = surface_maps(fabric, CELL_PIXELS)
+    surface = _surface(fabric)
     solid = surface.yarn != GAP
     low, high = surface.height[solid].min(), surface.height[solid].max()
     share = np.where(solid, (surface.height - low) / max(high - low, 1e-12), 0.0)
-    return png(mpl.colormaps["bone"](_tiled(share, CELL_PIXELS), bytes=True), 1)
+    return png(mpl.colormaps["bone"](share, bytes=True), 1)
 
 
 def normals(fabric: Fabric) -> bytes:
     """Return the normal map: (n + 1) / 2 as red, green, blue; gaps are black."""
-    surface = surface_maps(fabric, CELL_PIXELS)
+    surface = _surface(fabric)
     colours = np.where((surface.yarn != GAP)[..., None], 0.5 * surface.normal + 0.5, 0.0)
-    return png(_opaque(np.rint(255 * _tiled(colours, CELL_PIXELS)).astype(np.uint8)), 1)
+    return png(_opaque(np.rint(255 * colours).astype(np.uint8)), 1)
 
 
 def hex_colour(linear: Sequence[float]) -> str:
@@ -146,11 +147,10 @@ def _levels() -> npt.NDArray[np.float64]:
     return np.array([linear_rgb(f"#{code:02x}{code:02x}{code:02x}")[0] for code in range(256)])
 
 
-def _tiled(repeat: npt.NDArray[np.generic], pixels: int) -> npt.NDArray[np.generic]:
-    """Repeat a map over `CELLS` yarns of `pixels` each, the first pick at the bottom."""
-    side = CELLS * pixels
-    rows, columns = (np.arange(side) % extent for extent in repeat.shape[:2])
-    return np.asarray(repeat[rows][:, columns][::-1])
+def _surface(fabric: Fabric) -> ClothSurface:
+    """Return the surface at the pixels of the maps, the first pick at the bottom."""
+    centres = (np.arange(CELLS * CELL_PIXELS) + 0.5) / CELL_PIXELS
+    return surface_at(fabric, centres, centres[::-1, None])
 
 
 def _opaque(rgb: Bytes8) -> Bytes8:

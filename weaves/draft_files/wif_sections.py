@@ -197,13 +197,14 @@ def _refuse_missing(wif: _Wif, where: str) -> None:
 
 def _count_from_one(wif: _Wif) -> None:
     """Count treadles and shafts from 1: some programs count them from 0, where WIF means none."""
-    treadling = {} if wif.liftplan else wif.treadling
-    if not wif.liftplan and 0 in wif.tieup:
-        wif.tieup = {treadle + 1: shafts for treadle, shafts in wif.tieup.items()}
-        wif.treadling = {pick: tuple(t + 1 for t in treadles) for pick, treadles in treadling.items()}
-        warnings.warn("[TIEUP] counts treadles from 0; they are counted from 1 here.", stacklevel=1)
     lifts = "liftplan" if wif.liftplan else "tieup"
-    if any(0 in shafts for shafts in wif.threading.values()) and any(0 in s for s in getattr(wif, lifts).values()):
+    if lifts == "tieup" and 0 in wif.tieup:
+        wif.tieup = {treadle + 1: shafts for treadle, shafts in wif.tieup.items()}
+        wif.treadling = {pick: tuple(t + 1 for t in treadles) for pick, treadles in wif.treadling.items()}
+        warnings.warn("[TIEUP] counts treadles from 0; they are counted from 1 here.", stacklevel=1)
+    used = [{shaft for shafts in sets.values() for shaft in shafts} for sets in (wif.threading, getattr(wif, lifts))]
+    # With 0 for "none", the last of the stated shafts is used as well.
+    if 0 in used[0] & used[1] and wif.weaving.shafts == max(used[0] | used[1]) + 1:
         for name in ("threading", lifts):
             setattr(wif, name, {key: tuple(s + 1 for s in shafts) for key, shafts in getattr(wif, name).items()})
         warnings.warn("[THREADING] counts shafts from 0; they are counted from 1 here.", stacklevel=1)

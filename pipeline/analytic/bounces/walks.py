@@ -40,7 +40,7 @@ from pipeline.truth.geometry.pieces import cell_pieces, orbits
 from pipeline.truth.geometry.visibility import visible
 
 _FEWEST: Final = 16
-"""Points of the smallest piece."""
+"""Points of the smallest piece; fewer where a cloth has so many pieces that all walks are shared out."""
 _OFF: Final = 1e-9
 """Distance from a wall at which walks go on, in yarn spacings: beyond its rounding, on the open side."""
 _IN_GAP: Final = 64
@@ -128,7 +128,8 @@ def starting_points(field: HeightField, count: int) -> Start:
     pieces = [(orbit, piece) for orbit in orbits(field) for piece in cell_pieces(field, *orbit[0])]
     yarns = [(orbit, piece) for orbit, piece in pieces if piece.family != GAP]
     areas = np.array([2.0 * piece.radius * (piece.along[1] - piece.along[0]) for _, piece in yarns])
-    counts = np.maximum(np.ceil(count * areas / areas.sum()).astype(np.int64), _FEWEST)
+    fewest = min(_FEWEST, max(count // len(yarns), 1))
+    counts = np.maximum(np.ceil(count * areas / areas.sum()).astype(np.int64), fewest)
     columns = []
     for number, ((orbit, piece), points) in enumerate(zip(yarns, counts.tolist(), strict=True)):
         (pick, end), (low, high) = orbit[0], piece.along

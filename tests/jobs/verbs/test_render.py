@@ -19,6 +19,7 @@ from reports.images.tiles import displayed
 from reports.measure.scene.shot import read_shot, shoot
 from reports.options import ShotOptions
 from tests.pipeline.truth.cloths import woven
+from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 from weaves.families import Satin
 
@@ -90,6 +91,19 @@ def test_a_swatch_of_a_fabric_shows_its_colours_and_its_repeat(monkeypatch, tmp_
     monkeypatch.setattr(jobs.verbs.render, "make", lambda scene, *_: made.append(scene))
     jobs.verbs.show.write_swatch(str(tmp_path / "wide.toml"), wide, tmp_path, "32x24")
     assert made[0].cloths["swatch"].yarns == (150.0, 150.0)
+
+
+def test_swatches_of_many_different_cells_are_made_of_points(monkeypatch, tmp_path):
+    """Tables grow with the different cells, points do not."""
+    made = Mock()
+    monkeypatch.setattr(jobs.verbs.render, "make", made)
+    over = np.random.default_rng(1).random((40, 30)) < 0.5
+    rows = tuple("".join("#" if up else "." for up in pick) for pick in over)
+    many = load_fabric("denim").model_copy(update={"name": "many", "draft": Matrix(family="matrix", rows=rows)})
+    (tmp_path / "many.toml").write_text(many.to_toml())
+    for name, fabric in (("denim", load_fabric("denim")), (str(tmp_path / "many.toml"), many)):
+        jobs.verbs.show.write_swatch(name, fabric, tmp_path, "32x24")
+    assert [call.args[1] for call in made.call_args_list] == ["selvage", "point_sampled:4"]
 
 
 @pytest.mark.slow

@@ -132,6 +132,7 @@ MANY = numbered([f"{k % 256},{k // 256},0" for k in range(300)])
         ({"THREADING": "1=1\n2=2\n3=3"}, "end 4 of [THREADING]"),
         ({"TREADLING": numbered([1, 2, 3, 4, 1, 2, 3])}, "pick 8 of [TREADLING]"),
         ({"TIEUP": "1=1,2\n2=2,3\n3=3,4\n4=0"}, "pick 4 of [TREADLING]"),
+        ({"THREADING": numbered([0, 2, 3, 4] * 2), "TIEUP": "1=1,2\n2=2,3\n3=3,4\n4=0"}, "end 1 of [THREADING]"),
         ({"TIEUP": "1=1,2,3,4\n2=2,3\n3=3,4"}, "pick 1 of [TREADLING]"),
         ({"THREADING": UNEVEN, "WARP": "Threads=311\nColor=1"}, "repeats after 311 ends: at most 256 are allowed"),
         ({"COLOR_TABLE": MANY, "WARP_COLORS": numbered(range(1, 301)), "THREADING": numbered([1, 2, 3, 4] * 75)},

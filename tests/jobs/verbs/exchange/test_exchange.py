@@ -28,6 +28,19 @@ def test_options_replace_numbers_of_single_yarns(twillight, tmp_path):
     assert (fabric.weft.bend, fabric.warp.roughness) == (like.weft.bend, like.warp.roughness)
 
 
+def test_a_part_of_a_draft_is_a_fabric(twillight, refused, tmp_path):
+    """Ends 3 to 6 of a twill, two white and two red, and picks 2 to 5."""
+    (tmp_path / "a.wif").write_text(wif(WARP_COLORS=numbered([1, 1, 1, 1, 2, 2, 1, 1])), encoding="utf-8")
+    code, text, _ = twillight("import", "a.wif", "--out", "a.toml", "--ends", "3-6", "--picks", "2-5")
+    assert code == 0 and "4 ends and 4 picks" in text
+    fabric = load_fabric(tmp_path / "a.toml")
+    assert fabric.weave.rows() == ["..##", ".##.", "##..", "#..#"]
+    assert [count for _, count in fabric.colours.ends] == [2, 2]
+    for part in ("3", "0-4", "5-4", "1-9", "a-b"):
+        complaint = refused("import", "a.wif", "--out", "b.toml", "--ends", part)
+        assert f"--ends = '{part}': FIRST-LAST is needed, from 1-1 to 1-8" in complaint
+
+
 def test_a_fabric_that_was_exported_is_imported(twillight, tmp_path):
     code, text, _ = twillight("export", "herringbone", "--wif", "h.wif")
     assert code == 0 and "h.wif" in text and "no spacing" in text
