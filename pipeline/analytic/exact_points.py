@@ -13,17 +13,22 @@ from pipeline.truth.query import Queries
 
 
 def sample_points(cloth: ClothSide, queries: Queries, count: int, seed: int, r2: bool = False) -> Float32:
-    """Return the components from `count` points a query, (N, 4); the viewer is in front.
+    """Return the components from `count` points a query, (N, 4); the viewer is in front, rays no lower than 89 degrees.
 
     The points are independent, or with `r2` the first of that sequence, shifted at random once a query
     [Roberts2018R2].
     """
-    return np.ascontiguousarray(_sample(cloth, columns_of(queries), count, np.uint64(seed), r2)[:, :4])
+    return np.ascontiguousarray(_points(cloth, queries, count, seed, r2)[:, :4])
 
 
 def sample_transparency(cloth: ClothSide, looks: Queries, count: int, seed: int, r2: bool = False) -> Float32:
     """Return the share of light from straight behind that passes at the same points, (N,)."""
-    return _sample(cloth, columns_of(looks), count, np.uint64(seed), r2)[:, 4]
+    return _points(cloth, looks, count, seed, r2)[:, 4]
+
+
+def _points(cloth: ClothSide, queries: Queries, count: int, seed: int, r2: bool) -> Float32:
+    columns = columns_of(queries.raised() if cloth.parallax else queries)
+    return _sample(cloth, columns, count, np.uint64(seed), r2)
 
 
 @allocating_kernel

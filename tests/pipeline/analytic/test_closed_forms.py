@@ -120,7 +120,8 @@ def test_the_seen_area_of_a_closed_surface_is_the_projected_one():
 )
 def test_footprints_on_a_lattice_cover_the_cloth_evenly(sigma, stretch):
     """The mean over centres of what is seen is that of a footprint far wider than the repeat, in every regime. Weights
-    are shares of the footprint on lines, up to the tail that is cut off, and to the error of rules."""
+    are shares of the footprint, up to the tail that is cut off, and to the error of rules; those of fixed nodes, from
+    .3 yarns to even ones, are densities times the integral of the Gaussian."""
     fabric = woven("polyester_lining", twist=20.0, width=0.9)
     ends, picks = fabric.weave.repeat
     u, v = (axis.ravel() for axis in np.mgrid[0:ends:0.125, 0:picks:0.125] + 0.0625)
@@ -133,5 +134,6 @@ def test_footprints_on_a_lattice_cover_the_cloth_evenly(sigma, stretch):
         sums, _ = query_sums(methods.soft_table(fabric), asked)
         means.append(sums[:, :, [AREA, OPEN_DIFFUSE, OPEN_SPECULAR]].mean(axis=0).astype(np.float64))
     ratio = means[0] / means[1]
-    assert sigma > 0.3 or 0.96 < ratio.mean() < 1.01
+    whole = 2.0 * math.pi * sigma**2 * stretch if sigma == 0.45 else 1.0
+    assert 0.96 < ratio.mean() / whole < 1.01
     np.testing.assert_allclose(ratio / ratio.mean(), 1.0, atol=0.015)

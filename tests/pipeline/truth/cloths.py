@@ -40,9 +40,9 @@ def equal_queries(wi, wo, sigma=2.0, rows=1, centre=(0.3, 0.7)):
 
 
 def answering(estimator, **options):
-    """Return options of an estimator; of `quadrature`, which knows no rims, those of the fabric plane."""
-    plane = {"parallax": False} if estimator == "quadrature" else {}
-    return TruthOptions(estimator=estimator, **plane | options)
+    """Return options of an estimator; `quadrature`, which knows no rims, leaves walls out."""
+    walls = {"walls": "left_out"} if estimator == "quadrature" else {}
+    return TruthOptions(estimator=estimator, **walls | options)
 
 
 def fixed(count, estimator="owen", **options):

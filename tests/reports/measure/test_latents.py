@@ -12,8 +12,8 @@ from reports.measure.latents import SHARES, between, measure_edits, measure_path
 from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import Fabric, load_fabric
 
-TRUTH = TruthOptions(estimator="node_table", parallax=False)
-ASKED = QueryOptions(sigma=(0.3, 4.0))
+TRUTH = TruthOptions(estimator="node_table")
+ASKED = QueryOptions(sigma=(0.3, 1.0), max_angle=60.0)
 
 
 class Truth(FakeMethod):
