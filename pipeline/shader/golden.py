@@ -76,6 +76,7 @@ GROUPS: Final = {
     "back_transmitted": Group(64, 1.0, -1.0, False),
     "curved": Group(64, 1.0, 1.0, True),
     "curved_transmitted": Group(64, -1.0, 1.0, True),
+    "low": Group(32, 1.0, 1.0, False, (LOWEST_VIEWER, _LEAST_RISE)),
 }
 """Kinds of golden queries; a folder has those that its tables know."""
 
@@ -204,7 +205,7 @@ def lobes_of(sides: Sides, looks: Queries) -> Lobes:
 def _candidates(repeat: tuple[int, int], group: Group, rng: np.random.Generator) -> Queries:
     """Return twice as many queries as a group has, footprints of every kind by turns, anywhere in the repeat."""
     count = 2 * group.rows
-    footprints = np.array(_FOOTPRINTS if group.rise[0] >= _LEAST_RISE else _ON_FIXED_NODES)
+    footprints = np.array(_FOOTPRINTS if group.rise[0] >= LOWEST_VIEWER else _ON_FIXED_NODES)
     kinds = footprints[np.arange(count) % len(footprints)]
     drawn = np.exp(np.log(kinds[:, :, 0]) + rng.random((count, 2)) * np.log(kinds[:, :, 1] / kinds[:, :, 0]))
     sigma, ratio = drawn[:, 0], drawn[:, 1]

@@ -36,7 +36,7 @@ def any_asked(estimator):
 
 def answers(fabric, queries, estimator, **options):
     """Return components and transparency, float64 (N, 5)."""
-    error, most = (0.003, 1 << 14) if estimator == "quadrature" else (0.01, 1 << 11)
+    error, most = (0.003, 1 << 15) if estimator == "quadrature" else (0.01, 1 << 11)
     chosen = answering(estimator, relative_error=error, max_count=most, **options)
     found = estimate(fabric, queries, chosen, 4)
     return np.concatenate([found.mean, found.transparency[:, None]], axis=1).astype(np.float64)

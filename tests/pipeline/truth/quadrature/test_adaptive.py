@@ -16,7 +16,7 @@ from tests.presets import slow
 from weaves.fabric import load_fabric
 
 CUT, NEVER = 2, 9  # level from which on lines are cut; the second is never reached
-FINE = answering("quadrature", relative_error=3e-4, absolute_error=0.0, max_count=1 << 15)
+FINE = answering("quadrature", parallax=False, relative_error=3e-4, absolute_error=0.0, max_count=1 << 15)
 
 
 @pytest.mark.parametrize("name", ["polyester_lining", "satin_8", "herringbone", "silk_shantung", "basket"])
@@ -132,7 +132,7 @@ def test_stated_bounds_cover_the_true_error(rows):
 @pytest.mark.parametrize("footprint", ["gaussian", "box"])
 def test_extremes_stay_finite_and_not_negative(sigma, footprint):
     fabric = woven("silk_charmeuse", roughness=0.01)
-    options = answering("quadrature", footprint=footprint, max_count=512)
+    options = answering("quadrature", parallax=False, footprint=footprint, max_count=512)
     for theta in (0.0, 89.9):
         queries = equal_queries(direction(theta, 13), direction(60.0, 200), sigma, rows=2, centre=(1e6 + 0.3, -1e6))
         answers = estimate(fabric, queries, options, 1)
