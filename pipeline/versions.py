@@ -17,7 +17,7 @@ TRAINING: Final = 4
 
 MODELS: Final[dict[str, int]] = {
     "curved": 2,
-    "point_sampled": 4,
+    "point_sampled": 5,
     "prefiltered": 2,
     "selvage": 6,
     "soft_nodes": 7,

@@ -43,4 +43,5 @@ def test_extremes_stay_finite_and_not_negative():
         for other in (0.0, 89.9):
             queries = equal_queries(direction(theta, 13), direction(other, 200), sigma, 4, (1e6 + 0.3, -1e6))
             values = sample_points(cloth, queries, 1, 0)
+            np.testing.assert_array_equal(values, sample_points(cloth, queries.raised(), 1, 0))
             assert np.isfinite(values).all() and (values >= 0).all()
