@@ -12,6 +12,7 @@ where they are 0.
 
 from __future__ import annotations
 
+from contextvars import ContextVar
 from functools import reduce
 from operator import or_
 from typing import Any, Final
@@ -28,6 +29,14 @@ BSDF: Final = "twillight"
 
 REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)
 """Components."""
+
+WITHOUT_CLOTH: Final = ContextVar("WITHOUT_CLOTH", default=False)
+"""True while a scene is rendered in which nothing wears cloth: Dr.Jit records the BSDFs of other scenes all the same."""
+
+
+def wears_cloth(shape: Any) -> bool:
+    """Return whether a shape's BSDF is a cloth, or has one inside."""
+    return shape.bsdf() is not None and f"{BSDF}[" in str(shape.bsdf())
 
 
 class RayValues:
@@ -105,6 +114,8 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
             """Draw a direction; return it and the BSDF times its cosine, over its density."""
+            if _recorded(mi, dr):
+                return dr.zeros(mi.BSDFSample3f), mi.Spectrum(0.0)
             columns, rows, hits = _hits(mi, dr, si, active, sample1, sample2)
             random = np.column_stack([columns.number(sample1), columns.vector(sample2)])[rows]
             wo, pdf, straight, weight = self._worn.sample(hits, random) if len(rows) else _NOTHING
@@ -120,6 +131,8 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 
         def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
             """Return the share of light that goes straight through, or past a silhouette."""
+            if _recorded(mi, dr):
+                return mi.Spectrum(0.0)
             columns, rows, hits = _hits(mi, dr, si, active)
             share = self._worn.transparency(hits) if len(rows) else np.empty(0)
             return columns.to_mitsuba(mi.Spectrum, np.repeat(share[:, None], 3, axis=1), rows)
@@ -129,6 +142,8 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
             return f"{BSDF}[{self._worn.options}]"
 
         def _evaluated(self, ctx: Any, si: Any, wo: Any, active: Any, values: bool, density: bool) -> tuple[Any, Any]:
+            if _recorded(mi, dr):
+                return mi.Spectrum(0.0), mi.Float(0.0)
             columns, rows, hits = _hits(mi, dr, si, active, wo)
             light = columns.vector(wo)[rows]
             rgb, pdf = np.zeros((len(rows), 3)), np.zeros(len(rows))
@@ -146,12 +161,19 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 _NOTHING: Any = (np.empty((0, 3)), np.empty(0), np.empty(0, np.bool_), np.empty((0, 3)))
 
 
+def _recorded(mi: Any, dr: Any) -> bool:
+    """Return whether Dr.Jit records a call that no ray of a scene without cloth makes; BadInput if rays make it."""
+    if mi.variant().startswith("scalar") or not dr.flag(dr.JitFlag.SymbolicScope):
+        return False
+    if not WITHOUT_CLOTH.get():
+        allowed = "use the integrator twillight_path; direct and prb work inside `with twillight_mitsuba.evaluated():`"
+        raise BadInput(f"bsdf {BSDF}", "", "an integrator that Dr.Jit records", allowed)
+    return True
+
+
 def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[RayValues, Index, RayHits]:
     """Return the active rows with a viewer on either side, and what they meet; `others` have the same length."""
     scalar = mi.variant().startswith("scalar")
-    if not scalar and dr.flag(dr.JitFlag.SymbolicScope):
-        allowed = "render inside `with twillight_mitsuba.evaluated():`"
-        raise BadInput(f"bsdf {BSDF}", "", "a recorded loop", allowed)
     normal, du = si.sh_frame.n, si.dp_du
     handed = dr.dot(dr.cross(du, si.dp_dv), normal)
     stride, bend = _curved(dr, si)

@@ -22,16 +22,18 @@ of u are a tenth of a yarn spacing by default. A ray that leaves a silhouette ag
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
+from rich.console import Console
+from rich.progress import track
 
-from pipeline.mitsuba.bsdf import BSDF
+from pipeline.mitsuba.bsdf import BSDF, wears_cloth
 from pipeline.mitsuba.worn import PIXEL
-from pipeline.scenes.loading import has_uv
+from pipeline.scenes.loading import faceted, has_uv
 from weaves.errors import BadInput
 from weaves.validation import Frozen, validated
 
@@ -39,7 +41,7 @@ INTEGRATOR: Final = "twillight_path"
 """Name of the plugin."""
 
 
-MOST_RAYS: Final = 2**20
+MOST_RAYS: Final = 2**18
 """Most rays that are traced at a time; a ray takes about a kilobyte."""
 
 MOST_SCATTER: Final = 0.5
@@ -101,17 +103,18 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
         ) -> Any:
             """Render the scene, as all integrators of Mitsuba do.
 
-            Pictures of more than `MOST_RAYS` rays are the mean of several; the film then keeps the last one only.
+            Pictures of more than `MOST_RAYS` rays are the mean of several, with a bar on a terminal; the film then
+            keeps the last one only.
 
             Raises
             ------
             BadInput
-                If a mesh that wears the BSDF `twillight` has no uv coordinates.
+                If a mesh that wears the BSDF `twillight` has no uv coordinates, or is bent and has no vertex normals.
             """
             # Mitsuba calls this function again, for each part.
             if self._samples:
                 return super().render(scene, sensor, seed, spp, develop, evaluate)
-            _refuse_bare(mi, scene)
+            _refuse_meshes(mi, scene)
             seen = sensor if isinstance(sensor, mi.Sensor) else scene.sensors()[sensor]
             samples = spp or seen.sampler().sample_count()
             self._deviation = ray_deviation(seen.film().rfilter(), samples)
@@ -124,7 +127,7 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
                     means = (
                         super(TwillightPath, self).render(scene, sensor, seed + (number << 16), part, True, evaluate)
                         * (part / samples)
-                        for number, part in enumerate(parts)
+                        for number, part in enumerate(_tracked(parts))
                     )
                     return sum(means)
             finally:
@@ -163,13 +166,22 @@ def ray_deviation(rfilter: Any, samples: int) -> float:
     return math.sqrt(max(PIXEL**2 - spread, PIXEL**2 / max(samples, 4)))
 
 
-def _refuse_bare(mi: Any, scene: Any) -> None:
-    """Refuse a scene in which a mesh wears cloth and has no uv coordinates."""
+def _tracked(parts: list[int]) -> Iterable[int]:
+    """Return parts with a bar on a terminal."""
+    console = Console(stderr=True)
+    return track(parts, "rendering", console=console, disable=not console.is_terminal, transient=True)
+
+
+def _refuse_meshes(mi: Any, scene: Any) -> None:
+    """Refuse a scene in which a mesh wears cloth and does not say where its yarns are, or how it curves."""
     for shape in scene.shapes():
-        worn = shape.bsdf() is not None and str(shape.bsdf()).startswith(f"{BSDF}[")
-        if worn and shape.is_mesh() and not has_uv(mi, shape):
+        if shape.is_mesh() and wears_cloth(shape):
             name = shape.id() or shape.class_name()
-            raise BadInput("scene", "shape", name, f"a shape that wears {BSDF} needs uv coordinates")
+            if not has_uv(mi, shape):
+                raise BadInput("scene", "shape", name, f"a shape that wears {BSDF} needs uv coordinates")
+            if faceted(mi, shape):
+                allowed = f"a bent mesh that wears {BSDF} needs vertex normals, which tell its curvature"
+                raise BadInput("scene", "shape", name, allowed)
 
 
 class _Bounce(NamedTuple):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, Final
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, Final, NoReturn
 
-from pipeline.mitsuba.bsdf import BSDF, bsdf_class
+from pipeline.mitsuba.bsdf import BSDF, WITHOUT_CLOTH, bsdf_class, wears_cloth
 from pipeline.mitsuba.integrator import INTEGRATOR, integrator_class
 from pipeline.models.patch_bsdf import USUAL_METHOD
 from pipeline.scenes.loading import Loaded
@@ -18,6 +20,8 @@ HOW: Final = (
     "`apt install libllvm19` on Debian, or name the library in DRJIT_LIBLLVM_PATH"
 )
 """How to install LLVM."""
+
+_COLOURS = "must have RGB colours, such as llvm_ad_rgb or scalar_rgb"
 
 _registered: set[str] = set()
 
@@ -37,7 +41,7 @@ def register() -> Any:
     if mi.variant() is None:
         mi.set_variant(best_variant())
     if not _rgb(str(mi.variant())):
-        raise BadInput("mitsuba", "variant", mi.variant(), "must have RGB colours, such as llvm_ad_rgb or scalar_rgb")
+        raise BadInput("mitsuba", "variant", mi.variant(), _COLOURS)
     if not _registered:
         mi.detail.add_variant_callback(lambda old, new: _enter(mi))
     _enter(mi)
@@ -78,8 +82,38 @@ def _enter(mi: Any) -> None:
     import drjit as dr
 
     variant = mi.variant()
-    if variant in _registered or not _rgb(variant):
+    if not hasattr(mi.render, "__wrapped__"):
+        mi.render = _guarded(mi.render)
+    if variant in _registered:
         return
     _registered.add(variant)
-    mi.register_bsdf(BSDF, bsdf_class(mi, dr))
-    mi.register_integrator(INTEGRATOR, integrator_class(mi, dr))
+    mi.register_bsdf(BSDF, bsdf_class(mi, dr) if _rgb(variant) else _refuse_colours)
+    mi.register_integrator(INTEGRATOR, integrator_class(mi, dr) if _rgb(variant) else _refuse_colours)
+
+
+def _refuse_colours(props: Any) -> NoReturn:
+    """Refuse the variant that is set."""
+    import mitsuba as mi
+
+    raise BadInput("mitsuba", "variant", mi.variant(), _COLOURS)
+
+
+def _guarded(render: Callable[..., Any]) -> Callable[..., Any]:
+    """Return `mi.render` that ends in our sentence alone, and leaves scenes without cloth as they are."""
+
+    @wraps(render)
+    def guarded(scene: Any, *arguments: Any, **named: Any) -> Any:
+        before = WITHOUT_CLOTH.set(not any(map(wears_cloth, scene.shapes())))
+        try:
+            return render(scene, *arguments, **named)
+        except RuntimeError as error:
+            cause: BaseException | None = error
+            while cause is not None and not isinstance(cause, BadInput):
+                cause = cause.__cause__
+            if cause is None:
+                raise
+            raise cause from None
+        finally:
+            WITHOUT_CLOTH.reset(before)
+
+    return guarded

@@ -6,9 +6,9 @@ Footprint: a Gaussian of `pixel_sigma` pixels under J = d(u, v in yarns)/d(pixel
 are J's left singular vectors and its standard deviations pixel_sigma times the singular values. Mitsuba takes them over
 one pixel to the right and one downwards, on the tangent plane [Igehy1999RayDifferentials].
 
-Light: a light in sight of the place, along a straight ray, is a query; one that another surface hides is none. Cloth
-blocks such a ray as if it were opaque. A light on one side of the surface and on the other of its shading normal is
-none either.
+Light: a light in sight of the place, along a straight ray, is a query; one that another surface hides is none, and one
+that is hidden in parts is as strong as those in sight. Cloth blocks such a ray as if it were opaque. A light on one
+side of the surface and on the other of its shading normal is none either.
 
 Backdrop: other shapes are matte in their albedo; the environment is seen where a pixel's ray leaves the scene.
 Radiance of a shape = albedo / pi times the sum over the lights in sight of irradiance times cosine, both sides alike:
@@ -18,6 +18,7 @@ the lights and shadows of the cloth itself, without noise. Light that shapes or 
 from __future__ import annotations
 
 import math
+from itertools import chain
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -126,15 +127,23 @@ def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats,
     beside = off(places.position)
     index, towards, power = [], [], []
     for light in loaded.lights:
-        direction, distance, irradiance = light.reach(places.position)
+        direction, _, _ = light.reach(places.position)
         wi = np.einsum("nij,nj->ni", places.frame, direction)
         facing = dot(places.outward, direction)
         candidates = (wi[:, 2] * facing > 0.0) & (np.abs(wi[:, 2]) > 1e-6)
         start = places.position + (beside * np.sign(facing))[:, None] * places.outward
-        free = in_sight(loaded.mi, loaded.world, start, direction, distance, candidates)
-        index.append(free)
-        towards.append(wi[free])
-        power.append(irradiance[free])
+        irradiance = np.zeros_like(direction)
+        for part in light.parts or (light,):
+            towards_part, distance, strength = part.reach(places.position)
+            # What lies beyond the surface is as much in sight as the light itself.
+            beyond = dot(places.outward, towards_part) * facing <= 0.0
+            ray = np.where(beyond[:, None], direction, towards_part)
+            free = in_sight(loaded.mi, loaded.world, start, ray, distance, candidates)
+            irradiance[free] += strength[free]
+        lit = np.flatnonzero(irradiance.any(axis=1))
+        index.append(lit)
+        towards.append(wi[lit])
+        power.append(irradiance[lit])
     return np.concatenate(index), np.concatenate(towards), np.concatenate(power)
 
 
@@ -173,7 +182,7 @@ def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: npt.N
     viewer = camera.to_viewer(position)
     geometric, normal = (unit(n * np.where(dot(n, viewer) < 0.0, -1.0, 1.0)[:, None]) for n in (geometric, normal))
     total, start = np.zeros_like(position), position + off(position)[:, None] * geometric
-    for light in loaded.lights:
+    for light in chain.from_iterable(light.parts or (light,) for light in loaded.lights):
         direction, distance, irradiance = light.reach(position)
         cosine = np.maximum(dot(normal, direction), 0.0)
         free = in_sight(mi, world, start, direction, distance, (cosine > 0.0) & (dot(geometric, direction) > 0.0))

@@ -3,12 +3,15 @@
 An environment becomes `environment_directions` distant lights on a Fibonacci lattice, which parts the sphere into equal
 solid angles. Each carries the mean radiance of the `environment_samples` places of a finer lattice that lie nearest to
 it, times their solid angle: irradiances sum to that of the whole environment.
+
+Shadows of an environment are soft: each of its lights is in sight by parts, `_PARTS` smaller lights around it, one
+shadow ray each. They share its power as the environment has it, and shine from its own direction.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +23,7 @@ from weaves.errors import BadInput
 
 Floats = npt.NDArray[np.float64]
 
+_PARTS: Final = 4  # shadow rays of a direction of an environment, on average
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 
@@ -32,6 +36,8 @@ class Light(NamedTuple):
     """Unit vector to it if distant, else its position, (3,)."""
     power: Floats
     """Linear RGB irradiance on a surface that faces it, (3,); of a point light, at distance 1."""
+    parts: tuple[Light, ...] = ()
+    """Lights that it stands for, of which each may be in shadow; none: it is one itself."""
 
     def reach(self, position: Floats) -> tuple[Floats, Floats, Floats]:
         """Return unit vectors to the light (N, 3), distances (N,), irradiances on facing surfaces (N, 3)."""
@@ -83,11 +89,19 @@ def _delta(mi: Any, emitter: Any, distant: bool) -> Light:
 
 def _quadrature(mi: Any, environment: Any, options: SceneOptions) -> list[Light]:
     towards = fibonacci(options.environment_directions)
+    smaller = fibonacci(options.environment_directions * _PARTS)
     fine = fibonacci(options.environment_directions * options.environment_samples)
-    _, nearest = KDTree(towards).query(fine)
-    power = np.zeros_like(towards)
-    np.add.at(power, nearest, radiance(mi, environment, fine) * (4.0 * math.pi / len(fine)))
-    return [Light(True, d, p) for d, p in zip(towards, power, strict=True) if p.any()]
+    power = radiance(mi, environment, fine) * (4.0 * math.pi / len(fine))
+    cells = KDTree(towards)
+    (_, of_smaller), (_, of_fine) = cells.query(smaller), cells.query(fine)
+    lights = []
+    for cell, direction in enumerate(towards):
+        own, around = power[of_fine == cell], smaller[of_smaller == cell]
+        _, nearest = KDTree(around).query(fine[of_fine == cell])
+        shares = (own[nearest == part].sum(axis=0) for part in range(len(around)))
+        parts = (Light(True, d, share) for d, share in zip(around, shares, strict=True) if share.any())
+        lights.append(Light(True, direction, own.sum(axis=0), tuple(parts)))
+    return [light for light in lights if light.parts]
 
 
 def _vector(value: Any) -> Floats:

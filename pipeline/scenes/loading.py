@@ -128,7 +128,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
             if shape.is_mesh() and not has_uv(mi, shape):
                 allowed = "a shape that wears a fabric needs uv coordinates"
                 raise BadInput(where, "shape", shape.id() or shape.class_name(), allowed)
-            if options.curvature != "none" and shape.is_mesh() and _faceted(mi, shape):
+            if options.curvature != "none" and shape.is_mesh() and faceted(mi, shape):
                 allowed = "a bent mesh that wears a fabric needs vertex normals, which tell its curvature"
                 raise BadInput(where, "shape", shape.id() or shape.class_name(), allowed)
     if not worn:
@@ -185,8 +185,8 @@ def has_uv(mi: Any, mesh: Any) -> bool:
     return bool((np.ptp(np.asarray(found["vertex_texcoords"]).reshape(-1, 2), axis=0) > 0.0).all())
 
 
-def _faceted(mi: Any, mesh: Any) -> bool:
-    """Return whether a mesh has facets in several planes, and no normals of its vertices."""
+def faceted(mi: Any, mesh: Any) -> bool:
+    """Return whether a mesh has facets in several planes, and no normals of its vertices, which tell its curvature."""
     if mesh.has_vertex_normals():
         return False
     place = np.asarray(mi.traverse(mesh)["vertex_positions"], np.float64).reshape(-1, 3)
