@@ -126,15 +126,13 @@ def _options(page: PageInput) -> dict[str, object]:
 
 
 def _headlines(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> list[str]:
-    """Return a sentence for each learnt method, published ones first; the first of them quotes its paper."""
+    """Return a sentence for each learnt method, published ones first; the first `woven` quotes its paper."""
     published = {note.name for note in page.models if note.published}
     untrained = {note.name for note in page.models if not note.learns}
     keys = learnt(frames["errors"], untrained)
     keys.sort(key=lambda key: key[0] not in published)
-    sentences = [
-        headline(*key, frames["errors"], frames["timing"], paper=not index and key[0] in published)
-        for index, key in enumerate(keys)
-    ]
+    quoting = next((note.name for note in page.models if (note.kind or note.name) == "woven"), "")
+    sentences = [headline(*key, frames["errors"], frames["timing"], paper=key[0] == quoting) for key in keys]
     return [text for text in sentences if text]
 
 

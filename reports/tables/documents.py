@@ -17,7 +17,16 @@ from reports.record import Machine, Record
 from reports.tables.number_format import NONE, fixed_to, listed, scientific, times
 from reports.tables.page_tables import page_frames, sections
 from reports.tables.sentences import BOUNDED
-from reports.tables.summary import BASELINE, PAPER, error_table, of_baseline, over_unseen, rows, summary_table, unranged
+from reports.tables.summary import (
+    BASELINE,
+    PAPER_SAYS,
+    error_table,
+    of_baseline,
+    over_unseen,
+    rows,
+    summary_table,
+    unranged,
+)
 from reports.tables.table import markdown_table, number
 from weaves.errors import BadInput
 
@@ -118,10 +127,9 @@ def _woven(lines: Mapping[str, Sequence[str]]) -> list[str]:
     for setting, name in ((BOUNDED, "`woven` under the energy bound"), ("", "`woven`")):
         if line := lines.get(README_METHODS["woven", setting]):
             _, _, seen, unseen, _, time = line
-            lower, faster = PAPER
             others = f", {unseen} on unseen ones," if unseen != NONE else ""
             ours = f"{name} has {seen} lower MSE than two points on seen fabrics{others} at {time}"
-            return [f"{ours} their time; its paper reports {lower}× at {faster}× on its own scene and GPU."]
+            return [f"{ours} their time; {PAPER_SAYS}"]
     return []
 
 

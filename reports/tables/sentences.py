@@ -13,7 +13,7 @@ from reports.measure.by_size import SIZES, WHOLE
 from reports.over_seeds import LEAST, MOST, trainings
 from reports.record import TRUTH, Record
 from reports.tables.number_format import NO_BREAK, NONE, display, listed, percent, plain, shown, significant, times
-from reports.tables.summary import BASELINE, PAPER, of_baseline, over_unseen, parts_of, rows, unranged
+from reports.tables.summary import BASELINE, PAPER_SAYS, of_baseline, over_unseen, parts_of, rows, unranged
 from reports.tables.tradeoff import FAULTS, LIMITS, Fault, cheapest
 
 BOUNDED: Final = "bounded"
@@ -64,11 +64,10 @@ def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFra
     more = "".join(f" and {ratio} on {fabrics}" for ratio, fabrics in others)
     ratios = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
     cost = f", at {ratios.iloc[0]:.2g}× its time" if len(ratios) and math.isfinite(ratios.iloc[0]) else ""
-    lower, faster = PAPER
     name = display(method, setting)
     text = f"{name[0].upper()}{name[1:]} reaches {first} than point sampling at 2 points on {where}{more}{cost}"
     text += " (one training)" if own["seeds"].iloc[0] == 1 else ""
-    return f"{text}; the paper reports {lower}× at {faster}× on its own scene and GPU." if paper else f"{text}."
+    return f"{text}; {PAPER_SAYS}" if paper else f"{text}."
 
 
 def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) -> list[tuple[str, str]]:

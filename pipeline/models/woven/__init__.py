@@ -20,7 +20,10 @@ class WovenOptions(ComponentLossOptions):
     latent: int = Field(default=64, ge=4, le=512)
     """Length of the material latent."""
     hidden: int = Field(default=128, ge=8, le=1024)
-    """Width of the decoder's hidden layers; with latent 64 and 8 bins, 128 gives the published 86,660 parameters."""
+    """Width of the decoder's hidden layers."""
+    extra_layer: Literal["fusion", "encoder"] = "fusion"
+    """Place of one layer `hidden` -> `hidden`. With `encoder` the decoder has the layers of the paper's figure, 70,148
+    parameters. With `fusion` it has 86,660, a number from a note on the paper, and the encoder 16,512 less."""
     map_texels: Literal[16, 32, 64, 128] = 32
     """Side of the square normal and tangent maps, which hold one repeat; the paper does not say."""
     encoder_channels: int = Field(default=16, ge=4, le=128)
@@ -64,6 +67,9 @@ class WovenOptions(ComponentLossOptions):
             "every cloth in standard position": self.standard,
             "a random origin in every training step": self.roll,
             "no spatial fusion": not self.spatial_fusion,
+            "one layer more in the fusion, one less in the encoder": self.extra_layer == "fusion",
+            "an encoder of the maps with fewer channels": True,
+            f"maps of {self.map_texels} texels": True,
         }
         return tuple(change for change, made in changes.items() if made)
 

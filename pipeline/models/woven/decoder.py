@@ -126,7 +126,7 @@ def encode_patch(
 
 
 class Decoder(nn.Module):
-    """Latents and patches to network space: 86,660 parameters at the default widths, and 8,192 filters if `local`."""
+    """Latents and patches to network space; the filters of `local` are 8,192 parameters at the default widths."""
 
     def __init__(self, options: WovenOptions) -> None:
         super().__init__()
@@ -143,8 +143,8 @@ class Decoder(nn.Module):
             self.seen: Tensor
         self.fusion: nn.ModuleList | None = None
         if options.spatial_fusion:
-            layers = [nn.Linear(hidden, hidden), nn.Linear(hidden, _FUSED), nn.Linear(_FUSED + _DIRECTIONS, hidden)]
-            self.fusion = nn.ModuleList(layers)
+            deeper = [nn.Linear(hidden, hidden)] if options.extra_layer == "fusion" else []
+            self.fusion = nn.ModuleList([*deeper, nn.Linear(hidden, _FUSED), nn.Linear(_FUSED + _DIRECTIONS, hidden)])
         self.mix = Residual(hidden)
         self.narrow = nn.Linear(hidden, _FUSED)
         self.last = nn.Linear(_FUSED, 5 if options.transmission else 4)
@@ -175,8 +175,9 @@ class Decoder(nn.Module):
             x = torch.baddbmm(x, where, responses)
         x = activate(x)
         if self.fusion is not None:
-            deeper, narrow, angular = self.fusion
-            x = activate(narrow(activate(deeper(x))))
+            *spatial, angular = self.fusion
+            for layer in spatial:
+                x = activate(layer(x))
             x = activate(angular(torch.cat([x, directions], dim=-1)))
         x = activate(self.narrow(self.mix(x)))
         return activate(self.last(x))

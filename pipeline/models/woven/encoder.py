@@ -5,7 +5,7 @@ and begins at a random yarn in every training step: both are options.
 
 Residual convolutions, padded around the repeat, halve the maps four times; fully connected layers join them with the
 yarns' parameters. With `one_blob = "local"` it gives a picture of the repeat as well, bins x bins numbers, and the
-latent is then the same wherever the repeat begins. The published encoder of the maps is larger.
+latent is then the same wherever the repeat begins. The paper's encoder of the maps is larger.
 """
 
 from __future__ import annotations
@@ -122,6 +122,7 @@ class Encoder(nn.Module):
         flat = channels[-1] if self.local else channels[-1] * (options.map_texels // 16) ** 2
         self.flat = nn.Linear(flat, options.latent)
         self.join = nn.Linear(options.latent + (7 if options.transmission else 4), options.hidden)
+        self.deeper = nn.Linear(options.hidden, options.hidden) if options.extra_layer == "encoder" else None
         self.mix = Residual(options.hidden)
         self.last = nn.Linear(options.hidden, options.latent)
         if self.local:
@@ -139,6 +140,8 @@ class Encoder(nn.Module):
         # What lies where is the picture's part, if there is one; the rest is then the same wherever the repeat begins.
         x = finer[-1].mean(dim=(2, 3)) if self.local else finer[-1].flatten(1)
         x = activate(self.join(torch.cat([activate(self.flat(x)), parameters], dim=-1)))
+        if self.deeper is not None:
+            x = activate(self.deeper(x))
         x = activate(self.last(self.mix(x)))
         if self.local:
             picture = functional.adaptive_avg_pool2d(self.picture(finer[self.depth]), self.bins)

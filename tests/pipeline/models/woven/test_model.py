@@ -24,6 +24,7 @@ TWILL = load_fabric("cotton_twill")
     ("changes", "more", "picture"),
     [
         ({"one_blob": "plain"}, 0, 0),
+        ({"one_blob": "plain", "extra_layer": "encoder"}, -128 * 129, 0),
         ({"one_blob": "periodic"}, 0, 0),
         ({"one_blob": "local"}, 64 * 128, 64),
         # The first layer alone changes: 3 numbers enter it in place of 24.
@@ -31,11 +32,20 @@ TWILL = load_fabric("cotton_twill")
         ({"one_blob": "periodic", "spatial_fusion": False}, 94 * 128 + 129 * (128 + 128 + 64) + 65 * 4 - 86_660, 0),
     ],
 )
-def test_decoder_stores_the_published_bytes(changes, more, picture):
+def test_parameters_and_bytes_of_the_decoder(changes, more, picture):
     """0.35 MB with the latent; a picture costs its filters and itself."""
     network = WovenNetwork(WovenOptions(**changes))
     assert network.architecture()["parameters"]["decoder"] == 86_660 + more
     assert Woven(network).bytes_stored(TWILL) == 4 * (86_660 + more + 64 + picture)
+
+
+@pytest.mark.parametrize(("place", "decoder", "joined"), [("fusion", 86_660, 50_112), ("encoder", 70_148, 66_624)])
+def test_both_readings_of_the_paper_have_their_counts(place, decoder, joined):
+    network = WovenNetwork(WovenOptions(one_blob="plain", extra_layer=place))
+    assert network.architecture()["parameters"]["decoder"] == decoder
+    of_maps = ("maps", "flat", "picture")
+    parts = [p for name, p in network.encoder.named_parameters() if not name.startswith(of_maps)]
+    assert sum(p.numel() for p in parts) == joined
 
 
 def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size():
