@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from jobs.terminal import Terminal, print_lines
-from jobs.verbs.parameters import NOTHING, FabricName, Local, given
+from jobs.verbs.parameters import FabricName, Local, given
 from pipeline.atomic import atomic_write
 from reports.exports.export import export
 from weaves.draft_files.read import DraftThreads, cut_out, read_draft
@@ -28,6 +28,32 @@ class YarnFlags:
     bend: Annotated[float | None, Parameter(help="Largest inclination along a float, degrees.")] = None
     twist: Annotated[float | None, Parameter(help="Angle of the fibres to the yarn's axis, degrees.")] = None
     roughness: Annotated[float | None, Parameter(help="Roughness of the fibres.")] = None
+
+
+@dataclass(frozen=True)
+class ShaderFlags:
+    """Choices of a shader on the command line."""
+
+    model: Annotated[
+        str | None, Parameter(help="Of a shader: soft_nodes (default), selvage, or the folder of a trained neumip.")
+    ] = None
+    level: Annotated[int | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None
+    language: Annotated[
+        list[str],
+        Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),
+    ] = field(default_factory=list)
+    kind: Annotated[
+        list[str],
+        Parameter(help="Of a shader: behind, curvature or all, beside light and viewer in front of flat cloth."),
+    ] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class BsdfFlags:
+    """Choices of a BSDF on the command line."""
+
+    solar: Annotated[str | None, Parameter(help="Of a BSDF: the same fabric in the colours of the solar band.")] = None
+    points: Annotated[int | None, Parameter(help="Of a BSDF: points of a pair of patches, a power of two; 4.")] = None
 
 
 def import_draft(
@@ -77,36 +103,33 @@ def export_fabric(
     wif: Annotated[Local | None, Parameter(help="Draft file for weaving programs to write, ending in .wif.")] = None,
     maps: Annotated[Local | None, Parameter(help="Folder of texture maps and materials to write.")] = None,
     shader: Annotated[Local | None, Parameter(help="Folder of a shader with its tables to write.")] = None,
+    bsdf: Annotated[Local | None, Parameter(help="BSDF for daylight simulation to write, ending in .xml.")] = None,
     vertices: Annotated[int | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
     repeats: Annotated[int | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
     size: Annotated[int | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None,
-    model: Annotated[
-        str | None, Parameter(help="Of a shader: soft_nodes (default), selvage, or the folder of a trained neumip.")
-    ] = None,
-    level: Annotated[int | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None,
-    language: Annotated[
-        list[str],
-        Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),
-    ] = NOTHING,
-    kind: Annotated[
-        list[str],
-        Parameter(help="Of a shader: behind, curvature or all, beside light and viewer in front of flat cloth."),
-    ] = NOTHING,
+    of_shader: Annotated[ShaderFlags, Parameter(name="*")] = ShaderFlags(),
+    of_bsdf: Annotated[BsdfFlags, Parameter(name="*")] = BsdfFlags(),
 ) -> None:
     """Write a fabric for other programs, and print what was written.
 
     BadInput if not one path is given, or as `reports.exports.export.export`.
     """
-    paths = {"mesh": mesh, "wif": wif, "maps": maps, "shader": shader}
-    options: dict[str, Any] = {"vertices": vertices, "repeats": repeats, "size": size, "model": model, "level": level}
-    options |= {"language": language, "kind": kind}
+    paths = {"mesh": mesh, "wif": wif, "maps": maps, "shader": shader, "bsdf": bsdf}
+    options: dict[str, Any] = {
+        "vertices": vertices,
+        "repeats": repeats,
+        "size": size,
+        **vars(of_shader),
+        **vars(of_bsdf),
+    }
     chosen = {kind: path for kind, path in paths.items() if path is not None}
     if len(chosen) != 1:
-        allowed = "one of --mesh, --wif, --maps and --shader is needed"
+        allowed = "one of --mesh, --wif, --maps, --shader and --bsdf is needed"
         raise BadInput("export", "", " and ".join(f"--{kind}" for kind in chosen) or "nothing", allowed)
     ((what, path),) = chosen.items()
     stated = {key: value for key, value in options.items() if value not in (None, [])}
-    _write("export", fabric, what, path, stated)
+    with Terminal().status(what):
+        _write("export", fabric, what, path, stated)
 
 
 def view(

@@ -24,6 +24,7 @@ class ExportKind(NamedTuple):
 
 
 EXPORTS: Final = {
+    "bsdf": ExportKind("reports.exports.bsdf:write_bsdf", ".xml"),
     "mesh": ExportKind("reports.exports.mesh:write_mesh", ".ply"),
     "wif": ExportKind("reports.exports.export:write_draft", ".wif"),
     "maps": ExportKind("reports.exports.maps:write_maps"),

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from reports.viewer import view
 from tests.reports.viewer.conftest import shown_of
@@ -130,3 +131,16 @@ def test_a_page_of_a_fabric_is_written_whole_and_one_of_a_large_repeat_refused_b
     monkeypatch.setattr(view, "content", lambda fabric, truth: found)
     code, said, _ = twillight("view", "gingham", "--out", "a/x.html")
     assert code == 0 and "5 views" in said and [path.name for path in (tmp_path / "a").iterdir()] == ["x.html"]
+
+
+@pytest.mark.parametrize(
+    ("flags", "allowed"),
+    [
+        (["--points", "3"], "--points = 3: a power of two from 1 to 256 is needed"),
+        (["--solar", "denim"], "--solar = 'denim': has to be the cloth 'voile' in other colours"),
+        (["--level", "2"], "--level = 2: is not for bsdf; leave it out"),
+    ],
+)
+def test_a_bsdf_that_cannot_be_written_gets_one_sentence(twillight, flags, allowed, tmp_path):
+    code, _, complaint = twillight("export", "voile", "--bsdf", "shade.xml", *flags)
+    assert code == 2 and allowed in complaint and not (tmp_path / "shade.xml").exists()

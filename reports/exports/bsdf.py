@@ -1,0 +1,60 @@
+"""A fabric as a BSDF file for daylight simulation: LBNL WINDOW, Radiance, EnergyPlus."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pipeline.atomic import refuse_unwritable
+from pipeline.bsdf.klems_xml import LayerFacts, write_klems
+from pipeline.bsdf.of_fabric import PAIR_POINTS, fabric_bsdf
+from weaves.errors import BadInput
+from weaves.fabric import Fabric, load_fabric
+
+EMISSIVITY_ASSUMED: Final = 0.9
+"""Emissivity of yarns, which no fabric states: that of textiles."""
+
+THICKNESS_ASSUMED: Final = 5e-4
+"""Thickness in metres of a fabric without `yarns_per_cm`."""
+
+MOST_PAIR_POINTS: Final = 256
+
+
+def write_bsdf(fabric: Fabric, path: Path, solar: str = "", points: int = PAIR_POINTS) -> str:
+    """Write the Klems matrices of a fabric, and return a sentence on them; the sun meets its front, z > 0.
+
+    `solar` names the same cloth in the colours of the solar band; the file has the visible band there without it.
+    `points` are those of a pair of patches, a power of two up to `MOST_PAIR_POINTS`.
+
+    Raises
+    ------
+    BadInput
+        If a number, the path or the other fabric cannot be used.
+    """
+    if points not in {2**k for k in range(MOST_PAIR_POINTS.bit_length())}:
+        raise BadInput("export", "points", points, f"a power of two from 1 to {MOST_PAIR_POINTS} is needed")
+    refuse_unwritable(path)
+    bsdf = fabric_bsdf(fabric, load_fabric(solar) if solar else None, points=points)
+    openness, yarns = float(bsdf.direct[0]), (fabric.warp, fabric.weft)
+    thickness = THICKNESS_ASSUMED
+    if fabric.yarns_per_cm:
+        thickness = sum(0.01 * yarn.width * yarn.relief / n for yarn, n in zip(yarns, fabric.yarns_per_cm, strict=True))
+    write_klems(path, bsdf.scattering, LayerFacts(fabric.name, openness, EMISSIVITY_ASSUMED, thickness))
+    size = "" if fabric.yarns_per_cm else ", thickness (no yarns_per_cm)"
+    bands = "visible and solar" if solar else "visible, which stands for solar too"
+    return (
+        f"{path}: {bsdf.scattering.basis.name}, {bands}; at normal "
+        f"incidence {_facts(bsdf.scattering.hemispherical('visible')[:, :, 0], openness)}. Assumed: emissivity "
+        f"{EMISSIVITY_ASSUMED:g}{size}. Reciprocal: the mean of both ways of light, which differ by up to "
+        f"{bsdf.asymmetry:.0%}"
+    )
+
+
+def _facts(shares: np.ndarray[tuple[int, ...], np.dtype[np.float64]], direct: float) -> str:
+    """Return reflectances and transmittance in words, from (kinds, sides)."""
+    return (
+        f"reflectance {shares[0, 0]:.3f} front and {shares[0, 1]:.3f} back, transmittance {shares[1, 0]:.3f}, of it "
+        f"{direct:.3f} straight through"
+    )

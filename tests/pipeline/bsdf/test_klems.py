@@ -1,0 +1,172 @@
+"""Patches by closed forms; files by a round trip, by other programs (external) and with damage."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.bsdf.klems import BASES, KLEMS_FULL, Scattering
+from pipeline.bsdf.klems_xml import LayerFacts, mirrored, read_klems, write_klems
+from pipeline.bsdf.of_fabric import fabric_bsdf
+from pipeline.scenes.shade import shade
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
+from weaves.colour import LUMINANCE
+from weaves.errors import BadInput
+from weaves.fabric import load_fabric
+
+FACTS = LayerFacts("cloth", 0.05, 0.9, 1e-3)
+QUARTER = BASES["LBNL/Klems Quarter"]
+
+
+def lambertian(basis, reflectance=0.6, transmittance=0.3):
+    shares = np.array([reflectance, transmittance])[:, None, None, None]
+    return Scattering(basis, {"visible": np.broadcast_to(shares / np.pi, (2, 2, basis.patches, basis.patches)).copy()})
+
+
+@pytest.mark.parametrize(("basis", "patches"), [*zip(BASES.values(), (145, 73, 41), strict=True)])
+def test_patches_fill_the_hemisphere_and_turn_with_their_labels(basis, patches):
+    random = np.random.default_rng(1)
+    assert basis.patches == patches and basis.projected_solid_angle.sum() == pytest.approx(np.pi, abs=1e-12)
+    patch, u, v = np.arange(patches), random.random(patches), random.random(patches)
+    label = basis.directions(patch, u, v)
+    assert np.linalg.norm(label, axis=1) == pytest.approx(1.0) and (label[:, 2] >= 0.0).all()
+    assert basis.directions(basis.opposite[1:], u[1:], v[1:]) == pytest.approx(label[1:] * [-1, -1, 1], abs=1e-12)
+    # Exchanged azimuths: the same patch with v mirrored.
+    numbers = np.arange(patches**2, dtype=float).reshape(patches, patches)
+    at = mirrored(basis, numbers)[1:, 1:] % patches
+    there = basis.directions(at[0].astype(int), u[1:], 1.0 - v[1:])
+    assert there == pytest.approx(label[1:] * [-1, 1, 1], abs=1e-12)
+
+
+def test_a_lambertian_layer_has_its_shares_and_is_reciprocal():
+    layer = lambertian(KLEMS_FULL).checked("here")
+    assert layer.hemispherical("visible")[0] == pytest.approx(0.6) and layer.reciprocity("visible").max() == 0.0
+    assert layer.direct("visible") == pytest.approx(
+        np.broadcast_to(0.3 * KLEMS_FULL.projected_solid_angle / np.pi, (2, 145))
+    )
+    layer.bands["visible"][1, 0, 3, 70] *= 1.5
+    assert layer.reciprocity("visible")[2] > 0.0
+    with pytest.raises(BadInput, match=r"visible = 1\.1: .* at most 1\.005"):
+        lambertian(KLEMS_FULL, 0.8).checked("here")
+
+
+@pytest.mark.parametrize("basis", [*BASES.values()])
+def test_what_is_written_is_read(basis, tmp_path):
+    layer = lambertian(basis)
+    layer.bands["visible"][:] *= np.random.default_rng(2).random((2, 2, basis.patches, basis.patches))
+    write_klems(tmp_path / "layer.xml", layer, FACTS)
+    again = read_klems(tmp_path / "layer.xml")
+    assert again.basis == basis and set(again.bands) == {"visible", "solar"}
+    assert again.bands["solar"] == pytest.approx(layer.bands["visible"], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "allowed"),
+    [
+        ("<?xml", "<", "not XML"),
+        ("LBNL/Klems Quarter</ColumnAngleBasis>", "LBNL/Other</ColumnAngleBasis>", "must be that of the rows"),
+        ("<ScatteringData>", "<ScatteringData>1, ", "41 x 41 finite numbers"),
+        ("<ScatteringData>", "<ScatteringData>x, ", "numbers are needed"),
+        ("<ScatteringData>0.", "<ScatteringData>900.", "at most 1.005"),
+        ("<ScatteringData>0.", "<ScatteringData>-0.", "at least 0"),
+        ("<Wavelength unit", "<Wave unit", "not XML"),
+        ("WavelengthData>", "Other>", "no data of a wavelength"),
+        ("<WindowElement ", '<!DOCTYPE a [<!ENTITY b "c">]><WindowElement ', "document type"),
+    ],
+)
+def test_a_damaged_file_gets_one_sentence(old, new, allowed, tmp_path):
+    path = tmp_path / "layer.xml"
+    write_klems(path, lambertian(QUARTER), FACTS)
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(BadInput, match=allowed):
+        read_klems(path)
+    with pytest.raises(BadInput, match="No such file"):
+        read_klems(tmp_path / "missing.xml")
+
+
+@pytest.fixture(scope="module")
+def voile():
+    return fabric_bsdf(load_fabric("voile"), basis=QUARTER, points=1)
+
+
+def test_a_fabric_scatters_what_random_directions_find(voile):
+    """Transmittance and reflectance for light from straight above, against 4,000 random viewers."""
+    random, fabric, count = np.random.default_rng(3), load_fabric("voile"), 4000
+    sine, azimuth = np.sqrt(random.random(count)), 2.0 * np.pi * random.random(count)
+    square, turn = np.sin(np.radians(9.0)) ** 2 * random.random(count), 2.0 * np.pi * random.random(count)
+    shares = voile.scattering.hemispherical("visible")[:, 0, 0] - [0.0, voile.direct[0]]
+    for kind, sign in enumerate((1.0, -1.0)):
+        wo = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), sign * np.sqrt(1.0 - sine**2)], axis=1)
+        wi = np.stack([np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn), np.sqrt(1.0 - square)], axis=1)
+        keep = np.abs(wo[:, 2]) > 0.02  # the truth has no lower views; they are 4e-4 of all
+        queries = Queries.round(*np.zeros((2, count)), np.full(count, 32.0), wi, wo).take(keep)
+        values = np.pi * shade(fabric, estimate(fabric, queries, TruthOptions(), 0).mean, queries) @ LUMINANCE
+        values /= queries.wi[:, 2]
+        error = values.std() / np.sqrt(count)
+        # Both ways differ: the file has their mean.
+        assert abs(values.mean() - shares[kind]) < 4.0 * error + 0.5 * voile.asymmetry * values.mean()
+
+
+def test_a_fabric_is_reciprocal_and_lets_light_through_its_gaps(voile):
+    assert voile.scattering.reciprocity("visible").max() < 1e-12
+    gap = np.prod([1.0 - yarn.width for yarn in (load_fabric("voile").warp, load_fabric("voile").weft)])
+    assert voile.direct[0] > 0.7 * gap and (voile.direct >= 0.0).all()
+    assert voile.scattering.direct("visible")[0, 0] >= voile.direct[0]
+    with pytest.raises(BadInput, match="in other colours"):
+        fabric_bsdf(load_fabric("voile"), load_fabric("denim"))
+
+
+@pytest.mark.external
+def test_radiance_and_pywincalc_read_the_same_numbers(tmp_path, monkeypatch):
+    """`checkBSDF` and `rtrace` of Radiance: a sun on either side, seen from either side, in random patches."""
+    radiance, pywincalc = pytest.importorskip("pyradiance"), pytest.importorskip("pywincalc")
+    monkeypatch.chdir(tmp_path)
+    layer = fabric_bsdf(load_fabric("cotton_twill"), points=1).scattering
+    write_klems(Path("layer.xml"), layer, FACTS)
+    layer = read_klems(Path("layer.xml"))
+    system = pywincalc.GlazingSystem(
+        solid_layers=[pywincalc.parse_bsdf_xml_file("layer.xml")],
+        width_meters=1,
+        height_meters=1,
+        environment=pywincalc.nfrc_shgc_environments(),
+        bsdf_hemisphere=pywincalc.BSDFHemisphere.create(pywincalc.BSDFBasisType.KLEMS_FULL),
+    )
+    front = system.optical_method_results("PHOTOPIC").system_results.front
+    shares = front.reflectance.direct_hemispherical, front.transmittance.direct_hemispherical
+    assert shares == pytest.approx(layer.hemispherical("visible")[:, 0, 0], rel=1e-4)
+
+    home = Path(radiance.__file__).parent
+    environment = os.environ | {"RAYPATH": f".:{home / 'lib'}"}
+
+    def program(name, *arguments, **options):
+        command = [str(home / "bin" / name), *arguments]
+        return subprocess.run(command, env=environment, check=True, capture_output=True, text=True, **options).stdout
+
+    errors = [line.split()[-1] for line in program("checkBSDF", "layer.xml").splitlines()[-3:]]
+    assert [float(error) for error in errors] == [0.0, 0.0, 0.0]
+    # Radiance sees the room from +z, so the fabric is turned around y.
+    random, turned = np.random.default_rng(4), np.array([-1.0, 1.0, -1.0])
+    middle = np.array([0.5])
+    for kind, side in np.ndindex(2, 2):
+        out, into = random.integers(1, 120, 2)
+        lit, seen = (KLEMS_FULL.directions(np.array([patch]), middle, middle)[0] for patch in (into, out))
+        sun = lit * [-1.0, -1.0, 1 - 2 * side] * turned
+        eye = seen * [1.0, 1.0, 1 - 2 * (side ^ kind)] * turned
+        x, y, z = sun
+        Path("scene.rad").write_text(
+            f"void light l 0 0 3 1e6 1e6 1e6\nl source s 0 0 4 {x} {y} {z} .05\nvoid BSDF m 6 0 layer.xml 0 1 0 . 0 0\n"
+            "m polygon p 0 0 12 -1 -1 0 1 -1 0 1 1 0 -1 1 0\n"
+        )
+        Path("scene.oct").write_bytes(
+            subprocess.run(
+                [str(home / "bin" / "oconv"), "scene.rad"], env=environment, check=True, capture_output=True
+            ).stdout
+        )
+        ray = " ".join(f"{number:.9g}" for number in (*(5.0 * eye), *-eye))
+        radiance_seen = float(program("rtrace", "-h", "-w", "-ab", "0", "scene.oct", input=ray).split()[1])
+        irradiance = 1e6 * 2.0 * np.pi * (1.0 - np.cos(np.radians(0.025))) * abs(z)
+        assert radiance_seen / irradiance == pytest.approx(layer.bands["visible"][kind, side, out, into], rel=1e-3)
