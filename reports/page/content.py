@@ -90,3 +90,8 @@ class PageInput:
     pictures: Sequence[PictureFile]
     live: Mapping[str, Path] = field(default_factory=dict)
     """Live page of each fabric that has one, by the fabric's name."""
+
+    @property
+    def own(self) -> list[str]:
+        """Names of the methods from outside the package, which the page leads with."""
+        return [note.name for note in self.models if note.kind == ADDED_MODEL]

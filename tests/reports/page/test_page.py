@@ -76,7 +76,7 @@ def test_the_headline_and_the_front(folder, page):
     """
     for sentence in (
         "Woven reaches 4.5× lower MSE than point sampling at 2 points on the 2 seen fabrics and 4.5× lower MSE on one "
-        "unseen fabric, at 4.3× its time; the paper reports 4.1× at 0.83× on its own scene and GPU.",
+        "unseen fabric, at 4.3× its time; its paper reports 4.1× at 0.83× on its own scene and GPU.",
         "NeuMIP is trained on every fabric by itself",
         "Point sampling at 2 points answers 0 for 15% of the queries",
         "Front of error and time, seen fabrics",
