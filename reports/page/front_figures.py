@@ -1,9 +1,9 @@
 """Plots of errors against costs, both logarithmic, with the Pareto front.
 
 The settings of a method are one curve; its first and last are labelled, and so is the baseline. The broad band is the
-front, a vertical bar the range over trainings. Where `woven` is drawn, the dashed arrow is the ratio of its paper, drawn
-from our baseline: 4.1 times lower MSE, which is 2.0 times lower RMSE, at 0.83 times the time [Chen2024Woven]. Values of
-0 have no place on a logarithmic axis and are left out.
+front, a vertical bar the range over trainings. Where `woven` is drawn, the dashed arrow is the ratio of its paper, from
+our baseline: 4.1 times lower MSE, which is 2.0 times lower RMSE, at 0.83 times the time [Chen2024Woven]. Values of 0
+have no place on a logarithmic axis and are left out.
 """
 
 from __future__ import annotations

@@ -132,6 +132,7 @@ def _options(page: PageInput) -> dict[str, object]:
         "width": scenes.size[0],
         "height": scenes.size[1],
         "scene_frames": scenes.frames,
+        **dict(zip(("picture_width", "picture_height"), scenes.picture_size or (), strict=False)),
         "film_frames": min(scenes.frames, SHOWN),
         "diameter": f"{2 * options.edge.radius:g}",
         "depth": f"{options.edge.depth:g}",
@@ -144,7 +145,7 @@ def _options(page: PageInput) -> dict[str, object]:
 
 
 def _headlines(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> list[str]:
-    """Return a sentence for each method from outside and each learnt one, published ones before those of the package."""
+    """Return a sentence for each method from outside, then for each learnt one, published ones first."""
     published = {note.name for note in page.models if note.published}
     untrained = {note.name for note in page.models if not note.learns} - set(page.own)
     keys = learnt(frames["errors"], untrained)
@@ -156,7 +157,7 @@ def _headlines(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> list[str]
 def _pictures(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
     """Return fabrics, and the pictures of fabrics and scenes in their order."""
     views = strips(
-        page.pictures,
+        page.shown,
         {fabric.name: role for fabric, role in page.fabrics},
         [*page.options.views, *page.options.scenes.names],
         [frames["pictures"], scene_table(first_training(page.records))],

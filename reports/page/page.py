@@ -99,8 +99,8 @@ def _plots(frames: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[s
 
 def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
     """Draw every picture, every difference, every strip of frames, and the maps of every fabric."""
-    truths = {(p.fabric, p.scene): read_exr(p.path) for p in page.pictures if p.method == TRUTH}
-    for file in page.pictures:
+    truths = {(p.fabric, p.scene): read_exr(p.path) for p in page.shown if p.method == TRUTH}
+    for file in page.shown:
         exr = truths[file.fabric, file.scene] if file.method == TRUTH else read_exr(file.path)
         yield f"{file.stem}.png", tiles.picture(exr)
         if file.method != TRUTH and file.fabric:

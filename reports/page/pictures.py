@@ -74,7 +74,7 @@ def strips(
     methods : sequence of ModelNote
         Kinds of the methods.
     """
-    kinds = {note.name: note.kind for note in methods}
+    kinds = {note.name: note.kind or note.name for note in methods}
     mse = {
         (getattr(row, "fabric", ""), row.scene, row.method, row.setting): row.mse
         for table in errors
@@ -109,8 +109,9 @@ def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
     first ones stay, and the baseline.
     """
     result: dict[str, list[PictureFile]] = {}
-    for scene in dict.fromkeys(file.scene for file in pictures if not file.fabric):
-        own = sorted((f for f in pictures if not f.fabric and f.scene == scene), key=lambda f: f.method != TRUTH)
+    pictures = [file for file in pictures if not file.fabric and not file.larger]
+    for scene in dict.fromkeys(file.scene for file in pictures):
+        own = sorted((f for f in pictures if f.scene == scene), key=lambda f: f.method != TRUTH)
         once = list({file.method: file for file in reversed(own)}.values())[::-1]
         once.sort(key=own.index)
         wanted = sorted(once, key=lambda file: file.method != TRUTH and (file.method, file.setting) != BASELINE)

@@ -13,7 +13,7 @@ from reports.measure.by_size import SIZES, WHOLE
 from reports.over_seeds import LEAST, MOST, trainings
 from reports.record import TRUTH, Record
 from reports.tables.number_format import NO_BREAK, NONE, display, listed, percent, plain, shown, significant, times
-from reports.tables.summary import BASELINE, PAPER, of_baseline, over_unseen, parts_of, rows, unranged
+from reports.tables.summary import BASELINE, OF_PAPER, PAPER, of_baseline, over_unseen, parts_of, rows, unranged
 from reports.tables.tradeoff import FAULTS, LIMITS, Fault, cheapest
 
 BOUNDED: Final = "bounded"
@@ -246,7 +246,9 @@ def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Collect
     motion = [record.value for record in records if record.metric == "motion"]
     truth = [record.value for record in records if record.metric == "truth_relative_error"]
     share = waited(records)
+    methods = set(errors["method"]) if len(errors) else set()
     known = {
+        "paper_of": {OF_PAPER, BASELINE[0]} <= methods and display(OF_PAPER),
         "trainings": max(trainings(records).values(), default=0) > 1 and max(trainings(records).values()),
         "once": once and listed(once),
         "several": several and listed(several),

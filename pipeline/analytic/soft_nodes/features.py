@@ -1,4 +1,4 @@
-"""Features of a query for a network, with light in front; components by the soft nodes alone, with light on either side.
+"""Features of a query for a network, light in front; components by the soft nodes alone, light in front or behind.
 
 Ratios and bounded numbers only. Mirror images of a query, x -> -x and y -> -y, are the same query of a mirrored cloth:
 the half vector is brought to x, y >= 0, and what remains of the cloth is the sense of its twists. Exchanging x and y
