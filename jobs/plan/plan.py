@@ -12,7 +12,7 @@ from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.measurements.fabrics import ErrorsBySize, OfAddedMetric, OnFabric, OnUnseenPopulation, TruthNoise
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.models import AtExtremes, Latents
-from jobs.plan.measurements.scenes import FrameTime, OnScene, SceneShot
+from jobs.plan.measurements.scenes import FrameTime, LargerPicture, LargerShot, OnScene, SceneShot
 from jobs.plan.measurements.studies import Study
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.measurements.timing import TimeOfMethods
@@ -32,6 +32,8 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     Latents,
     SceneShot,
     OnScene,
+    LargerShot,
+    LargerPicture,
     FrameTime,
     AtExtremes,
     TimeOfMethods,

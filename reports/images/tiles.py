@@ -20,6 +20,7 @@ import matplotlib as mpl
 import matplotlib.image
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from reports.images.exr import RGB, Exr
 from weaves.colour import LUMINANCE, linear_rgb
@@ -164,6 +165,11 @@ def png(rgba: Bytes8, scale: int = SCALE) -> bytes:
     metadata: Any = {"Software": None}  # else the bytes change with matplotlib's version
     matplotlib.image.imsave(buffer, enlarged, format="png", metadata=metadata)
     return buffer.getvalue()
+
+
+def size_of(png: bytes) -> tuple[int, int]:
+    """Return width and height of a picture in pixels."""
+    return Image.open(io.BytesIO(png)).size
 
 
 Tone = Literal["srgb", "reinhard"]

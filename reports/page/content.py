@@ -58,6 +58,8 @@ class PictureFile:
     """``truth`` for the reference."""
     setting: str
     path: Path
+    larger: bool = False
+    """True for a picture of a scene that is larger than the frames in which methods are measured."""
 
     @property
     def label(self) -> str:
@@ -90,3 +92,14 @@ class PageInput:
     pictures: Sequence[PictureFile]
     live: Mapping[str, Path] = field(default_factory=dict)
     """Live page of each fabric that has one, by the fabric's name."""
+
+    @property
+    def shown(self) -> list[PictureFile]:
+        """The pictures of fabrics, and those of scenes: the larger ones, where a scene has any."""
+        larger = {picture.scene for picture in self.pictures if picture.larger}
+        return [one for one in self.pictures if one.fabric or one.larger == (one.scene in larger)]
+
+    @property
+    def own(self) -> list[str]:
+        """Names of the methods from outside the package, which the page leads with."""
+        return [note.name for note in self.models if note.kind == ADDED_MODEL]

@@ -25,8 +25,10 @@ from reports.tables.number_format import display
 from reports.tables.summary import BASELINE, rows
 
 DPI: Final = 200
-NARROWEST_PLOT: Final = 8.6
-"""Least width of plots in inches: the page shows every plot as wide as its column."""
+NARROWEST_PLOT: Final = 7.6
+"""Least width of plots in inches: the legend needs it."""
+ROW: Final = 0.22
+"""Height of a method's row, in inches."""
 
 _ROLES: Final = ("seen", "unseen")
 _MOST_DECADES: Final = 5  # whose labels fit under half a figure
@@ -92,7 +94,7 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
     roles = [role for role in _ROLES if role in set(table["role"])]
     places = _places(table)
     figure, panels = new_figure(
-        max(4.6 * len(roles), NARROWEST_PLOT), 1.1 + 0.28 * _height(places), len(roles), sharey=True
+        max(4.6 * len(roles), NARROWEST_PLOT), 1.1 + ROW * _height(places), len(roles), sharey=True
     )
     colours = scheme.colours(table["method"])
     for axes, role in zip(panels, roles, strict=True):
@@ -119,7 +121,7 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
 def aliasing(scheme: Scheme, table: pd.DataFrame) -> Figure:
     """Draw flicker and excess energy of every method; 0 is the truth."""
     places = _places(table)
-    figure, panels = new_figure(9.2, 1.1 + 0.28 * _height(places), 2, sharey=True)
+    figure, panels = new_figure(9.2, 1.1 + ROW * _height(places), 2, sharey=True)
     colours = scheme.colours(table["method"])
     columns = {"flicker": "Flicker", "excess_energy": "Excess energy at high frequencies"}
     for axes, (column, title) in zip(panels, columns.items(), strict=True):
@@ -211,7 +213,7 @@ def _apart(places: Sequence[float], step: float, high: float) -> list[float]:
 def timing(scheme: Scheme, table: pd.DataFrame) -> Figure:
     """Draw the time of a query: median and quartiles."""
     places = _places(table)
-    figure, (axes,) = new_figure(9.2, 1.0 + 0.28 * _height(places))
+    figure, (axes,) = new_figure(9.2, 1.0 + ROW * _height(places))
     colours = scheme.colours(table["method"])
     for measured in rows(table):
         colour, row = colours[measured.method], places[measured.method, measured.setting]

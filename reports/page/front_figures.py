@@ -1,9 +1,9 @@
 """Plots of errors against costs, both logarithmic, with the Pareto front.
 
 The settings of a method are one curve; its first and last are labelled, and so is the baseline. The broad band is the
-front, a vertical bar the range over trainings. The dashed arrow is the ratio of the paper, drawn from our baseline: 4.1
-times lower MSE, which is 2.0 times lower RMSE, at 0.83 times the time [Chen2024Woven]. Values of 0 have no place on a
-logarithmic axis and are left out.
+front, a vertical bar the range over trainings. Where `woven` is drawn, the dashed arrow is the ratio of its paper, from
+our baseline: 4.1 times lower MSE, which is 2.0 times lower RMSE, at 0.83 times the time [Chen2024Woven]. Values of 0
+have no place on a logarithmic axis and are left out.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from reports.page.colours import Scheme
 from reports.page.figures import NARROWEST_PLOT, new_figure
 from reports.page.labels import Label, place_labels
 from reports.tables.number_format import display, size
-from reports.tables.summary import PAPER, front, of_baseline, rows
+from reports.tables.summary import OF_PAPER, PAPER, front, of_baseline, rows
 
 _ROLES: Final = ("seen", "unseen")
 _LEGEND_COLUMNS: Final = 5
@@ -89,7 +89,7 @@ def _by_role(
     table = table[(table["x"] > 0) & (table["y"] > 0)]
     roles = [role for role in _ROLES if role in set(table["role"])]
     colours = scheme.colours(table["method"])
-    paper = paper and bool(of_baseline(table).any())
+    paper = paper and _with_paper(table)
     height = 4.5 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
     figure, panels = new_figure(max(4.9 * len(roles), NARROWEST_PLOT), height, len(roles), sharey=True)
     labels: list[Label] = []
@@ -105,7 +105,7 @@ def _by_role(
         axes.margins(0.12)
         _tick(axes.xaxis, axes.get_xlim(), lambda value: f"{value:,.0f}")
     panels[0].set_ylabel(error)
-    _legend(figure, scheme, colours, f"the paper: {math.sqrt(PAPER[0]):.1f}× lower" if paper else "")
+    _legend(figure, scheme, colours, math.sqrt(PAPER[0]) if paper else math.nan)
     place_labels(figure, labels, scheme)
     return figure
 
@@ -142,7 +142,7 @@ def _against_time(
                     settings["x"], settings["y"], color=colours[str(method)], marker=scheme.marker(str(method)),
                     markersize=4.5, linewidth=1.1,
                 )  # fmt: skip
-            for row in rows(own[of_baseline(own)]) if measure == paper else ():
+            for row in rows(own[of_baseline(own)]) if measure == paper and _with_paper(table) else ():
                 _paper_arrow(axes, scheme, (row.x, row.y), PAPER[0])
             axes.set(xscale="log", yscale="log", title="" if place else title)
             _tick(axes.yaxis, axes.get_ylim(), worded, 8)
@@ -150,7 +150,7 @@ def _against_time(
             axes.xaxis.set_minor_formatter(NullFormatter())
         line[0].set_ylabel(label)
     grid[-1, len(panels) // 2].set_xlabel(axis)
-    _legend(figure, scheme, colours, f"the paper: {PAPER[0]}× lower" if paper and of_baseline(table).any() else "")
+    _legend(figure, scheme, colours, PAPER[0] if paper and _with_paper(table) else math.nan)
     return figure
 
 
@@ -171,11 +171,16 @@ def _tick(axis: Axis, limits: tuple[float, float], worded: Callable[[float], str
     axis.set_minor_locator(NullLocator())
 
 
-def _legend(figure: Figure, scheme: Scheme, colours: Mapping[str, str], paper: str) -> None:
-    """Draw one legend for all panels: colour and mark of every method, and the paper's arrow."""
+def _with_paper(table: pd.DataFrame) -> bool:
+    """Return whether the method of the paper is drawn, and the baseline from which its arrow starts."""
+    return OF_PAPER in set(table["method"]) and bool(of_baseline(table).any())
+
+
+def _legend(figure: Figure, scheme: Scheme, colours: Mapping[str, str], lower: float) -> None:
+    """Draw one legend for all panels: colour and mark of every method, and the paper's arrow unless it is NaN."""
     handles = [Line2D([], [], color=colours[name], marker=scheme.marker(name), label=display(name)) for name in colours]
-    if paper:
-        step = f"{paper} at {PAPER[1]}× the time"
+    if math.isfinite(lower):
+        step = f"{display(OF_PAPER)} in its paper: {lower:.1f}× lower at {PAPER[1]}× the time"
         handles.append(Line2D([], [], color=scheme.muted, linestyle=(0, (3, 2)), label=step))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(_LEGEND_COLUMNS, len(handles)), fontsize=9)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 import pandas as pd
@@ -18,25 +18,35 @@ from reports.over_seeds import first_training
 from reports.page.alt_texts import alt_texts
 from reports.page.colours import DARK, LIGHT, Scheme
 from reports.page.content import PageInput
+from reports.page.figures import DPI
 from reports.page.pictures import SHOWN, films, strips
 from reports.record import TRUTH
 from reports.tables.number_format import display, plain
 from reports.tables.page_tables import ranged_frames, sections
-from reports.tables.sentences import headline, lacking, learnt, scene_sentences, trade
-from reports.tables.summary import scene_table
+from reports.tables.sentences import headline, lacking, learnt, own_figures, scene_sentences, trade
+from reports.tables.summary import OF_PAPER, scene_table
 from reports.tables.table import WORDS
 from weaves.fabric import Fabric
 
 ALWAYS: Final = frozenset({"fabrics", "made", "columns", "limits"})
 """Sections that every page has; the others are left out where nothing was measured."""
 
+FIRST_SIGHT: Final = frozenset({"trade", "error", "pictures", "live", "scenes"})
+"""Sections that are open from the start."""
+
 OPEN_ROWS: Final = 15
 """Rows of the longest table that is open from the start."""
+
+PLOT_SCALE: Final = 108 / DPI
+"""Pixels of the page, at most, for one of a plot: letters are as large as those of the text."""
+
+FIRST_CELLS: Final = 7
+"""Pictures of a view that are shown from the start: a line of the page."""
 
 _MOST_CHIPS: Final = 8  # different colours shown of a yarn's threads
 
 
-def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], plots: Collection[str]) -> str:
+def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], sizes: Mapping[str, tuple[int, int]]) -> str:
     """Return the HTML of a page.
 
     Parameters
@@ -45,22 +55,28 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], plots: Collec
         Its content.
     frames : mapping
         From `reports.tables.page_tables.page_frames`; those of `ranged_frames` are shown.
-    plots : collection of str
-        Names of the plots that were drawn.
+    sizes : mapping
+        Width and height, in pixels, of every picture and plot in ``figures``.
     """
     per_material = [note.name for note in page.models if note.per_material]
     every = sections(page.records, frames, _options(page), per_material)
     ranged = ranged_frames(frames)
     lead, figures = trade(ranged["tradeoff"])
+    headlines = _headlines(page, ranged)
+    if page.own and headlines:
+        lead, *headlines = [headlines[0], lead, *headlines[1:]]
+        figures = [*own_figures(page.own[0], ranged["errors"], ranged["timing"]), *figures[-1:]]
     content = {
         "page": page,
         "lead": lead,
-        "headlines": _headlines(page, ranged),
+        "headlines": list(filter(None, headlines)),
         "figures": figures,
+        "paper_of": OF_PAPER in {note.name for note in page.models},
         "scene_sentences": scene_sentences(frames["scenes"]),
         "limits": [*every["limits"].intro, *lacking(page.records)],
         "live": {fabric: plain(fabric) for fabric in page.live},
-        "plots": plots,
+        "sizes": sizes,
+        "plot_scale": PLOT_SCALE,
         "plot_words": WORDS["plots"],
         "alt_texts": alt_texts(ranged),
         "definitions": {row.title: row.definition for row in METRICS.values() if row.definition} | WORDS["definitions"],
@@ -68,6 +84,8 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], plots: Collec
         "display": display,
         "frame_names": sorted(frames),
         "open_rows": OPEN_ROWS,
+        "first_sight": FIRST_SIGHT,
+        "first_cells": FIRST_CELLS,
         **_pictures(page, frames),
     }
     shown = [
@@ -114,6 +132,7 @@ def _options(page: PageInput) -> dict[str, object]:
         "width": scenes.size[0],
         "height": scenes.size[1],
         "scene_frames": scenes.frames,
+        **dict(zip(("picture_width", "picture_height"), scenes.picture_size or (), strict=False)),
         "film_frames": min(scenes.frames, SHOWN),
         "diameter": f"{2 * options.edge.radius:g}",
         "depth": f"{options.edge.depth:g}",
@@ -126,23 +145,23 @@ def _options(page: PageInput) -> dict[str, object]:
 
 
 def _headlines(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> list[str]:
-    """Return a sentence for each learnt method, published ones first; the first `woven` quotes its paper."""
+    """Return a sentence for each method from outside, then for each learnt one, published ones first."""
     published = {note.name for note in page.models if note.published}
-    untrained = {note.name for note in page.models if not note.learns}
+    untrained = {note.name for note in page.models if not note.learns} - set(page.own)
     keys = learnt(frames["errors"], untrained)
-    keys.sort(key=lambda key: key[0] not in published)
-    quoting = next((note.name for note in page.models if (note.kind or note.name) == "woven"), "")
-    sentences = [headline(*key, frames["errors"], frames["timing"], paper=key[0] == quoting) for key in keys]
+    keys.sort(key=lambda key: (key[0] not in page.own, key[0] not in published))
+    sentences = [headline(*key, frames["errors"], frames["timing"], paper=key[0] == OF_PAPER) for key in keys]
     return [text for text in sentences if text]
 
 
 def _pictures(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
     """Return fabrics, and the pictures of fabrics and scenes in their order."""
     views = strips(
-        page.pictures,
+        page.shown,
         {fabric.name: role for fabric, role in page.fabrics},
         [*page.options.views, *page.options.scenes.names],
         [frames["pictures"], scene_table(first_training(page.records))],
+        page.models,
     )
     return {
         "fabrics": [fabric_card(fabric, role) for fabric, role in page.fabrics],
@@ -164,8 +183,10 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
     for family, yarn, threads in families:
         numbers = [f"{yarn.bend:.3g}°", f"{yarn.twist:.3g}°".replace("-", "−")]
         numbers += [f"{value:.3g}" for value in (yarn.roughness, yarn.relief, yarn.width)]
-        colours = [(kind, shown) for kind in ("diffuse", "specular") for shown in _chips(getattr(threads, kind))]
-        yarns.append({"family": family, "cells": numbers, "colours": colours})
+        chips = {kind: _chips(getattr(threads, kind)) for kind in ("diffuse", "specular")}
+        colours = [(kind, shown) for kind, every in chips.items() for shown in every[:_MOST_CHIPS]]
+        more = sum(map(len, chips.values())) - len(colours)
+        yarns.append({"family": family, "cells": numbers, "colours": colours, "more": more})
     return {
         "name": fabric.name,
         "title": plain(fabric.name),
@@ -179,4 +200,4 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
 
 def _chips(threads: Float64) -> list[str]:
     """Return the different colours of some threads (n, 3) as they are shown, in their order."""
-    return list(dict.fromkeys(hex_colour((EXPOSURE * rgb).tolist()) for rgb in threads))[:_MOST_CHIPS]
+    return list(dict.fromkeys(hex_colour((EXPOSURE * rgb).tolist()) for rgb in threads))

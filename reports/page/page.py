@@ -7,6 +7,7 @@ the page last: a page that exists is whole.
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -50,22 +51,20 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         write_table(folder / "tables" / name, frame)
         written += [f"tables/{name}.csv", f"tables/{name}.parquet"]
     progress(0.1)
-    images = dict(_plots(ranged_frames(frames), page))
-    for name, content in images.items():
+    sizes: dict[str, tuple[int, int]] = {}
+    expected = 18 + 3 * len(page.pictures) + 3 * len(page.fabrics)
+    for name, content in itertools.chain(_plots(ranged_frames(frames), page), _tiles(page)):
         atomic_write(folder / "figures" / name, content)
         written.append(f"figures/{name}")
-    progress(0.4)
-    for done, (name, content) in enumerate(_tiles(page)):
-        atomic_write(folder / "figures" / name, content)
-        written.append(f"figures/{name}")
-        progress(0.4 + 0.6 * min(1.0, (done + 1) / (3 * len(page.pictures) + 3 * len(page.fabrics) + 1)))
+        sizes[name] = tiles.size_of(content)
+        progress(0.1 + 0.9 * min(1.0, len(sizes) / expected))
     for fabric, path in page.live.items():
         atomic_write(folder / "live" / f"{fabric}.html", path.read_bytes())
         written.append(f"live/{fabric}.html")
     write_records(folder / OF_A_PAGE, page.records, page.machine)
     write_files(folder, written)
     index = folder / "index.html"
-    atomic_write(index, page_html(page, frames, {name.removesuffix("-light.png") for name in images}).encode())
+    atomic_write(index, page_html(page, frames, sizes).encode())
     return index
 
 
@@ -100,8 +99,8 @@ def _plots(frames: dict[str, pd.DataFrame], page: PageInput) -> Iterator[tuple[s
 
 def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
     """Draw every picture, every difference, every strip of frames, and the maps of every fabric."""
-    truths = {(p.fabric, p.scene): read_exr(p.path) for p in page.pictures if p.method == TRUTH}
-    for file in page.pictures:
+    truths = {(p.fabric, p.scene): read_exr(p.path) for p in page.shown if p.method == TRUTH}
+    for file in page.shown:
         exr = truths[file.fabric, file.scene] if file.method == TRUTH else read_exr(file.path)
         yield f"{file.stem}.png", tiles.picture(exr)
         if file.method != TRUTH and file.fabric:

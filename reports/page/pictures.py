@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from pipeline.models.added.added_code import ADDED_MODEL
 from reports.images.tiles import EXPOSURE, encoded, png
-from reports.page.content import PictureFile
+from reports.page.content import ModelNote, PictureFile
 from reports.record import TRUTH
 from reports.tables.number_format import beyond_noise, display, scientific
 from reports.tables.summary import BASELINE, rows
@@ -50,9 +51,15 @@ class Strip:
 
 
 def strips(
-    pictures: Sequence[PictureFile], order: Mapping[str, str], scenes: Sequence[str], errors: Sequence[pd.DataFrame]
+    pictures: Sequence[PictureFile],
+    order: Mapping[str, str],
+    scenes: Sequence[str],
+    errors: Sequence[pd.DataFrame],
+    methods: Sequence[ModelNote] = (),
 ) -> list[Strip]:
     """Return the views of the fabrics, then the scenes.
+
+    In each the truth stands first, then the methods from outside, the first picture of each other kind, and the rest.
 
     Parameters
     ----------
@@ -64,20 +71,35 @@ def strips(
         Views and scenes in their order.
     errors : sequence of DataFrame
         From `summary.picture_table` and `summary.scene_table`: the MSE that stands beside a picture.
+    methods : sequence of ModelNote
+        Kinds of the methods.
     """
+    kinds = {note.name: note.kind or note.name for note in methods}
     mse = {
         (getattr(row, "fabric", ""), row.scene, row.method, row.setting): row.mse
         for table in errors
         for row in rows(table)
     }
     views: dict[tuple[str, str], Strip] = {}
-    for file in sorted(pictures, key=lambda file: file.method != TRUTH):
+    for file in sorted(pictures, key=lambda file: (file.method != TRUTH, kinds.get(file.method) != ADDED_MODEL)):
         strip = views.setdefault((file.fabric, file.scene), Strip(file.fabric, file.scene, order.get(file.fabric, "")))
         value = mse.get((file.fabric, file.scene, file.method, file.setting), math.nan)
         cell = {"stem": file.stem, "method": file.method, "label": display(file.method, file.setting)}
         strip.cells.append(cell | {"mse": beyond_noise(value, scientific)})
+    for strip in views.values():
+        strip.cells[:] = _first_of_each_kind(strip.cells, kinds)
     fabrics, places = ({name: index for index, name in enumerate(names)} for names in (order, dict.fromkeys(scenes)))
     return sorted(views.values(), key=lambda s: (fabrics.get(s.fabric, len(fabrics)), places.get(s.scene, len(places))))
+
+
+def _first_of_each_kind(cells: Sequence[dict[str, str]], kinds: Mapping[str, str]) -> list[dict[str, str]]:
+    """Return cells with the first one of each kind in front; methods from outside are kinds of their own."""
+    first, others, met = [], [], set()
+    for cell in cells:
+        kind = kinds.get(cell["method"], cell["method"])
+        (others if kind in met - {ADDED_MODEL} else first).append(cell)
+        met.add(kind)
+    return first + others
 
 
 def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
@@ -87,8 +109,9 @@ def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
     first ones stay, and the baseline.
     """
     result: dict[str, list[PictureFile]] = {}
-    for scene in dict.fromkeys(file.scene for file in pictures if not file.fabric):
-        own = sorted((f for f in pictures if not f.fabric and f.scene == scene), key=lambda f: f.method != TRUTH)
+    pictures = [file for file in pictures if not file.fabric and not file.larger]
+    for scene in dict.fromkeys(file.scene for file in pictures):
+        own = sorted((f for f in pictures if f.scene == scene), key=lambda f: f.method != TRUTH)
         once = list({file.method: file for file in reversed(own)}.values())[::-1]
         once.sort(key=own.index)
         wanted = sorted(once, key=lambda file: file.method != TRUTH and (file.method, file.setting) != BASELINE)

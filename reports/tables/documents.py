@@ -96,9 +96,10 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
             f"Recipe `{provenance.recipe}`, benchmark version {provenance.version}, {machine.cores} cores of "
             f"{machine.cpu}; {held_out['queries'].sum():,} held-out queries of {fabrics} fabrics. "
             "MSE: mean squared error of the colour on seen fabrics. × lower: the MSE of two points over that of the "
-            "method, on seen and on unseen fabrics. Flicker: variance over time beyond that of the truth, over its "
-            "squared mean, on all fabrics. × time: of one query on one thread, over that of two points; times within "
-            "a quarter, because no two runs take equally long. \\* Trained on each fabric that it is measured on. "
+            "method, on seen and on unseen fabrics. Flicker: variance over time beyond that of the truth (below 0: "
+            "less, by blur), over its squared mean, on all fabrics. × time: of one query on one thread, over that of "
+            "two points; times within a quarter, because no two runs take equally long. \\* Trained on each fabric "
+            "that it is measured on. "
             + "On several unseen fabrics: geometric mean, in parentheses its 95 % interval over fabrics. " * several
             + "–: one training, one fabric: no range. " * bool(left_out)
             + _trainings(errors),

@@ -13,7 +13,7 @@ from reports.measure.by_size import SIZES, WHOLE
 from reports.over_seeds import LEAST, MOST, trainings
 from reports.record import TRUTH, Record
 from reports.tables.number_format import NO_BREAK, NONE, display, listed, percent, plain, shown, significant, times
-from reports.tables.summary import BASELINE, PAPER_SAYS, of_baseline, over_unseen, parts_of, rows, unranged
+from reports.tables.summary import BASELINE, OF_PAPER, PAPER_SAYS, of_baseline, over_unseen, parts_of, rows, unranged
 from reports.tables.tradeoff import FAULTS, LIMITS, Fault, cheapest
 
 BOUNDED: Final = "bounded"
@@ -48,6 +48,22 @@ def trade(tradeoff: pd.DataFrame) -> tuple[str, list[dict[str, str]]]:
     within = "; ".join(f"within {listed(limits)} error: {name}" for name, limits in reached.items())
     where = _fabrics(base.fabrics, base.role)
     return f"A pixel of two random points has an error of {worst} on {where}. Cheapest {within}.", figures
+
+
+def own_figures(method: str, errors: pd.DataFrame, timing: pd.DataFrame) -> list[dict[str, str]]:
+    """Return the figures of a method from outside, in its first setting: × lower, error of the colour, and × time."""
+    own = next(rows(errors[errors["method"] == method]), None)
+    if own is None:
+        return []
+    ratios = timing[(timing["method"] == method) & (timing["setting"] == own.setting)]["time_ratio"]
+    lower = not own.ratio < 1
+    figures = {
+        f"{'lower' if lower else 'higher'} MSE than two points": times(own.ratio if lower else 1 / own.ratio),
+        f"error of its colour on {_fabrics(own.fabrics, own.role)}": percent(own.colour_rrmse),
+        "time of a query, in times of two points": times(next(iter(ratios), math.nan)),
+    }
+    name = display(method, own.setting)
+    return [{"value": value, "note": f"{name}: {note}"} for note, value in figures.items() if value != NONE]
 
 
 def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFrame, paper: bool = True) -> str:
@@ -229,7 +245,9 @@ def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Collect
     motion = [record.value for record in records if record.metric == "motion"]
     truth = [record.value for record in records if record.metric == "truth_relative_error"]
     share = waited(records)
+    methods = set(errors["method"]) if len(errors) else set()
     known = {
+        "paper_of": {OF_PAPER, BASELINE[0]} <= methods and display(OF_PAPER),
         "trainings": max(trainings(records).values(), default=0) > 1 and max(trainings(records).values()),
         "once": once and listed(once),
         "several": several and listed(several),

@@ -35,7 +35,10 @@ BASELINE: Final = ("point_sampled", "k = 2")
 """Method and setting of the baseline: point sampling at 2 points [Chen2024Woven]."""
 
 PAPER: Final = (4.1, 0.83)
-"""How much lower the published network's MSE is, and its time relative to the baseline's [Chen2024Woven]."""
+"""How much lower the MSE of the published `woven` is, and its time relative to the baseline's [Chen2024Woven]."""
+
+OF_PAPER: Final = "woven"
+"""The method that the paper of `PAPER` is of."""
 
 PAPER_SAYS: Final = f"the paper reports {PAPER[0]}× at {PAPER[1]}× without our changes, on its own scene and GPU."
 """The same as the end of a sentence on `woven`."""

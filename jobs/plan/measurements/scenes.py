@@ -1,4 +1,4 @@
-"""Measurements in scenes: the truth's frames, the errors of a model in them, the time of a frame."""
+"""Measurements in scenes: the truth's frames, errors of a model in them, larger pictures, the time of a frame."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ class SceneCloth(TaskPart):
     """Angle from u to the weft, in degrees."""
 
 
-class SceneShot(Measurement):
-    """The frames of a scene: queries with the truth's answers, and pictures. All recipes and models share them."""
+class _Shot(Measurement):
+    """Frames of a scene: queries with the truth's answers, and pictures. All recipes and models share them."""
 
-    kind: Literal["scene truth"] = "scene truth"
+    larger: ClassVar = False
     code: ClassVar = ("truth", "fallback", "scenes", "bench", "scene_bench")  # answers of the fallback are stored
     endings: ClassVar = (".npz", ".exr")
     scene: str
@@ -78,12 +78,12 @@ class SceneShot(Measurement):
     @classmethod
     def all(cls, options: SceneBenchOptions) -> list[Self]:
         """Return the shots of a recipe's scenes, in its order."""
-        return [cls.of(name, select(ShotOptions, options)) for name in options.names]
+        raise NotImplementedError
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
         """The truth's frames."""
-        return (PictureFile("", self.scene, "truth", "", Path(self.products[1])),)
+        return (PictureFile("", self.scene, "truth", "", Path(self.products[1]), self.larger),)
 
     @property
     def fabrics(self) -> list[str]:
@@ -107,10 +107,36 @@ class SceneShot(Measurement):
         write_truth(read_shot(shot), picture)
 
 
-class OnScene(Measurement):
+class SceneShot(_Shot):
+    """The frames in which methods are measured."""
+
+    kind: Literal["scene truth"] = "scene truth"
+
+    @classmethod
+    def all(cls, options: SceneBenchOptions) -> list[Self]:
+        """Return the shots of a recipe's scenes, in its order."""
+        return [cls.of(name, select(ShotOptions, options)) for name in options.names]
+
+
+class LargerShot(_Shot):
+    """The first frame for the larger pictures of the page."""
+
+    kind: Literal["scene picture truth"] = "scene picture truth"
+    larger: ClassVar = True
+
+    @classmethod
+    def all(cls, options: SceneBenchOptions) -> list[Self]:
+        """Return the shots of a recipe's scenes, in its order; none if it wants no larger pictures."""
+        if options.picture_size is None:
+            return []
+        first = {"size": options.picture_size, "frames": 1}
+        return [cls.of(name, select(ShotOptions, options).model_copy(update=first)) for name in options.names]
+
+
+class _OnShot(Measurement):
     """One setting of a model on one scene: a change of one setting repeats no other measurement."""
 
-    kind: Literal["scene errors"] = "scene errors"
+    shots: ClassVar[type[_Shot]]
     code: ClassVar = ("fallback", "bench", "scene_bench")
     scene: str
     shot: Made
@@ -129,19 +155,21 @@ class OnScene(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a scene, model that answers for its cloths, seed and setting; pictures are of the first seed."""
         bench = subjects.recipe.bench
-        for shot in SceneShot.all(bench.scenes):
+        for shot in cls.shots.all(bench.scenes):
             for model, trained in subjects.answering(shot.fabrics):
                 for options in trained.options.single():
                     one = trained.model_copy(update={"options": options})
-                    yield cls(
-                        scene=shot.scene,
-                        shot=shot.made,
-                        model=one,
-                        options=select(SceneErrorOptions, bench.scenes),
-                        shown=one.shown(bench.picture_counts) if model.is_first else (),
-                        extent=shot.options.size,
-                        frames=shot.options.frames,
-                    )
+                    shown = one.shown(bench.picture_counts) if model.is_first else ()
+                    if shown or not shot.larger:
+                        yield cls(
+                            scene=shot.scene,
+                            shot=shot.made,
+                            model=one,
+                            options=select(SceneErrorOptions, bench.scenes),
+                            shown=shown,
+                            extent=shot.options.size,
+                            frames=shot.options.frames,
+                        )
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -151,8 +179,8 @@ class OnScene(Measurement):
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
         """The frames of every setting shown."""
-        name = self.model.options.name
-        return tuple(PictureFile("", self.scene, name, setting, self.picture(setting)) for setting in self.shown)
+        subject, larger = ("", self.scene, self.model.options.name), self.shots.larger
+        return tuple(PictureFile(*subject, setting, self.picture(setting), larger) for setting in self.shown)
 
     @property
     def cost(self) -> float:
@@ -161,13 +189,28 @@ class OnScene(Measurement):
         return 0.5 + self.model.seconds(queries, fabrics=3.0)  # tables know light from behind and curved cloth
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
-        """Measure it."""
+        """Measure it; of a larger picture there are no Records."""
         from reports.measure.scene.scene_errors import measure_scene
         from reports.measure.scene.shot import read_shot
 
         methods = self.model.with_fallback(out, self.options.footprint)
         pictures = {setting: out / self.picture(setting) for setting in self.shown}
-        return measure_scene(methods, read_shot(out / self.shot.path), self.options, pictures)
+        records = measure_scene(methods, read_shot(out / self.shot.path), self.options, pictures)
+        return [] if self.shots.larger else records
+
+
+class OnScene(_OnShot):
+    """Errors of one setting of a model in the frames of a scene."""
+
+    kind: Literal["scene errors"] = "scene errors"
+    shots: ClassVar = SceneShot
+
+
+class LargerPicture(_OnShot):
+    """A larger picture of a scene by one setting of a model."""
+
+    kind: Literal["scene picture"] = "scene picture"
+    shots: ClassVar = LargerShot
 
 
 class FrameTime(Measurement):

@@ -1,4 +1,4 @@
-"""Features of a query for a network, and components by the soft nodes alone, light in front or behind.
+"""Features of a query for a network, light in front; components by the soft nodes alone, light in front or behind.
 
 Ratios and bounded numbers only. Mirror images of a query, x -> -x and y -> -y, are the same query of a mirrored cloth:
 the half vector is brought to x, y >= 0, and what remains of the cloth is the sense of its twists. Exchanging x and y
@@ -6,8 +6,8 @@ exchanges warp and weft: that is a permutation of the features and of the compon
 
 The components of a patch hidden almost wholly fade to 0: the truth of most such patches is that nothing at all is seen.
 
-Where walls are most of what is seen, sums are many times the bare ones, which know no walls: shares of these are cut
-off, so that no feature is far from those that a network was trained on.
+Where walls are most of what is seen, sums are many times the bare ones, which know no walls: shares of the bare sums
+are cut off at 2, so that no feature is far from those that a network was trained on.
 
 Each component comes with its value without shadows of the light. That value is a mean of the point model over nodes
 whose weights do not depend on wi; int (w_d <i.n_p> + (1 - w_d) i_z) / pi d(wi) over the viewer's side is at most 1 for
@@ -17,7 +17,7 @@ specular ones, scattered once, stay far below 1 (weaves.yarn).
     0-7, 8-15   of warp, of weft: share of the area seen; how much is seen of the bare area, diffuse and specular; how
                 much of the latter two is in doubt; specular and diffuse component
     16-24       wi, wo; slopes of the half vector; wi.wo
-    25-27       how much of the footprint is seen (twice, the second resolving patches almost hidden); its size
+    25-27       how much of the footprint is seen; its size; how much is seen, resolving patches almost hidden
     28-29       senses of the twists
     30-39       of the cloth alone, warp and weft by turns: roughness, bend, relief, length of floats, width
 """

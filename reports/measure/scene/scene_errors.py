@@ -108,7 +108,9 @@ def _over_time(
 
     `still` are the pixels that show lit cloth all the way, if there are any.
     """
-    records = []
+    records: list[Record] = []
+    if len(own) == 1:
+        return records
     if still.any():
         value = flicker(own[:, still], truth[:, still], noise[:, still])
         scale = truth[:, still].mean() ** 2

@@ -9,7 +9,7 @@ let link = null;
 dialog.prepend(picture);
 
 function neighbour(step) {
-  const group = link.closest(".strip, .views, .tiles");
+  const group = link.closest(".group, .views, .tiles");
   const links = group ? [...group.querySelectorAll(`a.enlarge[data-kind="${link.dataset.kind}"]`)] : [link];
   return links[links.indexOf(link) + step];
 }

@@ -34,7 +34,7 @@ def test_the_front_and_the_settings_of_methods_are_curves(table, costs):
     assert curves == {1, 5}  # woven and NeuMIP; points of 1, 2, 4, 16, 64
     assert {text.get_text() for text in figure.axes[0].texts} == {"1", "2", "64", ""}  # 2 is the baseline, "" the arrow
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == ["woven", "NeuMIP", "points", "the paper: 2.0× lower at 0.83× the time"]
+    assert names == ["woven", "NeuMIP", "points", "woven in its paper: 2.0× lower at 0.83× the time"]
 
 
 def test_flicker_is_drawn_as_its_distance_from_the_truths(table, costs):
@@ -69,7 +69,7 @@ def test_scenes_mark_their_fronts_and_the_papers_step():
     assert below.lines[0].get_xydata().tolist() == [[10.0, 0.1], [80.0, 0.01]]
     (arrow,) = [text for text in above.texts if text.arrow_patch]
     assert arrow.xy == pytest.approx((8.3, 0.2 / 4.1)) and not below.texts
-    assert figure.legends[0].get_texts()[-1].get_text() == "the paper: 4.1× lower at 0.83× the time"
+    assert figure.legends[0].get_texts()[-1].get_text() == "woven in its paper: 4.1× lower at 0.83× the time"
 
 
 def test_what_cannot_be_drawn_has_no_panel():

@@ -7,13 +7,15 @@ import matplotlib.image
 import pandas as pd
 import pytest
 
-from reports.images.tiles import EXPOSURE, hex_colour
+from pipeline.models.added.added_code import ADDED_MODEL
+from reports.images.tiles import EXPOSURE, hex_colour, size_of
 from reports.measure.latents import SHARES
 from reports.page import figures
 from reports.page.colours import DARK, LIGHT
+from reports.page.content import ModelNote
 from reports.page.figures import render
 from reports.page.files import read_files
-from reports.page.html import OPEN_ROWS, fabric_card, page_html, prose, schemes
+from reports.page.html import FIRST_SIGHT, OPEN_ROWS, fabric_card, page_html, prose, schemes
 from reports.page.page import write_page
 from reports.page.pictures import FRAME_GAP
 from reports.record import OF_A_PAGE, read_machine, read_records
@@ -22,6 +24,11 @@ from reports.tables.page_tables import page_frames
 from reports.tables.table import WORDS
 from tests.reports.page.conftest import Reader
 from weaves.fabric import load_fabric
+
+
+@pytest.fixture(scope="module")
+def sizes(folder):
+    return {path.name: size_of(path.read_bytes()) for path in (folder / "figures").iterdir()}
 
 
 def test_page_is_whole_and_needs_nothing_else(folder, page):
@@ -143,7 +150,7 @@ def test_a_page_of_nothing_claims_nothing(bare, tmp_path):
     assert not (tmp_path / "tables" / "other_metrics.csv").exists()
 
 
-def test_several_trainings_have_a_mean_and_a_range(bare, three_trainings, page):
+def test_several_trainings_have_a_mean_and_a_range(bare, three_trainings, page, sizes):
     """MSE of 1, 2 and 3 parts of that of k = 9 on denim and basket, whose mean is 1.5e-3 / 9; 2 points have 7.5e-4.
 
     Tables of more rows than `OPEN_ROWS` are closed, and what learns nothing has no headline.
@@ -155,7 +162,7 @@ def test_several_trainings_have_a_mean_and_a_range(bare, three_trainings, page):
         for index in range(OPEN_ROWS)
     ]
     content = replace(bare, records=[*three_trainings, *many])
-    several = Reader(page_html(content, page_frames(content.records), set(WORDS["plots"])))
+    several = Reader(page_html(content, page_frames(content.records), sizes))
     for sentence in (
         "Woven reaches 2.2× lower MSE (1.5× to 4.5× over 3 trainings) than point sampling at 2 points",
         "3.33e−4(3.09 … 3.58)e−4[1.67 … 5.00]e−4",
@@ -168,11 +175,35 @@ def test_several_trainings_have_a_mean_and_a_range(bare, three_trainings, page):
     assert "NeuMIP reaches" not in several.words and "NeuMIP reaches" in page.words
     assert "trainings" not in page.words.partition("Definitions of the columns")[0]
     once, often = (
-        {table["text"].strip() for table in part.all("caption") if "details" in table["within"]}
+        {table["text"].strip() for table in part.all("caption") if table.get("class") == "hidden"}
         for part in (page, several)
     )
     assert "Times and storage" in often - once and any(text.startswith("Errors, seen fabrics") for text in often - once)
     assert {"silhouettes", "stability", "latents", "accuracy", "other", "live"}.isdisjoint(several.ids)
+
+
+def test_a_method_from_outside_leads_and_no_other_papers_number_stands_beside_it(bare, made_up, sizes):
+    """Made up: NeuMIP is at k = 9, 4.5 times below two points, and takes 3610 ns to their 830."""
+    note = ModelNote("neumip", "a method of one's own", kind=ADDED_MODEL)
+    records = [record for record in made_up if record.method != "woven"]
+    content = replace(bare, models=[bare.models[2], note], records=records)
+    page = Reader(page_html(content, page_frames(records), sizes))
+    heading, lead, trade, *_ = [element["text"] for element in page.all("h1", "p") if "header" in element["within"]][1:]
+    assert heading.startswith("NeuMIP on") and lead.startswith("NeuMIP reaches 4.5× lower MSE")
+    assert trade.startswith("A pixel of two random points")
+    values = [element["text"] for element in page.all("div") if element.get("class") == "value"]
+    assert values == ["4.5×", "1.1 %", "4.3×", "2 %"]
+    assert "4.1×" not in page.words and "paper" not in page.words
+
+
+def test_every_picture_has_its_size_and_what_is_not_seen_at_first_can_be_opened(page, sizes):
+    pictures = [picture for picture in page.all("img") if picture["src"].startswith("figures/")]
+    assert len(pictures) > 20
+    for picture in pictures:
+        assert (int(picture["width"]), int(picture["height"])) == sizes[picture["src"].removeprefix("figures/")]
+    closed = {section["id"] for section in page.all("section") if section.get("class") == "closed"}
+    assert closed == set(WORDS["sections"]) - FIRST_SIGHT
+    assert all("summary" in title["within"] for title in page.all("h2") if title["text"] == "Energy")
 
 
 def test_headings_and_landmarks(page):

@@ -5,8 +5,9 @@ import matplotlib.image
 import numpy as np
 import pandas as pd
 
+from pipeline.models.added.added_code import ADDED_MODEL
 from reports.images import tiles
-from reports.page.content import PictureFile
+from reports.page.content import ModelNote, PictureFile
 from reports.page.pictures import FRAME_GAP, MOST_FILMS, SHOWN, Crop, films, filmstrip, liveliest, strips
 
 
@@ -46,6 +47,16 @@ def test_strips_are_in_order_and_say_their_errors():
     ]  # fmt: skip
     assert found[1].role == "unseen" and [cell["method"] for cell in found[1].cells] == ["truth", "woven"]
     assert [strip.cells[-1]["mse"] for strip in found[1:]] == ["2.00e−3", "–", "5.00e−4"]
+
+
+def test_the_first_of_each_kind_and_methods_from_outside_stand_in_front():
+    names = ["truth", "wide", "wider", "point_sampled", "own"]
+    kinds = {"wide": "woven", "wider": "woven", "own": ADDED_MODEL}
+    notes = [ModelNote(name, "", kind=kinds.get(name, name)) for name in names[1:]]
+    pictures = [file(name) for name in names] + [file("point_sampled", "k = 16")]
+    (strip,) = strips(pictures, {}, ["attic"], [], notes)
+    order = ["truth", "own", "wide", "points", "wider", "points, k\u00a0=\u00a016"]
+    assert [cell["label"] for cell in strip.cells] == order
 
 
 def test_every_row_shows_its_frames_and_a_slice_over_time():
