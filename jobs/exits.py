@@ -21,7 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
-from cyclopts import CycloptsError
+from cyclopts import CycloptsError, MissingArgumentError
 
 from weaves.errors import BadInput, WorkFailed, one_line
 
@@ -59,7 +59,7 @@ def _handle(raised: BaseException, tokens: Sequence[str], out: Path) -> int:
     """Print the sentence of an exception, and return the exit code."""
     error = _wrapped(raised)
     if isinstance(error, CycloptsError):
-        return _end(f"twillight: {error}", 2)
+        return _end(_missing(error) or f"twillight: {error}", 2)
     if isinstance(error, BadInput | WorkFailed):
         return _end(str(error), error.exit_code)
     if isinstance(error, KeyboardInterrupt):
@@ -75,8 +75,21 @@ def _handle(raised: BaseException, tokens: Sequence[str], out: Path) -> int:
             return _end(str(told), told.exit_code)
     if isinstance(error, OSError) and error.errno in _NO_FILE:
         return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
+    if type(error).__name__ == "ShellDetectionError":
+        return _end("twillight --install-completion: the shell is not known: add --shell bash, zsh or fish", 2)
     saved = _save_crash(tokens, "".join(traceback.format_exception(raised)), out)
     return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
+
+
+def _missing(error: CycloptsError) -> str:
+    """Return which argument is missing and what it is; empty for any other error."""
+    if not isinstance(error, MissingArgumentError) or (argument := error.argument) is None or not error.command_chain:
+        return ""
+    verb, name = " ".join(error.command_chain), argument.name
+    if argument.index is not None:
+        name = name.removeprefix("--").upper()
+    lacks = "lacks its value" if argument.tokens or error.keyword else "is missing"
+    return f"{verb}: {name} {lacks}: {argument.parameter.help} See `twillight {verb} --help`"
 
 
 def _wrapped(raised: BaseException) -> BaseException:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from jobs.cli import app
-from jobs.recipe.load import recipe_names
+from jobs.recipe.shipped import recipe_names
 from pipeline.models.catalogue import CLASSES
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.shards.schema import SCHEMAS

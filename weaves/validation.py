@@ -31,7 +31,7 @@ _LONG_KEY = re.compile(rf"(?:{_PART}[ \t]{{0,99}}+\.[ \t]{{0,99}}+){{{MOST_DEPTH
 class Frozen(BaseModel):
     """Data from outside or for an identity: fixed, without other keys, every number finite."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

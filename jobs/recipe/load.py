@@ -8,6 +8,7 @@ from typing import Final
 
 from jobs.recipe.added import Added
 from jobs.recipe.recipe import Recipe, RecipeFile
+from jobs.recipe.shipped import RECIPES, recipe_names
 from jobs.recipe.trained_by import check_trained_by, with_trained_by
 from jobs.recipe.validation import validate_recipe
 from pipeline.scenes.catalogue import load_scene
@@ -18,18 +19,11 @@ from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.population import population_fabrics
 from weaves.validation import read_toml, validated
 
-RECIPES = Path(__file__).parents[1] / "recipes"
-
 _MEASURED_BY: Final = {"stability": "truth", "sampler": "truth"}
 """Recipes that measure what was once measured without a recipe."""
 
 MOST_RECIPES: Final = 32
 """Most recipes that one recipe names, directly or through others."""
-
-
-def recipe_names() -> list[str]:
-    """Return the names of the recipes that come with the package."""
-    return sorted(path.stem for path in RECIPES.glob("*.toml"))
 
 
 def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:

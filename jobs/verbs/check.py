@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from jobs.exits import print_error
-from jobs.recipe.load import load_recipe, recipe_names
+from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import Recipe
+from jobs.recipe.shipped import recipe_names
 from jobs.terminal import print_lines, print_table, tracked
 from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out
 from pipeline.shards.check import check_shard

@@ -57,7 +57,7 @@ def show(
     """Print a fabric, and write its pictures if a folder is given."""
     cloth = load_fabric(fabric)
     if out is None and (maps or size != SWATCH_SIZE):
-        raise BadInput("show", "--out", "", "a folder is needed for pictures")
+        raise BadInput("show", "", "--out is missing", "a folder is needed for pictures")
     _print_fabric(cloth)
     if out is not None:
         with Terminal().status("pictures"):

@@ -34,7 +34,7 @@ _FILES: Final = {
 _CHANNELS: Final = {"integers": 1, "numbers": 1, "nodes": 4, "grid": 1}
 
 
-class Buffer(Frozen):
+class Buffer(Frozen, use_attribute_docstrings=True):
     """A buffer that the shader reads."""
 
     files: dict[str, str]
@@ -47,7 +47,7 @@ class Buffer(Frozen):
     """Arrays in it, after the scalars."""
 
 
-class PlacedLayer(Frozen):
+class PlacedLayer(Frozen, use_attribute_docstrings=True):
     """A layer: outputs = activation(biases + inputs times weights)."""
 
     network: str
@@ -60,7 +60,7 @@ class PlacedLayer(Frozen):
     """Function of each output."""
 
 
-class Networks(Frozen):
+class Networks(Frozen, use_attribute_docstrings=True):
     """The networks of a model, in the buffer `weights`. Offsets are in elements, shapes in numbers."""
 
     name: str
@@ -121,7 +121,7 @@ CONVENTIONS: Final = [
 """Axes, directions, cosine and colours."""
 
 
-class Descriptor(Frozen):
+class Descriptor(Frozen, use_attribute_docstrings=True):
     """Content of `soft_nodes.json`."""
 
     model: str = "soft_nodes"

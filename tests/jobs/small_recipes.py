@@ -8,8 +8,8 @@ import tomllib
 
 import tomli_w
 
-from jobs.recipe.load import RECIPES
 from jobs.recipe.recipe import Rows
+from jobs.recipe.shipped import RECIPES
 from pipeline.models.catalogue import CLASSES
 from pipeline.training.options import TrainingOptions
 from reports.options import BenchOptions

@@ -1,3 +1,9 @@
+import shlex
+import shutil
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
@@ -5,6 +11,8 @@ import pytest
 
 import jobs.verbs.run
 import jobs.verbs.show
+from jobs.cli import VERBS, app
+from jobs.recipe.load import load_recipe
 from pipeline.shards.manifest import Manifest
 from pipeline.truth import invariants
 from pipeline.truth.invariants import exact, worst
@@ -13,6 +21,8 @@ from tests.jobs import made_up
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_help_lists_the_verbs_in_the_order_of_work(twillight):
@@ -23,8 +33,44 @@ def test_help_lists_the_verbs_in_the_order_of_work(twillight):
     assert code == 0 and [verb for verb in verbs if verb in order] == order
 
 
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_help_ends_with_examples_that_are_understood(twillight, verb):
+    code, text, _ = twillight(*verb.split(), "--help")
+    shown = [line.strip() for line in text.partition("Examples:")[2].splitlines() if line.strip()]
+    assert code == 0 and shown == [f"twillight {verb} {tokens}".strip() for tokens in VERBS[verb].examples]
+    for call in shown:
+        app.parse_args(shlex.split(call)[1:], exit_on_error=False, print_error=False)
+
+
+def test_version_and_list_load_no_heavy_library(twillight):
+    assert twillight("--version")[:2] == (0, f"twillight {version('twillight')}\n")
+    heavy = ["torch", "numba", "scipy", "pandas", "pyarrow", "colour", "matplotlib"]
+    code = f"from jobs.cli import main; import sys; main(['list']); print([n for n in {heavy} if n in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout.endswith("\n[]\n"), done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_complete_verbs_and_options(shell, tmp_path):
+    script = tmp_path / "twillight"
+    script.write_text(app.generate_completion(shell=shell))
+    complete = {
+        "bash": 'source "$0"; COMP_WORDS=($1); COMP_CWORD=$2; _twillight; printf "%s\\n" "${COMPREPLY[@]}"',
+        "fish": 'source $argv[1]; complete -C "$argv[2]"',
+    }
+    if shell not in complete or not (program := shutil.which(shell)):
+        assert all(f"{word}" in script.read_text() for word in ("publish", "--licence"))
+        return
+    for line, word in (("twillight pub", "publish"), ("twillight publish --lic", "--licence")):
+        call = [program, "-c", complete[shell], script, line, str(line.count(" "))]
+        done = subprocess.run(call, capture_output=True, text=True, check=True)
+        assert [row.split("\t")[0] for row in done.stdout.splitlines()] == [word]
+
+
 def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
-    assert "denim" in twillight("list")[1] and "quick" in twillight("list")[1]
+    code, text, _ = twillight("list")
+    known = [load_fabric("tartan"), load_recipe("quick")]
+    assert code == 0 and all(words in text for words in (known[0].weave.name, known[0].source, known[1].about))
     code, text, _ = twillight("show", "denim")
     assert code == 0 and "· ██████" in text and "roughness" in text and "about" in twillight("plan", "smoke")[1]
     code, text, _ = twillight("status", "smoke")

@@ -9,7 +9,8 @@ import pytest
 
 from jobs.cli import main
 from jobs.plan.plan import plan
-from jobs.recipe.load import load_recipe, recipe_names
+from jobs.recipe.load import load_recipe
+from jobs.recipe.shipped import recipe_names
 from jobs.run.ledger import Ledger
 from tests.faults.runs import start
 from tests.jobs.small_recipes import MOST_MEMBERS, write_small

@@ -11,7 +11,7 @@ from typing import Any, Final
 import yaml
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
-from jobs.verbs.publish.contents import POPULATIONS, About
+from jobs.verbs.publish.contents import POPULATIONS, About, stem
 from pipeline.shards.joined import columns_joined
 from weaves.errors import BadInput, nearest
 
@@ -42,7 +42,7 @@ def licence_id(given: str | None) -> str:
     """Return an SPDX identifier as it is written; BadInput if none is given, or there is no such licence."""
     if not given:
         allowed = "an SPDX identifier such as CC-BY-4.0 is needed: without a licence nobody may use the data"
-        raise BadInput("publish", "--licence", given, allowed)
+        raise BadInput("publish", "", "--licence is missing", allowed)
     try:
         if not re.fullmatch(r"[A-Za-z0-9.-]{1,60}", given) or given.lower().startswith("licenseref-"):
             raise InvalidLicenseExpression(given)
@@ -72,13 +72,13 @@ def card(about: About) -> str:
         parts = [part for part in about.parts if (part.role, part.split) == (role, split)]
         fabrics = sum(len(part.fabrics) for part in parts)
         rows = sum(part.rows for part in parts)
-        place = f"`data/{role}/{split}-*.parquet`"
+        place = f"`{stem(role, split)}-*.parquet`"
         files.append((role, split, f"{fabrics:,}", f"{rows:,}", place, _ROLES[role]))
     named = ", ".join(f"`{name}`" for name in manifest.names("seen", "unseen"))
     populations = [(role, len(manifest.names(role))) for role in POPULATIONS]
     random = "".join(f"; `{role}.toml` has {count:,} random ones" for role, count in populations if count)
     text = _TEMPLATE.read_text(encoding="utf-8").format(
-        title=about.title,
+        title=about.citation.title,
         summary=about.summary,
         truth_version=about.truth_version,
         files=_table(files),
@@ -87,7 +87,8 @@ def card(about: About) -> str:
         options=_table([("option", "value"), *_options(manifest.about)]),
         licence=about.licence,
         url=licence_url(about.licence),
-        version=about.version,
+        reference=about.citation.line(about.version),
+        bibtex=about.citation.bibtex(about.id, about.version),
         fingerprint=manifest.fingerprint,
     )
     return f"---\n{yaml.safe_dump(_header(about), sort_keys=False, allow_unicode=True)}---\n{text}"
@@ -99,10 +100,10 @@ def _header(about: About) -> dict[str, Any]:
     configs: dict[str, dict[str, Any]] = {}
     for role, split in about.sets:
         config = configs.setdefault(role, {"config_name": role, "data_files": []})
-        config["data_files"].append({"split": split, "path": f"data/{role}/{split}-*.parquet"})
+        config["data_files"].append({"split": split, "path": f"{stem(role, split)}-*.parquet"})
     next(iter(configs.values()))["default"] = True
     return {
-        "pretty_name": about.title,
+        "pretty_name": about.citation.title,
         **_hub_licence(about.licence),
         "size_categories": [size],
         "tags": ["rendering", "appearance", "bsdf", "woven-cloth", "tabular"],
@@ -124,20 +125,13 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join([lines[0], "|" + " --- |" * len(rows[0]), *lines[1:]])
 
 
-def citation(about: About) -> str:
-    """Return the text of ``CITATION.cff``, in the Citation File Format 1.2."""
-    content = {
-        "cff-version": "1.2.0",
-        "message": "If you use this data set, please cite it as below.",
-        "type": "dataset",
-        "title": about.title,
-        "authors": [{"name": name} for name in about.authors],
-        "abstract": about.summary,
-        "version": about.version,
-        "license": about.licence,
-        "keywords": ["woven cloth", "appearance", "BSDF", "rendering", "ground truth"],
-        "identifiers": [
-            {"type": "other", "value": about.manifest.fingerprint, "description": "Fingerprint of all that shaped it"}
-        ],
-    }
-    return str(yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120))
+def citation_file(about: About) -> str:
+    """Return the text of ``CITATION.cff``."""
+    number = {"type": "other", "value": about.manifest.fingerprint, "description": "Fingerprint of all that shaped it"}
+    return about.citation.cff(
+        abstract=about.summary,
+        version=about.version,
+        license=about.licence,
+        keywords=["woven cloth", "appearance", "BSDF", "rendering", "ground truth"],
+        identifiers=[number],
+    )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
+from jobs.verbs.publish.citation import Citation
 from pipeline.shards.manifest import Manifest, Role, ShardEntry
 
 MOST_FILES: Final = 90
@@ -60,9 +61,18 @@ def parts_of(manifest: Manifest) -> list[PublishedPart]:
             for number in range(files):
                 group = names[len(names) * number // files : len(names) * (number + 1) // files]
                 rows = tuple(shard for name in group for shard in shards[name, split])
-                file = f"data/{role}/{split}-{number:02}.parquet"
+                file = f"{stem(role, split)}-{number:02}.parquet"
                 parts.append(PublishedPart(file, role, split, tuple(group), rows))
     return parts
+
+
+def stem(role: str, split: str) -> str:
+    """Return the path of a role's and split's files, without their numbers; it says what they must not be used for.
+
+    Rows of unseen cloth that are not for tests are for models of that cloth alone.
+    """
+    split = "test_only" if split == "test" else f"one_cloth_{split}" if role.startswith("unseen") else split
+    return f"data/{role}/{split}"
 
 
 class About(NamedTuple):
@@ -74,14 +84,15 @@ class About(NamedTuple):
     """Its files of rows."""
     licence: str
     """SPDX identifier."""
-    authors: tuple[str, ...]
+    citation: Citation
+    """What is cited."""
     truth_version: int
     """Version of the ground truth that answered the rows; 0 if the shards do not name it."""
 
     @property
-    def title(self) -> str:
-        """Title of the data set."""
-        return f"Twillight {self.manifest.name}: ground truth of the appearance of woven cloth"
+    def id(self) -> str:
+        """Name for programs."""
+        return f"twillight-{self.manifest.name}"
 
     @property
     def summary(self) -> str:

@@ -9,7 +9,7 @@ import json
 from typing import Any, Final
 
 from jobs.verbs.publish.card import licence_url
-from jobs.verbs.publish.contents import About
+from jobs.verbs.publish.contents import About, stem
 from pipeline.shards.joined import columns_joined
 
 _CR: Final = (
@@ -39,16 +39,28 @@ _TYPES: Final = {"string": "sc:Text", "float": "sc:Float", "int32": "sc:Integer"
 
 def croissant(about: About) -> str:
     """Return the file's text."""
+    doi = about.citation.doi
+    known = {
+        "datePublished": about.citation.date,
+        "url": about.citation.url,
+        "sameAs": doi and f"https://doi.org/{doi}",
+    }
     content = {
         "@context": _CONTEXT,
         "@type": "sc:Dataset",
         "conformsTo": "http://mlcommons.org/croissant/1.0",
-        "name": f"twillight-{about.manifest.name}",
+        "name": about.citation.title,
         "description": about.summary,
         "license": licence_url(about.licence),
-        "creator": [{"@type": "sc:Organization", "name": name} for name in about.authors],
+        "creator": [
+            {"@type": "sc:Person", "name": f"{given} {family}", "familyName": family, "givenName": given}
+            if given
+            else {"@type": "sc:Organization", "name": family}
+            for family, given in about.citation.persons
+        ],
+        **{key: value for key, value in known.items() if value},
         "version": about.version,
-        "citeAs": f"{', '.join(about.authors)}: {about.title}, version {about.version}",
+        "citeAs": about.citation.bibtex(about.id, about.version),
         "distribution": [_files(role, split) for role, split in about.sets],
         "recordSet": [_records(role, split) for role, split in about.sets],
     }
@@ -63,7 +75,7 @@ def _files(role: str, split: str) -> dict[str, Any]:
         "name": f"files-{role}-{split}",
         "description": f"Rows of {role} fabrics, split {split}.",
         "encodingFormat": "application/x-parquet",  # readers do not know application/vnd.apache.parquet
-        "includes": f"data/{role}/{split}-*.parquet",
+        "includes": f"{stem(role, split)}-*.parquet",
     }
 
 

@@ -7,6 +7,7 @@ continued by the same command, which keeps finished files of rows. The same data
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -14,8 +15,8 @@ from cyclopts import Parameter
 from filelock import FileLock, Timeout
 
 from jobs.terminal import print_lines, size, tracked
-from jobs.verbs.parameters import NOTHING
-from jobs.verbs.publish.card import LOADER, card, citation, licence_id
+from jobs.verbs.publish.card import LOADER, card, citation_file, licence_id
+from jobs.verbs.publish.citation import Citation
 from jobs.verbs.publish.contents import About, PublishedPart, own_shards, parts_of
 from jobs.verbs.publish.croissant import croissant
 from jobs.verbs.publish.recipe import recipe_files
@@ -28,10 +29,9 @@ from pipeline.shards.manifest import Manifest, Published, PublishedFile
 from pipeline.shards.store import read_about
 from weaves.errors import BadInput, WorkFailed
 
-AUTHORS: Final = ("The Twillight authors",)
-"""Authors of a data set if none are named."""
-
+_DEFAULT_TITLE: Final = "ground truth of the appearance of woven cloth"
 _LOCK: Final = ".lock"
+_UNCITED: Final = Citation()
 
 
 def publish(
@@ -39,20 +39,22 @@ def publish(
     *,
     to: Annotated[Path | None, Parameter(help="Folder to write; empty or not there.")] = None,
     licence: Annotated[str | None, Parameter(help="SPDX identifier of the data's licence, such as CC-BY-4.0.")] = None,
-    author: Annotated[list[str], Parameter(help="Author for the citation; may be given several times.")] = NOTHING,
+    citation: Annotated[Citation, Parameter(name="*")] = _UNCITED,
 ) -> None:
     """Write a data set as a folder for others.
 
-    BadInput if the licence is missing or unknown, the folder to write is not empty, or the data set is not whole;
-    WorkFailed if another process writes the same folder.
+    BadInput if the licence is missing or unknown, a value of the citation has not its form, the folder to write is not
+    empty, or the data set is not whole; WorkFailed if another process writes the same folder.
     """
     identifier = licence_id(licence)
+    citation.refuse_wrong()
     target = _free(to, dataset)
     manifest = Manifest.load(dataset)
     _refuse_unfinished(dataset, manifest)
     recipe, first = recipe_files(manifest, dataset), own_shards(manifest)[0]
     truth = int(read_about(dataset / first.file).get("task", {}).get("version", 0))
-    about = About(manifest, parts_of(manifest), identifier, tuple(author) or AUTHORS, truth)
+    citation = replace(citation, title=citation.title or f"Twillight {manifest.name}: {_DEFAULT_TITLE}")
+    about = About(manifest, parts_of(manifest), identifier, citation, truth)
     staging = target.with_name(f".tmp-{target.name}")
     left = {path.name for path in staging.iterdir()} if staging.is_dir() else set()
     if left and not left & {_LOCK, MANIFEST}:
@@ -80,7 +82,7 @@ def publish(
 def _free(to: Path | None, folder: Path) -> Path:
     """Return the folder to write if nothing is in it."""
     if to is None:
-        raise BadInput("publish", "--to", to, "the folder to write is needed")
+        raise BadInput("publish", "", "--to is missing", "the folder to write is needed")
     if to.is_dir():
         if any(to.iterdir()):
             raise BadInput("publish", "--to", str(to), "is not empty; name another folder, or empty it")
@@ -111,7 +113,7 @@ def _write(about: About, texts: dict[str, str], folder: Path, staging: Path) -> 
         **texts,
         "README.md": card(about),
         "croissant.json": croissant(about),
-        "CITATION.cff": citation(about),
+        "CITATION.cff": citation_file(about),
         "load.py": LOADER.read_text(encoding="utf-8"),
     }
     for name, text in texts.items():

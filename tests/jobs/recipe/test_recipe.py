@@ -6,7 +6,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from jobs.plan.measurements.models import AtExtremes
-from jobs.recipe.load import load_recipe, recipe_names
+from jobs.recipe.load import load_recipe
+from jobs.recipe.shipped import recipe_names
 from pipeline.scenes.catalogue import load_scene
 from tests.refusals import refusal, sentence_of
 from weaves.errors import BadInput

@@ -77,6 +77,8 @@ def test_the_folder_holds_what_it_should_and_its_hashes(published):
         if "role" in entry:
             rows[entry["role"], entry["split"]] += sum(entry["rows"].values())
     assert rows == ROWS and manifest["rows"] == sum(ROWS.values())
+    held_out = {entry["file"] for entry in manifest["files"] if entry.get("split") == "test"}
+    assert held_out == {file for file in found if "/test_only-" in file}
 
 
 def test_no_row_is_lost_or_changed(published, dataset):
@@ -118,7 +120,7 @@ def test_the_door_refuses_damaged_files(published, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(published, copy)
     data = twillight.open_dataset(copy)
-    first, second, *_ = sorted(copy.glob("data/seen/test-*.parquet"))
+    first, second, *_ = sorted(copy.glob("data/seen/test_only-*.parquet"))
     whole = first.read_bytes()
     flipped = whole[:1000] + bytes(byte ^ 1 for byte in whole[1000:2000]) + whole[2000:]
     for content, words in ((flipped, "get the data set again"), (second.read_bytes(), "has 0 rows of denim")):
@@ -153,7 +155,7 @@ def test_card_and_citation_have_what_data_hubs_and_the_format_require(published)
     files = {(c["config_name"], file["split"]): file["path"] for c in found["configs"] for file in c["data_files"]}
     assert {key: sum(pq.read_metadata(p).num_rows for p in published.glob(name)) for key, name in files.items()} == ROWS
     assert [config["config_name"] for config in found["configs"] if config.get("default")] == ["seen"]
-    assert all(f"| `{name}` |" in text for name in SCHEMA.names) and "{" not in text.replace("{{", "")
+    assert all(f"| `{name}` |" in text for name in SCHEMA.names) and "{" not in text.partition("```bibtex")[0]
     found = yaml.safe_load((published / "CITATION.cff").read_text(encoding="utf-8"))
     assert {"cff-version", "message", "title", "authors"} <= found.keys()
     assert found["type"] == "dataset" and found["license"] == "CC-BY-4.0"
@@ -163,6 +165,8 @@ def test_card_and_citation_have_what_data_hubs_and_the_format_require(published)
 def test_the_recipe_generates_the_same_rows(more, tmp_path):
     folder = write_dataset(tmp_path / "made", *more)
     assert publish(folder, tmp_path / "shelf") == 0
+    unseen = {path.name.partition("-")[0] for path in (tmp_path / "shelf" / "data" / "unseen").iterdir()}
+    assert unseen == {"test_only", *(("one_cloth_train", "one_cloth_validation") if more else ())}
     again = DataSet(load_recipe(tmp_path / "shelf" / "recipe.toml"))
     assert again.fingerprint == Manifest.load(folder).fingerprint
 
@@ -253,9 +257,27 @@ def test_a_data_set_of_an_earlier_version_is_refused(tmp_path, unpublished):
 
 
 def test_a_licence_that_hubs_do_not_know_has_a_name_and_an_address(dataset, tmp_path):
-    assert publish(dataset, tmp_path / "x", "--author", "A. Weaver", licence="EUPL-1.2") == 0
+    assert publish(dataset, tmp_path / "x", licence="EUPL-1.2") == 0
     header = yaml.safe_load((tmp_path / "x" / "README.md").read_text(encoding="utf-8").split("---\n")[1])
     assert (header["license"], header["license_name"]) == ("other", "eupl-1.2")
     assert header["license_link"] == "https://spdx.org/licenses/EUPL-1.2.html"
-    cited = yaml.safe_load((tmp_path / "x" / "CITATION.cff").read_text(encoding="utf-8"))
-    assert cited["authors"] == [{"name": "A. Weaver"}]
+
+
+CITED = {"title": "Eight cloths & more", "date": "2026-11-26", "url": "https://looms.org/x", "doi": "10.5281/zenodo.7"}
+
+
+def test_a_citation_is_the_same_everywhere(dataset, tmp_path):
+    flags = [part for name, value in CITED.items() for part in (f"--{name}", value)]
+    assert publish(dataset, tmp_path / "x", *flags, "--author", "Weaver, Ada", "--author", "The Guild") == 0
+    names = ("README.md", "croissant.json", "CITATION.cff")
+    card, croissant, cff = ((tmp_path / "x" / name).read_text(encoding="utf-8") for name in names)
+    cited, described = yaml.safe_load(cff), json.loads(croissant)
+    assert cited["authors"] == [{"family-names": "Weaver", "given-names": "Ada"}, {"name": "The Guild"}]
+    assert [person["name"] for person in described["creator"]] == ["Ada Weaver", "The Guild"]
+    assert [str(cited[key]) for key in ("title", "date-released", "url", "doi")] == list(CITED.values())
+    assert [described[key] for key in ("name", "datePublished", "url")] == list(CITED.values())[:3]
+    assert described["sameAs"] == f"https://doi.org/{CITED['doi']}"
+    for entry in ("title = {{Eight cloths \\& more}}", "author = {Weaver, Ada and {The Guild}}", "year = {2026}"):
+        assert entry in described["citeAs"]
+    assert "Ada Weaver, The Guild (2026): Eight cloths & more. Version" in card and described["citeAs"] in card
+    assert yaml.safe_load(card.split("---\n")[1])["pretty_name"] == CITED["title"]
