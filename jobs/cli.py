@@ -16,13 +16,14 @@ from jobs.exits import run_to_exit
 from jobs.verbs.parameters import OUT
 
 VERBS: Final = {
-    "list": ("list:print_lists", "List the fabrics and the recipes of the package."),
+    "list": ("list:print_lists", "List the fabrics and the recipes of the package, or make pictures of the fabrics."),
     "import": ("exchange:import_draft", "Make a fabric from the draft file of a weaving program."),
     "show": ("show:show", "Show a fabric: its drawdown and its yarns."),
     "export": (
         "exchange:export_fabric",
         "Write a fabric for other programs: a mesh, a draft, texture maps and materials, or a shader.",
     ),
+    "gallery": ("gallery:gallery", "Write a site of fabrics: pictures, live pages, maps, samples, shaders, files."),
     "view": (
         "exchange:view",
         "Write a page of one file that draws a fabric while light and viewer turn, and compares methods.",
