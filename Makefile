@@ -10,7 +10,7 @@ READY := .venv/installed
 # A run and its tests start many processes: compiled modules are kept, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: pictures viewer-shader report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults lint budgets rooms pins clean
+.PHONY: pictures viewer-shader gallery report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults lint budgets rooms pins clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -66,13 +66,18 @@ test-slow: $(READY)
 faults: $(READY)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m faults tests/faults
 
+# A site of all presets in out/gallery: pictures, live pages, maps, samples, shaders and files. Takes half an hour.
+gallery: $(READY)
+	@$(BIN)/twillight gallery --out out/gallery
+
 # The shaders of `twillight view`, after a change of their source in Slang or of the pretrained network; needs slangc.
 viewer-shader: $(READY)
 	$(BIN)/python -m reports.viewer.generate
 
 # The pictures of the pages in docs, made by the commands on these pages; a test checks that they are current.
 pictures: $(READY)
-	TWILLIGHT_WRITE_PICTURES=1 $(BIN)/pytest -q tests/test_task_pages.py tests/test_twillight_mitsuba.py
+	TWILLIGHT_WRITE_PICTURES=1 $(BIN)/pytest -q tests/test_task_pages.py tests/test_twillight_mitsuba.py tests/jobs/verbs/exchange/test_engines.py
+	$(BIN)/twillight list --pictures docs/pictures/presets --size 256x192
 	$(BIN)/python docs/pictures/cover.py
 
 lint: $(READY)

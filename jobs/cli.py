@@ -28,7 +28,11 @@ class VerbEntry(NamedTuple):
 
 
 VERBS: Final = {
-    "list": VerbEntry("list:print_lists", "List the fabrics and the recipes of the package.", ("",)),
+    "list": VerbEntry(
+        "list:print_lists",
+        "List the fabrics and the recipes of the package, or make pictures of the fabrics.",
+        ("", "--pictures presets"),
+    ),
     "import": VerbEntry(
         "exchange:import_draft",
         "Make a fabric from the draft file of a weaving program.",
@@ -41,8 +45,18 @@ VERBS: Final = {
     ),
     "export": VerbEntry(
         "exchange:export_fabric",
-        "Write a fabric for other programs: a mesh, a draft, texture maps and materials, or a shader.",
-        ("denim --maps denim-maps --size 1024", "denim --mesh denim.ply", "denim --shader denim-shader"),
+        "Write a fabric for other programs: a mesh, a draft, texture maps and materials, a shader, or a BSDF.",
+        (
+            "denim --maps denim-maps --size 1024",
+            "denim --mesh denim.ply",
+            "denim --shader denim-shader",
+            "voile --bsdf voile.xml",
+        ),
+    ),
+    "gallery": VerbEntry(
+        "gallery:gallery",
+        "Write a site of fabrics: pictures, live pages, maps, samples, shaders, files.",
+        ("--out site",),
     ),
     "view": VerbEntry(
         "exchange:view",

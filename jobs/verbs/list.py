@@ -5,16 +5,30 @@ Only what is printed is read and checked: colours and recipes need libraries tha
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from cyclopts import Parameter
 from pydantic import TypeAdapter
 
 from jobs.recipe.shipped import RECIPES, recipe_names
-from jobs.terminal import print_lines, print_table
-from weaves.fabric import PRESETS, Weave, preset_names
+from jobs.terminal import print_lines, print_table, tracked
+from jobs.verbs.parameters import Local
+from weaves.fabric import PRESETS, Weave, load_fabric, preset_names
 from weaves.validation import read_toml
 
 
-def print_lists() -> None:
-    """Print a table of fabrics and a table of recipes."""
+def print_lists(
+    *,
+    pictures: Annotated[Local | None, Parameter(help="Folder for a picture of every fabric.")] = None,
+    size: Annotated[str, Parameter(help="WIDTHxHEIGHT of the pictures in pixels.")] = "384x288",
+) -> None:
+    """Print a table of fabrics and a table of recipes; or, of fabrics, write pictures."""
+    if pictures is not None:
+        from jobs.verbs.show import write_swatch  # numba, which the lists need not wait for
+
+        for name in tracked(preset_names(), "pictures"):
+            print_lines(write_swatch(name, load_fabric(name), pictures, size))
+        return
     fabrics, weave = [read_toml(PRESETS / f"{name}.toml") for name in preset_names()], TypeAdapter(Weave)
     rows = []
     for fabric in fabrics:

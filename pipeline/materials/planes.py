@@ -148,7 +148,7 @@ def _order(candidate: Layout) -> tuple[float, float, int]:
 
 def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
     """Sum a fabric's surface over the texels of the finest level."""
-    per_texel = _samples(shown)
+    per_texel = samples(shown)
     width, height = shown.width * per_texel, shown.height * per_texel
     lowest = _lowest(fabric)
     factors = share.per_area(share.diffuse), white_f0(fabric, share), share.per_area(share.transmitted)
@@ -179,7 +179,7 @@ def yarn_ids(fabric: Fabric, shown: Layout) -> npt.NDArray[np.int32]:
     return np.concatenate(bands)
 
 
-def _samples(shown: Layout) -> int:
+def samples(shown: Layout) -> int:
     """Return the points of a texel along each side, a power of two."""
     count = 1
     while count * shown.texels_per_yarn < SAMPLES_PER_YARN:

@@ -48,7 +48,8 @@ class Constants(NamedTuple):
     sheen : float64 (3,)
         Colour of the sheen, linear RGB.
     transmitted : float
-        Largest share of the light scattered many times that goes through, over the channels.
+        Weight of the light that goes through: the largest transmitted colour, or less where the base colour would
+        not fit beside it.
     open_cloth : bool
         Whether there are gaps.
     """
@@ -77,6 +78,8 @@ class Textures(NamedTuple):
         Unit direction of the fibres, at right angles to the normal; along +y, or +x where it lies nearer to x.
     alpha_along, alpha_across : (H, W)
         GGX roughness along the fibres and across them, not its square root.
+    occlusion : (H, W)
+        Share of an even sky's light that reaches the yarns, 1 in gaps.
     """
 
     base_color: Float32
@@ -88,6 +91,7 @@ class Textures(NamedTuple):
     tangent: Float32
     alpha_along: Float32
     alpha_across: Float32
+    occlusion: Float32
 
 
 def constants(fabric: Fabric, share: Reflectance) -> Constants:
@@ -97,22 +101,28 @@ def constants(fabric: Fabric, share: Reflectance) -> Constants:
     largest = max(float((colours.specular * factor[f]).max()) for f, colours in enumerate(threads))
     largest = min(max(largest, 1e-4), 0.9)
     root = largest**0.5
-    back = sum(colours.diffuse.mean(axis=0) * share.diffuse[f] for f, colours in enumerate(threads))
-    through = sum(colours.diffuse_transmission.mean(axis=0) * share.transmitted[f] for f, colours in enumerate(threads))
-    shares = np.divide(through, back + through, out=np.zeros(3), where=through > 0.0)
+    factors = share.per_area(share.diffuse), share.per_area(share.transmitted)
+    back = max(float(colours.diffuse.max() * factors[0][f]) for f, colours in enumerate(threads))
+    through = max(float(colours.diffuse_transmission.max() * factors[1][f]) for f, colours in enumerate(threads))
     open_cloth = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width) > 0.0
-    return Constants((1 + root) / (1 - root), largest, _sheen(fabric, share), float(shares.max()), open_cloth)
+    return Constants(
+        (1 + root) / (1 - root), largest, _sheen(fabric, share), through / max(1.0, back + through), open_cloth
+    )
 
 
-def textures(level: Planes, material: Constants) -> Textures:
-    """Return the maps of a level."""
+def textures(level: Planes, material: Constants, lit: Float32 | None = None) -> Textures:
+    """Return the maps of a level; `lit` is that of `pipeline.materials.occlusion`, None for no occlusion."""
+    lit = level.coverage if lit is None else lit
     rows = max(1, _BAND // level.coverage.shape[1])
     starts = range(0, len(level.coverage), rows)
-    bands = [_band(Planes(*(plane[first : first + rows] for plane in level)), material) for first in starts]
+    bands = [
+        _band(Planes(*(plane[first : first + rows] for plane in level)), material, lit[first : first + rows])
+        for first in starts
+    ]
     return Textures(*(np.concatenate(parts) for parts in zip(*bands, strict=True)))
 
 
-def _band(level: Planes, material: Constants) -> Textures:
+def _band(level: Planes, material: Constants, lit: Float32) -> Textures:
     """Return the maps of some rows."""
     covered = np.maximum(level.coverage, _TINY)[..., None]
     normal = np.where(level.coverage[..., None] > _TINY, level.normal, (0.0, 0.0, 1.0))
@@ -120,7 +130,8 @@ def _band(level: Planes, material: Constants) -> Textures:
     tangent, along, across = _flakes(normal, level.fibres / covered)
     specular = np.clip(level.specular / covered / material.largest_f0, 0.0, 1.0)
     base, through = (np.clip(plane / covered, 0.0, 1.0) for plane in (level.base, level.through))
-    maps = (base, specular, through, level.coverage, level.height, normal, tangent, along, across)
+    occlusion = np.where(level.coverage > _TINY, np.clip(lit / covered[..., 0], 0.0, 1.0), 1.0)
+    maps = (base, specular, through, level.coverage, level.height, normal, tangent, along, across, occlusion)
     return Textures(*(np.asarray(values, np.float32) for values in maps))
 
 

@@ -12,13 +12,16 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.analytic.mip_levels import halved
 from pipeline.folders import own_files
 from pipeline.materials.lobes import SHEEN_ROUGHNESS, reflectance
+from pipeline.materials.occlusion import lit_coverage
 from pipeline.materials.planes import Layout, layout, planes, yarn_ids
 from pipeline.materials.textures import Constants, Textures, across_direction, constants, openpbr_roughness, textures
 from reports.exports.materials import (
     DOCUMENT,
     LARGEST_TEXTURE,
+    OPENPBR,
     SAMPLE,
     spacing_cm,
     write_openpbr,
@@ -52,6 +55,20 @@ def _openpbr(level: Textures) -> tuple[Plane, Plane]:
     return openpbr_roughness(level.alpha_along, level.alpha_across)
 
 
+def _isotropic(level: Textures) -> Plane:
+    """Return the roughness of a round highlight as bright as the long one at its middle."""
+    return np.asarray((level.alpha_along * level.alpha_across) ** 0.25)
+
+
+def _orm(level: Textures) -> Plane:
+    return np.stack([level.occlusion, _isotropic(level), np.zeros_like(level.occlusion)], axis=-1)
+
+
+def _mask(level: Textures) -> Plane:
+    none = np.zeros_like(level.occlusion)
+    return np.stack([none, level.occlusion, none, 1.0 - _isotropic(level)], axis=-1)
+
+
 _DOWN: Final = np.array([1.0, -1.0, 1.0], np.float32)
 
 MAPS: Final[dict[str, Map]] = {
@@ -78,6 +95,13 @@ MAPS: Final[dict[str, Map]] = {
     ),
     "roughness": Map("share", "roughness of OpenPBR; goes with anisotropy", lambda level: _openpbr(level)[0]),
     "anisotropy": Map("share", "anisotropy of OpenPBR, rougher across", lambda level: _openpbr(level)[1]),
+    "occlusion": Map(
+        "share", "ambient occlusion: the share of an even sky's light that arrives", lambda level: level.occlusion
+    ),
+    "orm": Map(
+        "share", "red occlusion, green roughness without anisotropy, blue metallic, which is 0 (glTF, Unreal)", _orm
+    ),
+    "mask": Map("share", "red metallic, green occlusion, blue detail, alpha smoothness: 1 - roughness (Unity)", _mask),
 }
 """Every map that has mip levels, by its file name; `transmission_color` is left out where nothing goes through."""
 
@@ -117,14 +141,14 @@ def write_maps(fabric: Fabric, folder: Path, size: int = 2048) -> str:
 def _write(fabric: Fabric, shown: Layout, folder: Path) -> int:
     """Write all files, and return the number of maps."""
     share = reflectance(fabric)
-    material, level = constants(fabric, share), planes(fabric, shown, share)
+    material, level, lit = constants(fabric, share), planes(fabric, shown, share), lit_coverage(fabric, shown)
     maps = {name: row for name, row in MAPS.items() if name != "transmission_color" or material.transmitted > 0.0}
     span = (float(level.height.min()), float(level.height.max()))
     write_texture(folder / "yarn_id", yarn_ids(fabric, shown), YARN_ID[0])
     levels: list[tuple[int, int]] = []
     sampled, place = False, folder
     while True:
-        level_maps = textures(level, material)
+        level_maps = textures(level, material, lit)
         for name, row in maps.items():
             write_texture(place / name, row.of(level_maps), row.kind, span)
         if not sampled and max(level.coverage.shape) <= LARGEST_TEXTURE:
@@ -132,14 +156,19 @@ def _write(fabric: Fabric, shown: Layout, folder: Path) -> int:
             sampled = True
         if level.coverage.size == 1:
             break
-        level = level.halved()
+        level, lit = level.halved(), halved(lit)
         height, width = level.coverage.shape
         levels.append((width, height))
         (place := folder / "mips" / f"{width}x{height}").mkdir(parents=True)
     listed = {**{name: (row.kind, row.meaning) for name, row in maps.items()}, "yarn_id": YARN_ID}
     write_openpbr(folder / DOCUMENT, fabric.name, material)
     about = _about(fabric, shown, material) | {
-        "height_span": span,
+        "height": {
+            "zero": "the middle plane of the cloth, where the axes of yarns change side",
+            "exr_unit_m": spacing_cm(fabric) / 100.0,
+            "png_black_m": span[0] * spacing_cm(fabric) / 100.0,
+            "png_white_m": span[1] * spacing_cm(fabric) / 100.0,
+        },
         "maps": {
             name: {"meaning": meaning, "kind": kind, "exr": f"{name}.exr", "png": f"{name}.png"}
             for name, (kind, meaning) in listed.items()
@@ -161,7 +190,7 @@ def _about(fabric: Fabric, shown: Layout, material: Constants) -> dict[str, Any]
         "yarns_per_cm": (ends, picks),
         "yarns_per_cm_source": "fabric" if fabric.yarns_per_cm else "default",
         "size_cm": (shown.ends / ends, shown.picks / picks),
-        "spacing_cm": spacing_cm(fabric),
+        "openpbr": OPENPBR,
         "orientation": "U along the picks, V along the ends; the lower left corner is the first end and pick",
         "material": {
             "ior": material.ior,

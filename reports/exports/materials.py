@@ -1,9 +1,9 @@
 """Materials made of the maps of a folder: a MaterialX document, and a draped sample of the cloth as GLB.
 
-The document is an OpenPBR surface [Andersson2024OpenPBR] whose inputs are the maps. Its `geometry_tangent` is the cross
-product of normal and fibre direction, because OpenPBR's tangent is the rougher direction. Light that goes through is
-the subsurface of a thin-walled surface with a scatter anisotropy of 1; its weight is the material's `transmitted`, and
-the base colour is divided by what is left.
+The document is an OpenPBR surface of version `OPENPBR` [Andersson2024OpenPBR] whose inputs are the maps. Its
+`geometry_tangent` is the cross product of normal and fibre direction, because OpenPBR's tangent is the rougher
+direction. Light that goes through is the subsurface of a thin-walled surface with a scatter anisotropy of 1; its
+weight is the material's `transmitted`, and the base colour is divided by what is left.
 
 The sample has the shape of the scene `drape`, in metres, y up: base colour with opacity, metallic-roughness, normal,
 and the extensions of glTF 2.0 [Khronos2021GLTF] KHR_materials_anisotropy, KHR_materials_specular (coloured),
@@ -30,6 +30,9 @@ from weaves.fabric import Fabric
 
 DOCUMENT: Final = "material.mtlx"
 SAMPLE: Final = "sample.glb"
+
+OPENPBR: Final = "1.1.2"
+"""Version of OpenPBR for which a document is made; 1.1.1 in MaterialX up to 1.39.5 squares `subsurface_color`."""
 
 DEFAULT_YARNS_PER_CM: Final = (20.0, 20.0)
 """Ends and picks per centimetre of a fabric that does not state them."""

@@ -4,7 +4,7 @@
 |---|---|---|
 | colour | linear RGB, 16-bit floats | sRGB, 8 bits |
 | direction | 0.5 + 0.5 w of a unit vector w, 16-bit floats | the same, 8 bits |
-| share | a number from 0 to 1, 16-bit float | the same, 8 bits |
+| share | numbers from 0 to 1, 16-bit floats | the same, 8 bits |
 | height | as it is, 32-bit float | 0 at the lowest, 65535 at the highest |
 | number | a whole number, 32-bit float | the same, 16 bits |
 
@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from reports.images.exr import RGB, write_exr
+from reports.images.exr import write_exr
 from reports.images.tiles import encoded
 
 Kind = Literal["colour", "direction", "share", "height", "number"]
@@ -36,7 +36,7 @@ def write_texture(path: Path, plane: npt.NDArray[Any], kind: Kind, span: tuple[f
     ----------
     path : Path
         Without a suffix; its folder exists.
-    plane : (H, W) or (H, W, 3)
+    plane : (H, W) or (H, W, 3); shares also (H, W, 4)
         Values; directions as unit vectors.
     kind : str
         What the values are.
@@ -45,7 +45,7 @@ def write_texture(path: Path, plane: npt.NDArray[Any], kind: Kind, span: tuple[f
     """
     values = 0.5 + 0.5 * plane if kind == "direction" else plane
     shown = values[::-1]
-    channels = {"Y": shown} if shown.ndim == 2 else {name: shown[..., axis] for axis, name in enumerate(RGB)}
+    channels = {"Y": shown} if shown.ndim == 2 else {"RGBA"[axis]: shown[..., axis] for axis in range(shown.shape[-1])}
     write_exr(path.with_name(f"{path.name}.exr"), channels, half=channels if kind in _HALF else (), durable=False)
     path.with_name(f"{path.name}.png").write_bytes(png_bytes(values, kind, span))
 

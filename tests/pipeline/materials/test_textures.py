@@ -23,11 +23,11 @@ def maps_of(fabric, size, halvings=0):
     return textures(level, constants(fabric, share))
 
 
-def diffuse_albedo(fabric, side):
-    """Return the truth's diffuse reflectance under an even sky, from above, by a grid of directions."""
+def diffuse_albedo(fabric, side, sky=1.0):
+    """Return the truth's diffuse share of an even sky's light above (1) or behind (-1), by a grid of directions."""
     square, turn = (np.stack(np.meshgrid(*[(np.arange(side) + 0.5) / side] * 2), -1).reshape(-1, 2)).T
     z, sine, turn = np.sqrt(square), np.sqrt(1.0 - square), 2.0 * math.pi * turn
-    wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1)
+    wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), sky * z], axis=-1)
     none, size = np.zeros(len(wi)), np.full(len(wi), 2.0 * max(fabric.repeat))
     queries = Queries.round(none, none, size, wi, np.tile([0.0, 0.0, 1.0], (len(wi), 1)))
     options = TruthOptions(estimator="mc", relative_error=0.02, max_count=16384)
@@ -42,6 +42,13 @@ def test_the_mean_base_colour_is_the_diffuse_albedo_of_the_truth(name, side):
     maps = maps_of(fabric, 1024 if name == "tartan" else 256)
     found = (maps.base_color * maps.opacity[..., None]).mean(axis=(0, 1))
     np.testing.assert_allclose(found, diffuse_albedo(fabric, side), rtol=0.03)
+
+
+def test_the_mean_transmitted_colour_is_what_the_truth_lets_through():
+    fabric = load_fabric("gauze")
+    maps = maps_of(fabric, 256)
+    through = (maps.transmission_color * maps.opacity[..., None]).mean(axis=(0, 1))
+    np.testing.assert_allclose(through, diffuse_albedo(fabric, 16, sky=-1.0), rtol=0.03)
 
 
 def test_on_one_fibre_the_roughness_is_that_of_the_fibre():
