@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -241,7 +241,9 @@ class Loom(Family):
     family: Literal["loom"] = "loom"
     threading: tuple[StrictInt, ...] = Field(min_length=1)
     """Shaft of each end, from 1."""
-    tie_up: tuple[tuple[StrictBool | StrictInt, ...], ...]
+    tie_up: tuple[Annotated[tuple[StrictBool | StrictInt, ...], Field(max_length=LARGEST_REPEAT)], ...] = Field(
+        max_length=LARGEST_REPEAT
+    )
     """One row per treadle: 1 for each shaft that it lifts, else 0."""
     treadling: tuple[StrictInt, ...] = Field(min_length=1)
     """Treadle of each pick, from 1."""

@@ -20,9 +20,7 @@ from weaves.draft_files.read import DraftFile, DraftThreads
 from weaves.errors import BadInput, one_line
 from weaves.fabric import Fabric
 from weaves.validation import validated
-
-NARROWEST_YARN: Final = 0.05
-"""Least width of a yarn, in yarn spacings."""
+from weaves.yarn import NARROWEST_YARN
 
 LONG_REPEAT: Final = 128
 """Threads of a longer repeat are searched for a shorter one, of which the last is not whole."""

@@ -24,11 +24,11 @@ DECIPOINTS: Final = 720 / 2.54
 def wif_text(fabric: Fabric) -> str:
     """Return a fabric as a Weaving Information File, version 1.1.
 
-    Threading, tie-up and treadling are those of `Draft.loom`. The file has as many ends and picks as the repeats of
+    Threading, tie-up and treadling are those of `Fabric.loom`. The file has as many ends and picks as the repeats of
     structure and colours fill. Spacing and thickness are written if the fabric has `yarns_per_cm`. BadInput if more
     than `MOST_THREADS` ends or picks would be needed.
     """
-    loom = fabric.weave.loom()
+    loom = fabric.loom()
     tieup = {
         treadle: {shaft for shaft, lifted in enumerate(shafts, 1) if lifted}
         for treadle, shafts in enumerate(loom.tie_up, 1)
