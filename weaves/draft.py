@@ -7,9 +7,10 @@ first. A float is a run of cells, cyclic in the repeat, over which one yarn stay
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -82,9 +83,22 @@ class Draft:
         An 8-end satin has 64 cells of 8 different kinds. Each translation group has as many members in every orbit, so
         the number is that of all cells over that of the translations.
         """
-        matrix = self.warp_over
-        shifts = sum(np.array_equal(np.roll(matrix, shift, (0, 1)), matrix) for shift in np.ndindex(matrix.shape))
-        return int(matrix.size // shifts)
+        return self.warp_over.size // len(translations(self.warp_over))
+
+    def loom(self) -> Loom:
+        """Return a loom that weaves it: ends that rise together have one shaft, picks that lift the same one treadle.
+
+        Shafts and treadles are numbered as they appear.
+        """
+        threading, shafts = numbered([end.tobytes() for end in self.warp_over.T])
+        treadling, treadles = numbered([pick.tobytes() for pick in self.warp_over])
+        first = [threading.index(shaft) for shaft in range(len(shafts))]
+        tie_up = self.warp_over[[treadling.index(treadle) for treadle in range(len(treadles))]][:, first]
+        return Loom(
+            threading=tuple(shaft + 1 for shaft in threading),
+            tie_up=tuple(map(tuple, tie_up.astype(int).tolist())),
+            treadling=tuple(treadle + 1 for treadle in treadling),
+        )
 
     def hangs_together(self) -> bool:
         """Return whether no yarns lie loose on the others, so that the cloth does not come apart.
@@ -111,6 +125,22 @@ class Draft:
         return (ends, picks), min(
             np.packbits(windows[pick, end]).tobytes() for windows in shifted for pick, end in np.ndindex(picks, ends)
         )
+
+
+def translations(matrix: Bools) -> npt.NDArray[np.int64]:
+    """Return the shifts by rows and columns that map a cyclic matrix onto itself, (n, 2), in order from (0, 0) on.
+
+    All cells agree where the autocorrelation of their signs has its full value; each that does not lowers it by 2.
+    """
+    spectrum = np.fft.rfft2(np.where(matrix, 1.0, -1.0))
+    agreement = np.fft.irfft2(spectrum * spectrum.conj(), matrix.shape)
+    return np.argwhere(agreement > matrix.size - 1.0)
+
+
+def numbered(rows: Sequence[Hashable]) -> tuple[list[int], list[Hashable]]:
+    """Return a number for each row, equal for equal ones, counted from 0 as they appear; and the different rows."""
+    different: dict[Hashable, int] = {}
+    return [different.setdefault(row, len(different)) for row in rows], list(different)
 
 
 class Cells(NamedTuple):
@@ -149,16 +179,14 @@ def cells(draft: Draft) -> Cells:
 
 def _runs(side: Bools) -> tuple[Floats, Floats]:
     """Measure the cyclic runs of equal values down the columns: length, and place from the middle of the run."""
-    length, offset = np.full(side.shape, np.inf), np.zeros(side.shape)
-    count = len(side)
-    for column in range(side.shape[1]):
-        changes = np.flatnonzero(side[:, column] != np.roll(side[:, column], 1))
-        for first, following in zip(changes, np.roll(changes, -1), strict=True):
-            cells_in_run = (following - first) % count
-            index = (first + np.arange(cells_in_run)) % count
-            length[index, column] = cells_in_run
-            offset[index, column] = np.arange(cells_in_run) - (cells_in_run - 1) / 2
-    return length, offset
+    count, row = len(side), np.arange(2 * len(side))[:, None]
+    begins = np.tile(side != np.roll(side, 1, axis=0), (2, 1))
+    begin = np.maximum.accumulate(np.where(begins, row, -1))[count:]
+    following = np.minimum.accumulate(np.where(begins, row, 2 * count)[::-1])[-2 : -count - 2 : -1]
+    place = row[count:] - begin
+    length = place + following - row[:count]
+    changes = begins.any(axis=0)
+    return np.where(changes, length, np.inf), np.where(changes, place - (length - 1) / 2, 0.0)
 
 
 def smallest_repeat(matrix: Bools) -> Bools:
@@ -213,7 +241,9 @@ class Loom(Family):
     family: Literal["loom"] = "loom"
     threading: tuple[StrictInt, ...] = Field(min_length=1)
     """Shaft of each end, from 1."""
-    tie_up: tuple[tuple[StrictBool | StrictInt, ...], ...]
+    tie_up: tuple[Annotated[tuple[StrictBool | StrictInt, ...], Field(max_length=LARGEST_REPEAT)], ...] = Field(
+        max_length=LARGEST_REPEAT
+    )
     """One row per treadle: 1 for each shaft that it lifts, else 0."""
     treadling: tuple[StrictInt, ...] = Field(min_length=1)
     """Treadle of each pick, from 1."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,6 +17,7 @@ import tomli_w
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, Strict, model_serializer, model_validator
 
 from weaves.colour_order import ColourOrder, ThreadColours, colours_of_yarns
+from weaves.count import PerCm, with_widths
 from weaves.draft import Draft, Loom, Matrix
 from weaves.errors import BadInput, nearest
 from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill
@@ -38,10 +40,6 @@ def _file_name(name: str) -> str:
     return name
 
 
-YarnCount = Annotated[float, Strict(), Field(ge=0.1, le=1000)]
-"""Yarns per centimetre."""
-
-
 class Fabric(Frozen):
     """A woven fabric.
 
@@ -54,14 +52,16 @@ class Fabric(Frozen):
     0.5
     """
 
+    also_read = ("sett",)
+
     name: Annotated[str, AfterValidator(_file_name)]
     """Letters, digits, - and _: it becomes part of file names."""
     source: str = Field(default="", max_length=2000)
     """Source of the numbers."""
     optical_thickness: Annotated[float, Strict()] = Field(default=2.0, ge=0.001, le=100)
     """Optical thickness T of the yarn layer."""
-    yarns_per_cm: tuple[YarnCount, YarnCount] | None = None
-    """Ends per centimetre and picks per centimetre: the physical size, where it is known."""
+    yarns_per_cm: tuple[PerCm, PerCm] | None = None
+    """Ends per centimetre and picks per centimetre: the physical size, where it is known; a file may call it `sett`."""
     draft: Weave
     """The weave family and its numbers."""
     warp: Yarn
@@ -70,6 +70,11 @@ class Fabric(Frozen):
     """The yarns along x."""
     colours: ColourOrder | None = None
     """Colours of single ends and picks, in place of the colours of the two yarns."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_counts(cls, table: Any) -> Any:
+        return with_widths(table) if isinstance(table, Mapping) else table
 
     @model_validator(mode="after")
     def _keeps_energy(self) -> Fabric:
@@ -102,6 +107,10 @@ class Fabric(Frozen):
     def weave(self) -> Draft:
         """The draft, woven."""
         return _woven(self.draft)
+
+    def loom(self) -> Loom:
+        """Return the loom that weaves it: that of the file if it states one, else `Draft.loom`."""
+        return self.draft if isinstance(self.draft, Loom) else self.weave.loom()
 
     @property
     def repeat(self) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_args
+from typing import Any, ClassVar, Final, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -32,6 +32,9 @@ class Frozen(BaseModel):
     """Data from outside or for an identity: fixed, without other keys, every number finite."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    also_read: ClassVar[tuple[str, ...]] = ()
+    """Keys that a file may have in place of fields."""
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -132,7 +135,7 @@ def _fields_at(model: type[BaseModel], location: Sequence[int | str]) -> set[str
         ]
         # A step that is no field is an index (stay) or the tag of a union (choose).
         models = inner or [known for known in models if _tagged(known, step)] or models
-    return {name for known in models for name in known.model_fields}
+    return {name for known in models for name in (*known.model_fields, *getattr(known, "also_read", ()))}
 
 
 def _models(field: Any) -> list[type[BaseModel]]:

@@ -27,7 +27,7 @@ reciprocal and may exceed 1: it has 2.5 for light at 88 degrees behind a satin b
 from __future__ import annotations
 
 import math
-from typing import Annotated, cast
+from typing import Annotated, Final, cast
 
 from pydantic import Field, Strict
 
@@ -37,6 +37,9 @@ from weaves.validation import Frozen
 
 Number = Annotated[float, Strict()]
 
+NARROWEST_YARN: Final = 0.05
+"""Least width of a yarn, in yarn spacings."""
+
 _CHANNELS = ("red", "green", "blue")
 _ROUNDING = 1e-9  # of sums of colours
 
@@ -44,7 +47,9 @@ _ROUNDING = 1e-9  # of sums of colours
 class Yarn(Frozen):
     """One family of yarns, warp or weft."""
 
-    width: Number = Field(default=1.0, ge=0.05, le=1)
+    also_read = ("tex", "ne", "fibre_density", "packing")
+
+    width: Number = Field(default=1.0, ge=NARROWEST_YARN, le=1)
     """Gap scale g: width of the yarn in yarn spacings; below 1 the cloth has gaps."""
     bend: Number = Field(ge=0, le=85)
     """Largest inclination of a float, u_max, in degrees; 0 is drawn flat."""

@@ -1,6 +1,6 @@
 """`twillight show`: a fabric's drawdown and yarns on the terminal, and its pictures.
 
-Pictures are a lit swatch and the drawdown, also in colours, as PNG. Maps of the geometry are PNG and EXR.
+Pictures are the whole draft and a lit swatch, as PNG. Maps of the geometry are PNG and EXR.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ from pipeline.atomic import atomic_write
 from pipeline.scenes.catalogue import load_scene
 from pipeline.truth.options import TABLE_CELLS
 from reports.images import tiles
+from reports.images.draft import draft
 from reports.images.exr import write_exr
 from weaves.colour_order import ColourOrder
+from weaves.count import cover
 from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric
 from weaves.surface import GAP, surface_maps
@@ -50,7 +52,7 @@ _UNITS: Final = {"width": "yarn spacings", "bend": "degrees", "twist": "degrees"
 def show(
     fabric: FabricName,
     *,
-    out: Annotated[Local | None, Parameter(help="Folder for pictures: drawdown and lit swatch.")] = None,
+    out: Annotated[Local | None, Parameter(help="Folder for pictures: the draft and a lit swatch.")] = None,
     maps: Annotated[bool, Parameter(help="Also height and normals, as PNG and EXR.", negative="")] = False,
     size: Annotated[str, Parameter(help="WIDTHxHEIGHT of the swatch in pixels.")] = SWATCH_SIZE,
 ) -> None:
@@ -60,15 +62,9 @@ def show(
         raise BadInput("show", "", "--out is missing", "a folder is needed for pictures")
     _print_fabric(cloth)
     if out is not None:
-        with Terminal().status("pictures"):
-            paths = [*write_pictures(cloth, out), *(write_maps(cloth, out) if maps else [])]
-            paths.append(write_swatch(fabric, cloth, out, size))
-        print_lines(*paths)
-
-
-def write_pictures(fabric: Fabric, folder: Path) -> list[Path]:
-    """Write the drawdown, in black and in colours, into a folder and return the paths."""
-    return _drawn(fabric, folder, tiles.drawdown, tiles.colours)
+        with Terminal().status("draft and maps" if maps else "draft"):
+            paths = [*_drawn(cloth, out, draft), *(write_maps(cloth, out) if maps else [])]
+        print_lines(*paths, write_swatch(fabric, cloth, out, size))
 
 
 def _drawn(fabric: Fabric, folder: Path, *draws: Callable[[Fabric], bytes]) -> list[Path]:
@@ -124,6 +120,12 @@ def _print_fabric(fabric: Fabric) -> None:
         warp, weft = (f"{value:g}" if isinstance(value, float) else str(value) for value in values)
         rows.append((name, warp, weft, _UNITS.get(name, "")))
     print_table(("yarn", "warp", "weft", "unit"), rows, text=("warp", "weft", "unit"))
+    closed = cover(fabric.warp, fabric.weft)
+    shares = f"warp {closed.warp:.1%}, weft {closed.weft:.1%}, cloth {closed.cloth:.1%}; openness {closed.openness:.1%}"
+    print_lines(f"cover factor: {shares}")
+    if closed.openness:
+        angles = f"{closed.cut_off_along_warp:.0f}° along the warp, {closed.cut_off_along_weft:.0f}° along the weft"
+        print_lines(f"cut-off angle of light through the gaps: {angles}")
     if fabric.colours:
         print_lines(*_colours(fabric.colours))
     print_lines(f"optical thickness {fabric.optical_thickness:g}", fabric.source)

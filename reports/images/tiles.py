@@ -38,8 +38,6 @@ SCALE: Final = 2
 CELLS: Final = 16
 """Yarns shown in each direction by the maps of the repeat."""
 CELL_PIXELS: Final = 12
-MOST_CELLS: Final = 512
-"""Most threads, and pixels, shown in each direction by the drawdown in colours."""
 
 Bytes8 = npt.NDArray[np.uint8]
 
@@ -86,29 +84,6 @@ def overview(exrs: Sequence[Exr], columns: int) -> bytes:
     return png(np.concatenate(rows, axis=0))
 
 
-def drawdown(fabric: Fabric) -> bytes:
-    """Return the drawdown, warp over in black, the first pick at the bottom."""
-    picks, ends = (np.arange(CELLS) % count for count in fabric.weave.warp_over.shape)
-    cells = np.where(fabric.weave.warp_over[picks][::-1, ends], 35, 250).astype(np.uint8)
-    grey = cells.repeat(CELL_PIXELS, axis=0).repeat(CELL_PIXELS, axis=1)
-    lines = np.arange(len(grey)) % CELL_PIXELS == 0
-    grey[lines], grey[:, lines] = 190, 190
-    return png(_opaque(np.stack([grey] * 3, axis=-1)), 1)
-
-
-def colours(fabric: Fabric) -> bytes:
-    """Return the drawdown in the diffuse colour of the thread on top, the first pick at the bottom.
-
-    It shows the repeat of weave and colours, at least `CELLS` and at most `MOST_CELLS` threads in each direction.
-    """
-    warp, weft = (encoded(threads.diffuse) for threads in fabric.thread_colours())
-    ends, picks = (np.arange(min(max(extent, CELLS), MOST_CELLS)) for extent in fabric.repeat)
-    over = fabric.weave.warp_over[picks[:, None] % fabric.weave.repeat[1], ends % fabric.weave.repeat[0]]
-    shown = np.where(over[..., None], warp[ends % len(warp)][None], weft[picks % len(weft)][:, None])[::-1]
-    side = max(1, MOST_CELLS // max(over.shape))
-    return png(_opaque(shown.repeat(side, axis=0).repeat(side, axis=1)), 1)
-
-
 def height(fabric: Fabric) -> bytes:
     """Return the height map, black to white from the lowest to the highest point; gaps are black."""
     surface = _surface(fabric)
@@ -122,7 +97,7 @@ def normals(fabric: Fabric) -> bytes:
     """Return the normal map: (n + 1) / 2 as red, green, blue; gaps are black."""
     surface = _surface(fabric)
     colours = np.where((surface.yarn != GAP)[..., None], 0.5 * surface.normal + 0.5, 0.0)
-    return png(_opaque(np.rint(255 * colours).astype(np.uint8)), 1)
+    return png(opaque(np.rint(255 * colours).astype(np.uint8)), 1)
 
 
 def hex_colour(linear: Sequence[float]) -> str:
@@ -154,7 +129,8 @@ def _surface(fabric: Fabric) -> ClothSurface:
     return surface_at(fabric, centres, centres[::-1, None])
 
 
-def _opaque(rgb: Bytes8) -> Bytes8:
+def opaque(rgb: Bytes8) -> Bytes8:
+    """Return a picture (H, W, 3) with its opacity as a fourth channel, 255 everywhere."""
     return np.concatenate([rgb, np.full((*rgb.shape[:2], 1), 255, np.uint8)], axis=-1)
 
 

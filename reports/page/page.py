@@ -16,6 +16,7 @@ import pandas as pd
 
 from pipeline.atomic import atomic_write
 from reports.images import tiles
+from reports.images.draft import drawdown
 from reports.images.exr import film, read_exr
 from reports.page import figures, front_figures
 from reports.page.content import PageInput
@@ -111,7 +112,6 @@ def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
     for scene, files in films(page.pictures).items():
         yield f"film-{scene}.png", filmstrip({file.stem: film(read_exr(file.path)) for file in files})
     for fabric, _ in page.fabrics:
-        drawdown = tiles.drawdown if fabric.colours is None else tiles.colours
         for kind, draw in (("drawdown", drawdown), ("height", tiles.height), ("normals", tiles.normals)):
             yield f"{fabric.name}-{kind}.png", draw(fabric)
     spheres = [exr for (fabric, scene), exr in truths.items() if fabric and scene == "sphere"]

@@ -6,7 +6,7 @@ A draft file says nothing of fibres, twist, bend or roughness. Everything that i
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -15,14 +15,12 @@ import numpy as np
 
 from weaves.colour import linear_rgb
 from weaves.colour_order import MOST_COLOURS
-from weaves.draft import LARGEST_REPEAT, Bools, Draft, smallest_period
+from weaves.draft import LARGEST_REPEAT, Bools, Draft, numbered, smallest_period
 from weaves.draft_files.read import DraftFile, DraftThreads
 from weaves.errors import BadInput, one_line
 from weaves.fabric import Fabric
 from weaves.validation import validated
-
-NARROWEST_YARN: Final = 0.05
-"""Least width of a yarn, in yarn spacings."""
+from weaves.yarn import NARROWEST_YARN
 
 LONG_REPEAT: Final = 128
 """Threads of a longer repeat are searched for a shorter one, of which the last is not whole."""
@@ -85,12 +83,6 @@ def fabric_of(
     table |= {"yarns_per_cm": size} if size else {}
     table |= yarns | ({"colours": colours} if colours else {})
     return Imported(validated(Fabric, table, where), tuple(read), tuple(assumed))
-
-
-def numbered(rows: Sequence[Hashable]) -> tuple[list[int], list[Hashable]]:
-    """Return a number for each row, equal for equal ones, counted from 0 as they appear; and the different rows."""
-    different: dict[Hashable, int] = {}
-    return [different.setdefault(row, len(different)) for row in rows], list(different)
 
 
 def _repeat(over: Bools, where: str, read: list[str], assumed: list[str]) -> Bools:

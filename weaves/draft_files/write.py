@@ -13,7 +13,7 @@ from dtx_to_wif import PatternData, WarpWeftData, write_wif
 
 from weaves.colour import encoded
 from weaves.colour_order import MOST_THREADS
-from weaves.draft_files.to_fabric import numbered
+from weaves.draft import numbered
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -24,26 +24,23 @@ DECIPOINTS: Final = 720 / 2.54
 def wif_text(fabric: Fabric) -> str:
     """Return a fabric as a Weaving Information File, version 1.1.
 
-    Ends that rise together are on one shaft, picks that lift the same shafts have one treadle; both are numbered as
-    they appear. The file has as many ends and picks as the repeats of structure and colours fill. Spacing and thickness
-    are written if the fabric has `yarns_per_cm`. BadInput if more than `MOST_THREADS` ends or picks would be needed.
+    Threading, tie-up and treadling are those of `Fabric.loom`. The file has as many ends and picks as the repeats of
+    structure and colours fill. Spacing and thickness are written if the fabric has `yarns_per_cm`. BadInput if more
+    than `MOST_THREADS` ends or picks would be needed.
     """
-    over = fabric.weave.warp_over
-    threading, _ = numbered([line.tobytes() for line in over.T.copy()])
-    treadling, _ = numbered([line.tobytes() for line in over])
-    shafts = [threading.index(shaft) for shaft in range(max(threading) + 1)]
+    loom = fabric.loom()
     tieup = {
-        treadle + 1: {shaft + 1 for shaft, end in enumerate(shafts) if over[treadling.index(treadle), end]}
-        for treadle in range(max(treadling) + 1)
+        treadle: {shaft for shaft, lifted in enumerate(shafts, 1) if lifted}
+        for treadle, shafts in enumerate(loom.tie_up, 1)
     }
     orders = [[_eight_bits(colour) for colour in threads.diffuse] for threads in fabric.thread_colours()]
     _, table = numbered([colour for order in orders for colour in order])
     axes = []
-    for key, repeat, order in (("ends", threading, orders[0]), ("picks", treadling, orders[1])):
+    for key, repeat, order in (("ends", loom.threading, orders[0]), ("picks", loom.treadling, orders[1])):
         if (threads := lcm(len(repeat), len(order))) > MOST_THREADS:
             needed = f"structure and colours repeat together after {threads:,} {key}"
             raise BadInput(fabric.name, "", needed, f"at most {MOST_THREADS:,} can be written to a draft file")
-        numbers = {index + 1: {repeat[index % len(repeat)] + 1} for index in range(threads)}
+        numbers = {index + 1: {repeat[index % len(repeat)]} for index in range(threads)}
         colours = {index + 1: table.index(order[index % len(order)]) + 1 for index in range(threads)}
         axes.append((numbers, colours))
     pattern = PatternData(
@@ -60,7 +57,7 @@ def wif_text(fabric: Fabric) -> str:
         color_range=(0, 255),
         source_program="twillight",
         source_version=version("twillight"),
-        num_shafts=len(shafts),
+        num_shafts=len(loom.tie_up[0]),
         num_treadles=len(tieup),
     )
     file = io.StringIO()

@@ -130,17 +130,17 @@ def starting_points(field: HeightField, count: int) -> Start:
     areas = np.array([2.0 * piece.radius * (piece.along[1] - piece.along[0]) for _, piece in yarns])
     fewest = min(_FEWEST, max(count // len(yarns), 1))
     counts = np.maximum(np.ceil(count * areas / areas.sum()).astype(np.int64), fewest)
-    columns = []
-    for number, ((orbit, piece), points) in enumerate(zip(yarns, counts.tolist(), strict=True)):
-        (pick, end), (low, high) = orbit[0], piece.along
-        shift = np.array([uniform(np.uint64(0), number, d) for d in range(4)])
-        numbers = (shift[:, None] + _FOUR ** -np.arange(1.0, 5.0)[:, None] * np.arange(points)) % 1.0
-        v = np.pi * (numbers[0] - 0.5)
-        across, along = 0.5 + piece.radius * np.sin(v), low + (high - low) * numbers[1]
-        x, y = (across, along) if piece.family == WARP else (along, across)
-        share = np.pi * piece.radius * np.cos(v) * (high - low) / points
-        columns.append(np.stack([end + x, pick + y, share, numbers[2], numbers[3]]))
-    return Start(*np.ascontiguousarray(np.concatenate(columns, axis=1)))
+    shift = np.array([[uniform(np.uint64(0), number, d) for number in range(len(yarns))] for d in range(4)])
+    rows = [(*orbit[0], *piece.along, piece.radius, piece.family) for orbit, piece in yarns]
+    of = np.repeat(np.arange(len(yarns)), counts)  # the piece of each point
+    pick, end, low, high, radius, family = np.array(rows, np.float64)[of].T
+    point = np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
+    numbers = (shift[:, of] + _FOUR ** -np.arange(1.0, 5.0)[:, None] * point) % 1.0
+    v = np.pi * (numbers[0] - 0.5)
+    across, along = 0.5 + radius * np.sin(v), low + (high - low) * numbers[1]
+    x, y = np.where(family == WARP, (across, along), (along, across))
+    share = np.pi * radius * np.cos(v) * (high - low) / counts[of]
+    return Start(*np.stack([end + x, pick + y, share, numbers[2], numbers[3]]))
 
 
 def transport(

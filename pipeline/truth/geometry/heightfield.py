@@ -69,17 +69,16 @@ def height_field(fabric: Fabric) -> HeightField:
         row[[SIN_TWIST, COS_TWIST]] = math.sin(twist), math.cos(twist)
     floats = np.zeros((*table.top.shape, 2, 4))
     crown = np.zeros(table.top.shape)
-    for pick, end in np.ndindex(*table.top.shape):
-        for side, offset, length in (
-            (TOP, table.top_offset[pick, end], table.top_length[pick, end]),
-            (UNDER, table.under_offset[pick, end], table.under_length[pick, end]),
-        ):
-            family = int(table.top[pick, end]) if side == TOP else 1 - int(table.top[pick, end])
-            own = _float_row(float(offset), float(length), families[family].width, families[family].bend)
-            floats[pick, end, side] = own
+    for side, offset, length in (
+        (TOP, table.top_offset, table.top_length),
+        (UNDER, table.under_offset, table.under_length),
+    ):
+        for family, y in enumerate(families):
+            here = (table.top == family) == (side == TOP)
+            own = _float_rows(offset[here], length[here], y.width, y.bend)
+            floats[here, side] = own
             if side == TOP or families[1 - family].width < 1.0:
-                rise = families[family].relief * _rise(side, own, yarn[family, RADIUS])
-                crown[pick, end] = max(float(crown[pick, end]), rise)
+                crown[here] = np.maximum(crown[here], y.relief * _rise(side, own, yarn[family, RADIUS]))
     sag = floats[..., BEND_RADIUS] - floats[..., AXIS_DROP]
     lowest = -float(max(y.relief for y in families) * sag.max())
     return HeightField(
@@ -87,25 +86,24 @@ def height_field(fabric: Fabric) -> HeightField:
     )
 
 
-def _float_row(offset: float, length: float, width: float, bend_degrees: float) -> tuple[float, float, float, float]:
-    """Return offset, bend radius, half length and R cos(u_max) of a float; bend radius 0 where it is drawn flat."""
+def _float_rows(offset: Float64, length: Float64, width: float, bend_degrees: float) -> Float64:
+    """Return offset, bend radius, half length and R cos(u_max) of floats, (N, 4); bend radius 0 if drawn flat."""
     sine = math.sin(math.radians(bend_degrees))
-    if not math.isfinite(length) or sine == 0.0 or width * sine >= length:
-        return offset, 0.0, 0.5 * length, 0.0
-    radius = length / (2.0 * sine)
-    return offset, radius, 0.5 * length, radius * math.cos(math.radians(bend_degrees))
+    bent = np.isfinite(length) & (width * sine < length)
+    radius = np.where(bent, length, 0.0) / (2.0 * sine) if sine else np.zeros_like(length)
+    return np.stack([offset, radius, 0.5 * length, radius * math.cos(math.radians(bend_degrees))], axis=-1)
 
 
-def _rise(side: int, row: tuple[float, float, float, float], radius: float) -> float:
-    """Return the greatest height of a float before relief: at its middle on top, at its ends beneath."""
-    _, bend, half, drop = row
-    if bend == 0.0:
-        return radius
-    if side == TOP:
-        return radius + bend - drop
-    inner = bend - radius
-    arc = inner * half / bend
-    return drop - math.sqrt((inner - arc) * (inner + arc)) + (half - arc) * half / drop
+def _rise(side: int, rows: Float64, radius: float) -> Float64:
+    """Return the greatest heights of floats before relief, (N,): at their middle on top, at their ends beneath."""
+    rise = radius + rows[:, BEND_RADIUS] - rows[:, AXIS_DROP]
+    if side == UNDER:
+        bent = rows[:, BEND_RADIUS] > 0.0
+        _, bend, half, drop = rows[bent].T
+        inner = bend - radius
+        arc = inner * half / bend
+        rise[bent] = drop - np.sqrt((inner - arc) * (inner + arc)) + (half - arc) * half / drop
+    return rise
 
 
 @kernel

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+import weaves.draft
 from pipeline.compiled.arrays import Float64, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.geometry.heightfield import (
@@ -115,34 +116,22 @@ Cell = tuple[int, int]
 
 def translations(field: HeightField) -> tuple[Cell, ...]:
     """Return the shifts by picks and ends that map the cloth onto itself; (0, 0) is the first."""
-    return _translations(field.top.shape, field.top.tobytes(), field.floats.tobytes())
+    return _translations(field.top.shape, field.top.tobytes())
 
 
 @lru_cache(maxsize=256)
-def _translations(shape: Cell, top: bytes, floats: bytes) -> tuple[Cell, ...]:
-    """Return the shifts; the bytes are those of `HeightField.top` and `HeightField.floats`."""
-    cells = np.frombuffer(top, np.int8).reshape(shape)
-    of_cells = np.frombuffer(floats, np.float64).reshape(*shape, -1)
-    return tuple(
-        shift
-        for shift in np.ndindex(shape)
-        if np.array_equal(np.roll(cells, shift, (0, 1)), cells)
-        and np.array_equal(np.roll(of_cells, shift, (0, 1)), of_cells)
-    )
+def _translations(shape: Cell, top: bytes) -> tuple[Cell, ...]:
+    """Return the shifts of `HeightField.top`: which yarn is on top says where every float begins and ends."""
+    shifts = weaves.draft.translations(np.frombuffer(top, np.int8).reshape(shape) == WARP)
+    return tuple((pick, end) for pick, end in shifts.tolist())
 
 
 def orbits(field: HeightField) -> list[list[Cell]]:
     """Return the cells of the repeat in orbits, each orbit from its first cell on."""
-    picks, ends = field.top.shape
-    shifts = translations(field)
-    left = dict.fromkeys(np.ndindex(picks, ends))
-    found = []
-    while left:
-        pick, end = next(iter(left))
-        found.append([((pick + p) % picks, (end + e) % ends) for p, e in shifts])
-        for cell in found[-1]:
-            del left[cell]
-    return found
+    length, height, _ = lattice(field)
+    first = np.stack(np.divmod(np.arange(height * length), length), axis=-1)
+    cells = (first[:, None] + np.array(translations(field))) % field.top.shape
+    return [[(pick, end) for pick, end in orbit] for orbit in cells.tolist()]
 
 
 def different_cells(field: HeightField) -> int:
