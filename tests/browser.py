@@ -29,8 +29,9 @@ os.execvp("chromium", ["chromium", *sys.argv[3:]])
 
 
 class Page:
-    """A page in a browser; `messages` are what it wrote to the console, `errors` those of them that are errors, `requests`
-    the addresses that it asked for.
+    """A page in a browser.
+
+    `messages` are what it wrote to the console, `errors` those that are errors, `requests` the addresses it asked for.
     """
 
     def __init__(self, process, write, read):

@@ -17,7 +17,7 @@ const YARN = { roughness: ["Roughness", 0.05, 1, 0.01, ""], twist: ["Twist", -60
   blend: ["Round shading", 0, 1, 0.01, ""] };
 const TILES = { truth: "Truth", flat: "Truth, flat footprints", map_material: "Texture maps" };
 const FRAME = 1000 / 30; // milliseconds of a coarse picture
-const STRIP = 60; // milliseconds of a strip of the full one
+const STRIP = 100; // milliseconds of a strip of the full one
 const MOST_PIXELS = 1.6e6;
 const ERROR_SIZE = 128;
 
@@ -41,7 +41,7 @@ class Viewer {
       width: own(content.widths), warp: { ...content.warp }, weft: { ...content.weft }, thickness: content.thickness,
       colours: content.colours.map((colour) => [...colour]), view: null, target: [0, 0],
     };
-    return this.go(content.views.length - 1);
+    return this.go(content.start);
   }
 
   // Take a view of the page, one that has tiles.
