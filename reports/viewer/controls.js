@@ -29,7 +29,7 @@ class Viewer {
     this.levels = content.tables.filter((table) => table.bend === 1 && table.width === 1).map((table) => table.level);
     this.usual = this.levels.includes(2) ? 2 : this.levels[0];
     this.scale = 1 / 8;
-    this.drawn = Promise.resolve();
+    this.job = 0;
     this.reset();
   }
 
@@ -103,45 +103,56 @@ class Viewer {
 
   get methods() { return [this.method(this.state.left), this.method(this.state.right)]; }
 
-  // Draw the newest state, after what is being drawn now has ended, which a newer state ends early.
+  // Draw; returns a promise of the full picture of the newest state.
   draw() {
-    this.job = (this.job ?? 0) + 1;
-    const { job } = this;
+    this.job += 1;
     clearTimeout(this.settling);
     this.wake?.();
-    this.drawn = this.drawn.catch(() => {}).then(nextFrame).then(() => this.frame(job));
+    if (!this.busy) this.drawn = this.work();
     return this.drawn;
+  }
+
+  async work() {
+    this.busy = true;
+    try {
+      let job;
+      do {
+        await nextFrame();
+        ({ job } = this);
+        await this.frame(job);
+      } while (job !== this.job);
+    } finally {
+      this.busy = false;
+    }
   }
 
   // Draw at once as many pixels as a frame has time for, and all of them when nothing has moved for a moment.
   async frame(job) {
-    if (job !== this.job) return;
     const { picture, canvas, methods, state } = this;
     const ready = await picture.prepare(state, methods);
-    if (job !== this.job) return;
-    const whole = this.size;
+    let whole = this.size;
     if (this.resized) [canvas.width, canvas.height] = whole;
     const columns = ([width]) => Math.round(width * state.wipe);
+    let spent;
     if (methods.some((method) => method.kind === TILE)) {
       const { size } = this.content.views[state.view];
       const side = Math.min(...whole);
       const corner = whole.map((length) => (length - side) >> 1);
       const wipe = Math.round(within((whole[0] * state.wipe - corner[0]) / side, 0, 1) * size);
-      picture.gl.clear(picture.gl.COLOR_BUFFER_BIT);
       const box = [...corner, ...corner.map((low) => low + side)];
-      const spent = await picture.small(state, ready, [size, size], wipe, box, false);
-      this.show("full", methods, state);
-      this.tell(job, spent, [size, size]);
-      return;
-    }
-    const size = whole.map((length) => Math.max(16, Math.round(length * this.scale)));
-    let spent = await picture.small(state, ready, size, columns(size), [0, 0, ...whole], true);
-    const rows = (whole[1] * STRIP * this.scale ** 2) / spent;
-    this.scale = within(this.scale * Math.sqrt(FRAME / spent), 0.08, 1);
-    this.show("coarse", methods, state);
-    if (size[1] < whole[1]) {
-      await new Promise((done) => { this.wake = done; setTimeout(done, 150); });
-      spent = await this.refine(job, state, ready, whole, columns(whole), rows);
+      picture.gl.clear(picture.gl.COLOR_BUFFER_BIT);
+      whole = [size, size];
+      spent = await picture.small(state, ready, whole, wipe, box, false);
+    } else {
+      const size = whole.map((length) => Math.max(16, Math.round(length * this.scale)));
+      spent = await picture.small(state, ready, size, columns(size), [0, 0, ...whole], true);
+      const rows = (whole[1] * STRIP * this.scale ** 2) / spent;
+      this.scale = within(this.scale * Math.sqrt(FRAME / spent), 0.08, 1);
+      this.show("coarse", methods, state);
+      if (size[1] < whole[1] && job === this.job) {
+        await new Promise((done) => { this.wake = done; setTimeout(done, 150); });
+        spent = await this.refine(job, state, ready, whole, columns(whole), rows);
+      }
     }
     if (job !== this.job) return;
     this.show("full", methods, state);
