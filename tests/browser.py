@@ -29,11 +29,14 @@ os.execvp("chromium", ["chromium", *sys.argv[3:]])
 
 
 class Page:
-    """A page in a browser; `errors` are what it wrote to the console, `requests` the addresses that it asked for."""
+    """A page in a browser.
+
+    `messages` are what it wrote to the console, `errors` those that are errors, `requests` the addresses it asked for.
+    """
 
     def __init__(self, process, write, read):
         self._process, self._write, self._read, self._count, self._session = process, write, read, 0, None
-        self.errors, self.requests = [], []
+        self.messages, self.errors, self.requests = [], [], []
 
     def call(self, method, **parameters):
         """Call a method of the developer tools and return its result."""
@@ -53,14 +56,20 @@ class Page:
         assert "error" not in answer, answer["error"]
         return answer["result"]
 
-    def open(self, address, ready, before=""):
-        """Load an address after the script `before`, and wait until the expression `ready` is true."""
+    def open(self, address, ready, before="", size=(480, 400, 1.0), scheme="light"):
+        """Load an address after the script `before`, and wait until the expression `ready` is true.
+
+        `size` has width and height in pixels of CSS, and screen pixels for each of them; `scheme` is "light" or "dark".
+        """
         (target,) = [t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page"]
         attached = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)
         self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
-        self.call("Emulation.setDeviceMetricsOverride", width=480, height=400, deviceScaleFactor=1, mobile=False)
+        width, height, ratio = size
+        metrics = {"width": width, "height": height, "deviceScaleFactor": ratio, "mobile": width < 480}
+        self.call("Emulation.setDeviceMetricsOverride", **metrics)
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
         self.call("Page.addScriptToEvaluateOnNewDocument", source=before)
         self.call("Page.navigate", url=address)
         self.run(f"new Promise(done => {{ const look = () => {ready} ? done() : setTimeout(look, 50); look(); }})")
@@ -80,6 +89,8 @@ class Page:
 
     def _note(self, event):
         kind, about = event.get("method"), event.get("params", {})
+        if kind in ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded"):
+            self.messages.append(str(about))
         if kind == "Runtime.exceptionThrown":
             self.errors.append(about["exceptionDetails"]["text"])
         elif kind == "Runtime.consoleAPICalled" and about["type"] == "error":
@@ -91,7 +102,7 @@ class Page:
 
 
 @contextmanager
-def opened(address, profile, *options, ready, before=""):
+def opened(address, profile, *options, ready, **how):
     """Yield a page as `Page.open` loads it; skip the test without Chromium."""
     if shutil.which("chromium") is None:
         pytest.skip("chromium is not installed")
@@ -108,7 +119,7 @@ def opened(address, profile, *options, ready, before=""):
         os.close(up[1])
         try:
             page = Page(own, write, read)
-            page.open(address, ready, before)
+            page.open(address, ready, **how)
             yield page
         finally:
             own.terminate()

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from jobs.terminal import Terminal, print_lines
+from jobs.terminal import Terminal, print_lines, progress
 from jobs.verbs.parameters import FabricName, Local, given
 from pipeline.atomic import atomic_write
 from reports.exports.export import export
@@ -141,8 +141,8 @@ def view(
     ] = 160,
 ) -> None:
     """Write the page of a fabric, and print what was written."""
-    with Terminal().status("tables and tiles"):
-        _write("view", fabric, "viewer", out, {"truth": truth}, viewer="out")
+    with progress("tables and pictures") as advance:
+        _write("view", fabric, "viewer", out, {"truth": truth, "progress": advance}, viewer="out")
 
 
 def _write(verb: str, name: str, kind: str, path: Path, options: Mapping[str, Any], **flags: str) -> None:

@@ -8,14 +8,16 @@ const code = (c) => Math.round(255 * toSrgb(within(c, 0, 1))).toString(16).padSt
 const hex = (rgb) => `#${rgb.map(code).join("")}`;
 const linear = (text) => [1, 3, 5].map((at) => toLinear(parseInt(text.slice(at, at + 2), 16) / 255));
 const rounded = (value, digits = 2) => `${Number(value.toPrecision(digits))}`; // never in powers of ten
+const nextFrame = () => new Promise(requestAnimationFrame);
 const percent = (share) => `${rounded(100 * share)} %`;
 
 const LIMITS = { plane: { tilt: [2, 89], turn: [-180, 180] }, sphere: { tilt: [-75, 80], turn: [-180, 180] },
   drape: { tilt: [-35, 60], turn: [-75, 75] } };
 const YARN = { roughness: ["Roughness", 0.05, 1, 0.01, ""], twist: ["Twist", -60, 60, 1, "°"],
-  blend: ["Normal’s weight", 0, 1, 0.01, ""] };
-const TILES = { truth: "Truth", flat: "Truth, flat footprints", map_material: "Map material" };
-const FRAME = 1000 / 30;
+  blend: ["Round shading", 0, 1, 0.01, ""] };
+const TILES = { truth: "Truth", flat: "Truth, flat footprints", map_material: "Texture maps" };
+const FRAME = 1000 / 30; // milliseconds of a coarse picture
+const STRIP = 100; // milliseconds of a strip of the full one
 const MOST_PIXELS = 1.6e6;
 const ERROR_SIZE = 128;
 
@@ -26,9 +28,8 @@ class Viewer {
     this.picture = new Picture(this.canvas, source, content);
     this.levels = content.tables.filter((table) => table.bend === 1 && table.width === 1).map((table) => table.level);
     this.usual = this.levels.includes(2) ? 2 : this.levels[0];
-    this.scale = 0.5;
-    this.rows = 64;
-    this.drawn = Promise.resolve();
+    this.scale = 1 / 8;
+    this.job = 0;
     this.reset();
   }
 
@@ -40,7 +41,7 @@ class Viewer {
       width: own(content.widths), warp: { ...content.warp }, weft: { ...content.weft }, thickness: content.thickness,
       colours: content.colours.map((colour) => [...colour]), view: null, target: [0, 0],
     };
-    return this.go(content.views.length - 1);
+    return this.go(content.start);
   }
 
   // Take a view of the page, one that has tiles.
@@ -53,7 +54,7 @@ class Viewer {
   }
 
   // Change the state and draw it; returns a promise of the finished picture.
-  set(changes, dragging = false) {
+  set(changes) {
     const next = { ...this.state, ...changes };
     const camera = ["shape", "turn", "tilt", "distance", "lightTurn", "lightTilt", "target"];
     if (!("view" in changes) && camera.some((name) => name in changes)) next.view = null;
@@ -66,7 +67,7 @@ class Viewer {
     next.wipe = within(next.wipe, 0, 1);
     this.state = next;
     this.shown?.(next);
-    return this.draw(dragging);
+    return this.draw();
   }
 
   // Whether the yarns are as they are in the fabric, but for their colours.
@@ -93,109 +94,115 @@ class Viewer {
       return { kind: SELVAGE, level: this.content.selvage.level, label: "Selvage" };
     }
     if (name === "point" || !this.picture.knows(NODES)) {
-      return { kind: POINT, level: this.usual, label: "One point" };
+      return { kind: POINT, level: this.usual, label: "One point a pixel" };
     }
     const wished = name === "truth" ? Math.max(...this.levels) : Number(name) || this.usual;
     const level = this.picture.indexOf(state, wished) === undefined ? this.usual : wished;
-    return { kind: NODES, level, label: `Soft nodes, k = ${level}` };
+    return { kind: NODES, level, label: `Soft nodes, detail ${level}` };
   }
 
   get methods() { return [this.method(this.state.left), this.method(this.state.right)]; }
 
-  draw(dragging) {
-    this.dragging = dragging;
-    this.job = (this.job ?? 0) + 1;
-    const { job } = this;
+  // Draw; returns a promise of the full picture of the newest state.
+  draw() {
+    this.job += 1;
     clearTimeout(this.settling);
-    this.drawn = new Promise((resolve, reject) => {
-      requestAnimationFrame(() => this.frame(job).then(resolve, reject));
-    });
+    this.wake?.();
+    if (!this.busy) this.drawn = this.work();
     return this.drawn;
   }
 
-  // Draw once: small while dragging, else in full, a strip at a time so that the page keeps answering.
+  async work() {
+    this.busy = true;
+    try {
+      let job;
+      do {
+        await nextFrame();
+        ({ job } = this);
+        await this.frame(job);
+      } while (job !== this.job);
+    } finally {
+      this.busy = false;
+    }
+  }
+
+  // Draw at once as many pixels as a frame has time for, and all of them when nothing has moved for a moment.
   async frame(job) {
-    if (job !== this.job) return;
-    const { picture, canvas, methods } = this;
-    const tiled = methods.some((method) => method.kind === TILE);
-    const { state } = this;
+    const { picture, canvas, methods, state } = this;
     const ready = await picture.prepare(state, methods);
-    if (job !== this.job) return;
-    this.fit();
-    this.label(methods);
-    const whole = [canvas.width, canvas.height];
-    if (tiled) {
+    let whole = this.size;
+    if (this.resized) [canvas.width, canvas.height] = whole;
+    const columns = ([width]) => Math.round(width * state.wipe);
+    let spent;
+    if (methods.some((method) => method.kind === TILE)) {
       const { size } = this.content.views[state.view];
       const side = Math.min(...whole);
       const corner = whole.map((length) => (length - side) >> 1);
       const wipe = Math.round(within((whole[0] * state.wipe - corner[0]) / side, 0, 1) * size);
-      picture.aim(null);
-      picture.gl.clear(picture.gl.COLOR_BUFFER_BIT);
       const box = [...corner, ...corner.map((low) => low + side)];
-      this.time(() => this.small(state, ready, [size, size], wipe, box, false), [size, size]);
-      this.settle(job);
-      return;
-    }
-    if (this.dragging) {
+      picture.gl.clear(picture.gl.COLOR_BUFFER_BIT);
+      whole = [size, size];
+      spent = await picture.small(state, ready, whole, wipe, box, false);
+    } else {
       const size = whole.map((length) => Math.max(16, Math.round(length * this.scale)));
-      const box = [0, 0, ...whole];
-      const spent = this.time(() => this.small(state, ready, size, Math.round(size[0] * state.wipe), box, true), size);
+      spent = await picture.small(state, ready, size, columns(size), [0, 0, ...whole], true);
+      const rows = (whole[1] * STRIP * this.scale ** 2) / spent;
       this.scale = within(this.scale * Math.sqrt(FRAME / spent), 0.08, 1);
-      this.settling = setTimeout(() => { this.draw(false); }, 250);
-      return;
+      this.show("coarse", methods, state);
+      if (size[1] < whole[1] && job === this.job) {
+        await new Promise((done) => { this.wake = done; setTimeout(done, 150); });
+        spent = await this.refine(job, state, ready, whole, columns(whole), rows);
+      }
     }
-    let spent = 0;
-    let row = 0;
-    while (row < whole[1]) {
-      if (row > 0) await new Promise(requestAnimationFrame);
-      if (job !== this.job) return;
-      const rows = [row, Math.min(row + this.rows, whole[1])];
-      const began = performance.now();
-      picture.aim(null);
-      picture.draw(state, ready, whole, rows, Math.round(whole[0] * state.wipe));
-      picture.wait();
-      const own = performance.now() - began;
-      spent += own;
-      if (rows[1] < whole[1]) this.rows = Math.round(within(this.rows * FRAME / own, 4, whole[1]));
-      [, row] = rows;
-    }
-    this.tell(spent, whole);
-    this.settle(job);
+    if (job !== this.job) return;
+    this.show("full", methods, state);
+    this.tell(job, spent, whole);
   }
 
-  small(state, ready, size, wipe, box, smooth) {
+  // Draw all pixels over a coarse picture, a strip at a time from above, so that the page keeps answering.
+  async refine(job, state, ready, whole, wipe, rows) {
     const { picture } = this;
-    picture.aim(size);
-    picture.draw(state, ready, size, [0, size[1]], wipe);
-    picture.show(size, box, smooth);
-    picture.wait();
-  }
-
-  time(work, size) {
-    const began = performance.now();
-    work();
-    const spent = Math.max(performance.now() - began, 0.1);
-    this.tell(spent, size);
+    let [spent, high] = [0, whole[1]];
+    while (high > 0 && job === this.job) {
+      const low = Math.max(0, high - Math.round(within(rows, 4, whole[1])));
+      const own = await picture.timed(() => picture.draw(state, ready, whole, [low, high], wipe));
+      rows = ((high - low) * STRIP) / own;
+      spent += own;
+      high = low;
+    }
     return spent;
   }
 
-  tell(spent, [width, height]) {
-    const rate = 1000 / Math.max(spent, 0.1); // clocks may be coarse
-    byId("speed").textContent = `${rounded(rate, rate < 10 ? 2 : 3)} frames/s at ${width} × ${height}`;
-  }
-
-  // Keep the canvas as large as it is shown, within a limit.
-  fit() {
-    const { canvas } = this;
-    const shown = canvas.getBoundingClientRect();
-    const ratio = Math.min(devicePixelRatio, Math.sqrt(MOST_PIXELS / Math.max(shown.width * shown.height, 1)));
-    const [width, height] = [shown.width, shown.height].map((length) => Math.max(1, Math.round(length * ratio)));
-    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-  }
-
-  label(methods) {
-    const { state, content } = this;
+  // Say how far the picture is; what is written about it is dim until it is full.
+  show(stage, methods, state) {
+    document.body.className = stage;
+    byId("line").style.left = `${100 * state.wipe}%`;
     ["left", "right"].forEach((side, index) => { byId(`label-${side}`).textContent = methods[index].label; });
+    byId("notice").textContent = this.notice();
+  }
+
+  // Write what belongs to the full picture: at once its time and the size of a pixel, later how far its sides differ.
+  tell(job, spent, [width, height]) {
+    const time = spent < 1000 ? `${rounded(spent)} ms` : `${rounded(spent / 1000)} s`;
+    byId("speed").textContent = `${time}, ${width} × ${height} pixels`;
+    const size = (2 * this.content.shapes.spread * this.state.distance) / Math.min(width, height);
+    byId("footprint").textContent = `${rounded(size)} yarns`;
+    byId("error").textContent = this.picture.floats ? "…" : "not known on this device";
+    if (this.picture.floats) this.settling = setTimeout(() => { if (job === this.job) this.measure(); }, 400);
+  }
+
+  // The pixels of the canvas as large as it is shown, within a limit.
+  get size() {
+    const { width, height } = this.canvas.getBoundingClientRect();
+    const ratio = Math.min(devicePixelRatio, Math.sqrt(MOST_PIXELS / Math.max(width * height, 1)));
+    return [width, height].map((length) => Math.max(1, Math.round(length * ratio)));
+  }
+
+  get resized() { return this.size[0] !== this.canvas.width || this.size[1] !== this.canvas.height; }
+
+  // What is shown in place of a method that has no picture of this state.
+  notice() {
+    const { state, content } = this;
     const names = [...new Set([state.left, state.right])];
     const said = names.filter((name) => name in TILES && !this.tiled(name)).map((name) => {
       const known = content.views.filter((view) => name in (view.tiles ?? {})).map((view) => view.name);
@@ -208,16 +215,7 @@ class Viewer {
     if (names.some((name) => name !== "point" && !this.tiled(name)) && !this.picture.knows(NODES)) {
       said.push("Soft nodes: their shader does not compile here. One point is shown instead.");
     } else if (said.length) said.push("Soft nodes are shown instead.");
-    byId("notice").textContent = said.join(" ");
-    byId("line").style.left = `${100 * state.wipe}%`;
-    const size = (2 * this.content.shapes.spread * state.distance) / Math.min(this.canvas.width, this.canvas.height);
-    byId("footprint").textContent = `${rounded(size)} yarns, in the middle`;
-  }
-
-  // When nothing has changed for a while: errors.
-  settle(job) {
-    if (!this.picture.floats) byId("error").textContent = "not on this device";
-    else this.settling = setTimeout(() => { if (job === this.job) this.measure(); }, 400);
+    return said.join(" ");
   }
 
   // Root of the mean squared difference of colour between two pictures, as a share of the second one's mean.
@@ -249,34 +247,17 @@ class Viewer {
     const found = [];
     for (const method of view ? [left, right, reference] : [left, right]) {
       found.push(await picture.components(state, method, size));
-      await new Promise(requestAnimationFrame);
+      await nextFrame();
       if (job !== this.job) return;
     }
     if (view) {
       const errors = found.slice(0, 2).map((picture) => percent(this.difference(picture, found[2])));
-      byId("error-name").textContent = "Error, share of the mean: left, right (truth itself)";
-      byId("error").textContent = `${errors.join(", ")} (${percent(view.standard_error)})`;
+      byId("error-name").textContent = "Error against the truth";
+      byId("error").textContent = `left ${errors[0]}, right ${errors[1]} (the truth itself ${percent(view.standard_error)})`;
     } else {
-      byId("error-name").textContent = "Left differs from right, share of the mean";
-      byId("error").textContent = percent(this.difference(found[0], found[1]));
+      byId("error-name").textContent = "The sides differ by";
+      byId("error").textContent = `${percent(this.difference(found[0], found[1]))} of the mean colour`;
     }
-  }
-
-  // Milliseconds of a picture of `size` pixels along each side by a method: the median of several.
-  async timed(name, size, times = 3) {
-    const method = this.method(name);
-    const ready = await this.picture.prepare(this.state, [method]);
-    const spent = [];
-    for (let n = 0; n < times; n += 1) {
-      this.picture.aim([size, size]);
-      this.picture.wait();
-      const began = performance.now();
-      this.picture.draw(this.state, ready, [size, size], [0, size], 0);
-      this.picture.wait();
-      spent.push(performance.now() - began);
-    }
-    this.picture.aim(null);
-    return spent.sort((a, b) => a - b)[times >> 1];
   }
 }
 
@@ -311,7 +292,7 @@ function makeRanges(viewer, bind) {
   for (const place of document.querySelectorAll("[data-range]")) {
     const { range: name, label, title, min, max, step, unit = "" } = place.dataset;
     const digits = (value) => (Math.abs(value) >= 100 || step === "1" ? value.toFixed(0) : value.toPrecision(2));
-    let text = "percent" in place.dataset ? (value) => `${Math.round(100 * value)} %` : (value) => digits(value) + unit;
+    let text = (value) => digits(value) + unit;
     if ("stops" in place.dataset) {
       const [key, values] = name === "bend" ? ["bends", content.bends] : ["widths", content.widths];
       text = (index) => {
@@ -328,14 +309,14 @@ function makeRanges(viewer, bind) {
     const head = group.appendChild(document.createElement("h2"));
     const title = family === "warp" ? "Warp" : "Weft";
     head.appendChild(document.createElement("span")).textContent = title;
-    [["diffuse", 2 + index], ["gloss", index]].forEach(([kind, component]) => {
+    [["Colour", 2 + index], ["Gloss", index]].forEach(([kind, component]) => {
       const label = head.appendChild(document.createElement("label"));
       label.className = "colour";
       label.append(kind);
       const input = label.appendChild(document.createElement("input"));
       input.type = "color";
-      input.setAttribute("aria-label", `${title}, ${kind} colour`);
-      input.dataset.name = `${title}, ${kind} colour`;
+      input.dataset.name = `${title}, ${kind.toLowerCase()}`;
+      input.setAttribute("aria-label", input.dataset.name);
       bind.input(input, () => ({
         colours: viewer.state.colours.map((colour, at) => (at === component ? linear(input.value) : colour)),
       }));
@@ -356,13 +337,7 @@ function makeChoices(viewer, bind) {
     button.addEventListener("click", () => viewer.go(index));
     bind.updates.push((state) => button.setAttribute("aria-pressed", state.view === index));
   });
-  for (const input of document.querySelectorAll("[name=shape]")) {
-    input.addEventListener("change", () => {
-      viewer.go(viewer.content.views.findIndex((view) => view.shape === input.value));
-    });
-    bind.updates.push((state) => { input.checked = state.shape === input.value; });
-  }
-  const names = [["point", "One point"], ...viewer.levels.map((level) => [String(level), `Soft nodes, k = ${level}`])];
+  const names = [["point", "One point a pixel"], ...viewer.levels.map((level) => [String(level), `Soft nodes, detail ${level}`])];
   if (viewer.content.selvage) names.push(["selvage", "Selvage"]);
   names.push(...viewer.content.tiles.map((name) => [name, TILES[name]]));
   for (const side of ["left", "right"]) {
@@ -377,6 +352,8 @@ function makeChoices(viewer, bind) {
     });
     bind.updates.push((state) => { byId(side).value = state[side]; });
   }
+  bind.input(byId("wipe"), () => ({ wipe: Number(byId("wipe").value) }));
+  bind.updates.push((state) => { byId("wipe").value = state.wipe; });
   byId("reset").addEventListener("click", () => viewer.reset());
 }
 
@@ -388,7 +365,7 @@ function makePad(viewer, bind) {
     const box = pad.getBoundingClientRect();
     const [x, y] = [event.clientX - box.left - box.width / 2, event.clientY - box.top - box.height / 2];
     const far = Math.min((Math.hypot(x, y) * 2.3) / box.width, 1);
-    viewer.set({ lightTurn: (Math.atan2(x, y) * 180) / Math.PI, lightTilt: 90 * (1 - far) }, true);
+    viewer.set({ lightTurn: (Math.atan2(x, y) * 180) / Math.PI, lightTilt: 90 * (1 - far) });
   };
   pad.addEventListener("pointerdown", (event) => { pad.setPointerCapture(event.pointerId); move(event); });
   pad.addEventListener("pointermove", move);
@@ -426,17 +403,19 @@ function listen(viewer) {
     const { state } = viewer;
     const side = Math.min(canvas.clientWidth, canvas.clientHeight);
     const moved = (2 * viewer.content.shapes.spread * state.distance) / side;
-    if (fingers.size === 2) viewer.set({ distance: (state.distance * apart) / Math.max(spread(), 1) }, true);
-    else if (event.altKey) viewer.set({ lightTurn: state.lightTurn + x / 3, lightTilt: state.lightTilt - y / 3 }, true);
-    else if (event.shiftKey && state.shape === "plane") viewer.set(shifted(state, -moved * x, moved * y), true);
-    else viewer.set({ turn: state.turn - x / 3, tilt: state.tilt + y / 3 }, true);
+    if (fingers.size === 2) {
+      const own = state.shape === "plane" ? shifted(state, (-moved * x) / 2, (moved * y) / 2) : {};
+      viewer.set({ ...own, distance: (state.distance * apart) / Math.max(spread(), 1) });
+    } else if (event.altKey) viewer.set({ lightTurn: state.lightTurn + x / 3, lightTilt: state.lightTilt - y / 3 });
+    else if (event.shiftKey && state.shape === "plane") viewer.set(shifted(state, -moved * x, moved * y));
+    else viewer.set({ turn: state.turn - x / 3, tilt: state.tilt + y / 3 });
   });
   for (const name of ["pointerup", "pointercancel"]) {
     canvas.addEventListener(name, (event) => fingers.delete(event.pointerId));
   }
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
-    viewer.set({ distance: viewer.state.distance * Math.exp(within(event.deltaY, -240, 240) / 800) }, true);
+    viewer.set({ distance: viewer.state.distance * Math.exp(within(event.deltaY, -240, 240) / 800) });
   }, { passive: false });
   canvas.addEventListener("keydown", (event) => {
     const { state } = viewer;
@@ -448,15 +427,9 @@ function listen(viewer) {
     const changes = x || y ? turned : others[event.key];
     if (!changes || event.ctrlKey || event.metaKey) return;
     event.preventDefault();
-    viewer.set(changes, true);
+    viewer.set(changes);
   });
-  const grip = document.querySelector("#line i");
-  grip.addEventListener("pointerdown", (event) => grip.setPointerCapture(event.pointerId));
-  grip.addEventListener("pointermove", (event) => {
-    const box = canvas.getBoundingClientRect();
-    if (event.buttons) viewer.set({ wipe: (event.clientX - box.left) / box.width }, true);
-  });
-  new ResizeObserver(() => viewer.draw(false)).observe(canvas);
+  new ResizeObserver(() => { if (viewer.resized) viewer.draw(); }).observe(canvas);
   canvas.addEventListener("webglcontextlost", () => {
     byId("notice").textContent = "The graphics device was lost; load this page again.";
   });
@@ -464,10 +437,11 @@ function listen(viewer) {
 
 async function start() {
   try {
+    for (let n = 0; n < 2; n += 1) await nextFrame(); // the still picture is seen first
     const sources = Object.fromEntries(["points", "nodes", "selvage"].map((name) => [name, byId(name).textContent]));
     const viewer = new Viewer(JSON.parse(byId("content").textContent), sources);
     const updates = [];
-    const input = (element, changes) => element.addEventListener("input", () => viewer.set(changes(), true));
+    const input = (element, changes) => element.addEventListener("input", () => viewer.set(changes()));
     const bind = { updates, input };
     makeRanges(viewer, bind);
     makeChoices(viewer, bind);
@@ -483,9 +457,8 @@ async function start() {
     listen(viewer);
     window.viewer = viewer;
     await viewer.set({});
-    document.body.classList.add("drawn");
   } catch (error) {
-    document.body.classList.add("still");
+    document.body.className = "still";
     byId("notice").textContent = `This is a still picture: ${error.message}`;
   }
 }

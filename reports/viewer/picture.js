@@ -222,9 +222,30 @@ class Picture {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   }
 
-  // Wait until all is drawn: a pixel cannot be read before.
-  wait() {
-    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
+  // Draw a small picture and show it on the canvas, in a box; returns its milliseconds. A first row is not timed: drivers
+  // compile what they draw with then.
+  async small(state, ready, size, wipe, box, smooth) {
+    const draw = (rows) => {
+      this.aim(size);
+      this.draw(state, ready, size, rows, wipe);
+    };
+    await this.timed(() => draw([0, 1]));
+    return this.timed(() => {
+      draw([0, size[1]]);
+      this.show(size, box, smooth);
+    });
+  }
+
+  // Milliseconds until what a function draws is done; the page answers meanwhile.
+  async timed(work) {
+    const { gl } = this;
+    const began = performance.now();
+    work();
+    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    while (fence && gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED) await new Promise((done) => { setTimeout(done); });
+    gl.deleteSync(fence);
+    return Math.max(performance.now() - began, 0.1); // clocks may be coarse
   }
 
   // Components of a square picture by one method, row 0 the lowest, -1 where there is no cloth.

@@ -12,7 +12,7 @@ import base64
 import gzip
 import html
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -51,7 +51,7 @@ VIEWS: Final = {
     "Cloth": Viewpoint("plane", 20.0, 45.0, 70.0, -50.0, 40.0, (2.0, 2.0)),
     "Horizon": Viewpoint("plane", 10.0, 7.0, 150.0, -50.0, 40.0, (2.0, 2.0)),
     "Sphere": Viewpoint("sphere", 15.0, 20.0, 215.0, -35.0, 45.0),
-    "Drape": Viewpoint("drape", -20.0, 10.0, 560.0, -40.0, 40.0),
+    "Drape": Viewpoint("drape", -20.0, 10.0, 620.0, -40.0, 40.0),
 }
 """Views of the page, each with a picture of the truth."""
 
@@ -59,7 +59,7 @@ TILES: Final = ("map_material",)
 """Methods that the page has as pictures at its views, beside the truth."""
 
 STILL: Final = "Drape"
-"""View of the still picture, for a browser without WebGL 2."""
+"""View of the still picture, with which the page opens."""
 
 STILL_SIZE: Final = 384
 
@@ -83,11 +83,13 @@ _OF_PLANE = TruthOptions(relative_error=0.01, parallax=False)
 _BRIGHT = 0.8  # linear value that few pixels of the still picture exceed
 
 
-def write_page(fabric: Fabric, path: Path, truth: int = 160) -> str:
+def write_page(
+    fabric: Fabric, path: Path, truth: int = 160, progress: Callable[[float], None] = lambda share: None
+) -> str:
     """Write the viewer of a fabric, whole or not at all, and return a sentence on it.
 
     `truth` counts the pixels along each side of tiles, pictures of the truth and other methods, from LEAST_TILE to
-    MOST_TILE; 0: there are none.
+    MOST_TILE; 0: there are none. `progress` takes the share that is done, from 0 to 1.
 
     Raises
     ------
@@ -100,7 +102,7 @@ def write_page(fabric: Fabric, path: Path, truth: int = 160) -> str:
     if ends * picks > MOST_REPEAT_CELLS:
         allowed = f"the shader takes repeats of at most {MOST_REPEAT_CELLS:,} cells"
         raise BadInput("export", "", f"{fabric.name}: {ends} ends × {picks} picks", allowed)
-    shown = content(fabric, truth)
+    shown = content(fabric, truth, progress)
     page = whole_page(shown)
     atomic_write(path, page.encode())
     return f"{path}: {len(shown['tables'])} tables, {len(shown['views'])} views, {len(page) / 1e6:.1f} MB"
@@ -127,12 +129,14 @@ def _text(name: str) -> str:
     return (_HOME / name).read_text(encoding="utf-8")
 
 
-def content(fabric: Fabric, truth: int) -> dict[str, Any]:
-    """Return what the page shows of a fabric, ready for JSON; `truth` as for `write_page`."""
+def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lambda share: None) -> dict[str, Any]:
+    """Return what the page shows of a fabric, ready for JSON; `truth` and `progress` as for `write_page`."""
     ends = fabric.weave.repeat[0]
     factors = bends(fabric), widths(fabric)
     of_shapes: list[dict[str, Any]] = []
     grids: list[str] = []
+    pictures: list[dict[str, Any]] = []
+    steps = len(factors[0]) * len(factors[1]) + len(VIEWS)
     for bend in factors[0]:
         for width in factors[1]:
             shape = bent(fabric, bend, width)
@@ -143,8 +147,12 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
             grids.append(packed(of_shape[0][1].front.grid.ravel()))
             kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
             of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
+            progress(len(grids) / steps)
     still, irradiance = _still(fabric)
     methods = _methods(fabric) if truth else {}
+    for name, camera in VIEWS.items():
+        pictures.append(_view(fabric, name, camera, truth, methods))
+        progress((len(grids) + len(pictures)) / steps)
     return {
         "fabric": fabric.name,
         "texture_width": TEXTURE_WIDTH,
@@ -160,7 +168,8 @@ def content(fabric: Fabric, truth: int) -> dict[str, Any]:
         "selvage": _selvage(fabric, of_shapes),
         "grids": grids,
         "tiles": [*methods, _FLAT, TRUTH] if truth else [],
-        "views": [_view(fabric, name, camera, truth, methods) for name, camera in VIEWS.items()],
+        "views": pictures,
+        "start": list(VIEWS).index(STILL),
         "shapes": {
             "spread": VIEW_SPREAD,
             "radius": sphere_radius(ends),

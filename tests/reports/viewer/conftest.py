@@ -22,12 +22,12 @@ def shown_of(truth, levels, bends, still):
         return content(load_fabric(FABRIC), truth)
 
 
-def viewer(shown, folder, before=""):
-    """Return the page of a content, written to a folder, in a browser after the script `before`."""
+def viewer(shown, folder, **how):
+    """Return the page of a content, written to a folder, in a browser; `how` as for `Page.open`."""
     path = folder / "gingham.html"
     path.write_text(whole_page(shown), encoding="utf-8")
-    ready = "/drawn|still/.test(document.body?.className)"
-    return opened(path.as_uri(), folder / "profile", ready=ready, before=before)
+    ready = "/full|still/.test(document.body?.className)"
+    return opened(path.as_uri(), folder / "profile", ready=ready, **how)
 
 
 @pytest.fixture(scope="session")

@@ -66,3 +66,28 @@ def test_a_page_draws_what_python_does(small, tmp_path):
         assert_equal(components(page, 2), expected(cloth, VIEWS["Sphere"], 2))
         assert_equal(components(page, "selvage"), expected_of("selvage", cloth, VIEWS["Sphere"]))
         assert page.errors == [] and all(address.startswith(("file:", "data:")) for address in page.requests)
+
+
+OVER = """[...document.querySelectorAll("input, select, button, #labels, #readings")].filter(element => {
+    const [a, b] = [byId("picture"), element].map(part => part.getBoundingClientRect());
+    return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+}).map(element => element.outerHTML)"""
+CUT = """[...document.querySelectorAll("button, dd, .range span, .range output, .side, #labels span")]
+    .filter(element => element.scrollWidth > element.clientWidth + 1 && element.clientWidth > 0)
+    .map(element => element.textContent)"""
+
+
+@pytest.mark.external
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1400, 900, 0.25), (390, 844, 0.5)])
+def test_a_page_is_whole_and_silent_on_screens_of_all_kinds(small, tmp_path, size, scheme):
+    with viewer(small, tmp_path, size=size, scheme=scheme) as page:
+        ground = page.run("getComputedStyle(document.documentElement).backgroundColor.match(/[0-9]+/g).map(Number)")
+        assert (min(ground) > 200) == (scheme == "light")
+        page.run("viewer.measure()")
+        assert page.run("byId('error').textContent").endswith("% of the mean colour")
+        assert page.run(OVER) == [] and page.run(CUT) == []
+        assert page.run("document.documentElement.scrollWidth") == size[0]
+        names = page.run("[...document.querySelectorAll('button')].map(element => element.textContent)")
+        assert len(set(names)) == len(names) > 5
+        assert page.messages == []
