@@ -126,7 +126,10 @@ def _across(rows: Float64, centre: Float64, sigma: Float64) -> Float64:
 
 
 def by_copy(table: SoftNodeTable) -> SoftNodeTable:
-    """Return a table of several repeats, _NEAR ends and picks or more, in which each thread is a kind of its own."""
+    """Return a table of several repeats, _NEAR ends and picks or more, in which each thread is a kind of its own.
+
+    No footprint covers it evenly.
+    """
     ends, picks = (int(n) for n in table.repeat)
     wide, high = ends * -(-_NEAR // ends), picks * -(-_NEAR // picks)
     pick, end = np.indices((high, wide)).reshape(2, -1)
@@ -161,7 +164,7 @@ def by_copy(table: SoftNodeTable) -> SoftNodeTable:
     names = ("evenly", "mean", "sharpness", "behind_mean", "behind_sharpness", "falls", "areas")
     return table._replace(
         repeat=np.array([wide, high]), kinds=np.array([wide, high]), starts=np.array(starts), nodes=nodes, spots=spots,
-        groups=np.array(rows, np.uint32), group_starts=group_starts.astype(np.uint32),
+        uniform=math.inf, groups=np.array(rows, np.uint32), group_starts=group_starts.astype(np.uint32),
         cell_groups=cell_groups.ravel().astype(np.uint32), piece_starts=piece_starts,
         **{name: getattr(table, name)[of_pieces] for name in ("pieces", "bounds", "floats", "crowns")},
         **{name: of_nodes(getattr(table, name)) for name in names},
