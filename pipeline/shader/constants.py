@@ -27,6 +27,7 @@ from pipeline.analytic.soft_nodes import (
 )
 from pipeline.compiled import float32
 from pipeline.models.patch_bsdf import PatchBSDF
+from pipeline.shader import threads
 from pipeline.truth import query
 from pipeline.truth.footprint import mixture
 from pipeline.truth.geometry import heightfield, visibility
@@ -84,6 +85,7 @@ _SAME: Final[tuple[tuple[ModuleType, tuple[str, ...]], ...]] = (
     (soft_horizons, ("FALL",)),
     (lobes, ("SCATTERED", "BROAD")),
     (importance_mixture, ("LEAST_COSINE",)),
+    (threads, ("TINT_COLUMNS", "SPREAD_OUT", "BELL_ENDS")),
 )
 # What a file keeps to itself is read by name: a shader has it from there, and a new name there is an error here.
 _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {

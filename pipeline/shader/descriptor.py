@@ -13,7 +13,7 @@ from pipeline.compiled.arrays import Float32
 from pipeline.models.domain import Domain
 from pipeline.scenes.shade import colours as linear_colours
 from pipeline.shader.constants import TEXTURE_WIDTH
-from pipeline.shader.golden import ANSWER_COLUMNS, DENSITY_COLUMN, GOLDEN_COLUMNS, TRANSPARENCY_COLUMN, Golden
+from pipeline.shader.golden import COLOUR, DENSITY_COLUMN, GOLDEN_COLUMNS, TRANSPARENCY_COLUMN, Golden
 from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.tables import ClothTables, Place
 from pipeline.truth.conventions import COMPONENTS
@@ -82,7 +82,7 @@ class Networks(Frozen, use_attribute_docstrings=True):
 class Colours(Frozen):
     """Linear Rec. 709 colours of the components: k_s, k_d, and k_dt in its place with light from the other side.
 
-    Means if threads differ in colour.
+    Means if threads differ in colour, as `threads` says; the array `tints` has the factors of each.
     """
 
     specular_warp: tuple[float, float, float]
@@ -144,6 +144,8 @@ class Descriptor(Frozen, use_attribute_docstrings=True):
     """Colours of the yarns."""
     repeat: tuple[int, int]
     """Ends and picks after which the weave repeats."""
+    threads: tuple[int, int]
+    """Ends and picks after which their colours repeat; 1 and 1 if they do not differ."""
     limits: dict[str, int]
     """Largest table that the shader takes."""
     texture_width: int = TEXTURE_WIDTH
@@ -174,7 +176,7 @@ class Shader(NamedTuple):
     `name` is that of its file in the source and of its function there. `sources` are files of the source that are the
     same for all fabrics, `generated` texts of the others by name, `files` contents of buffers by path in the folder.
     `about` has no source and languages yet. `size` are words for a sentence; `sampled` says whether directions can be
-    drawn; `onnx` returns the network as an ONNX model, if there is one.
+    drawn; `onnx` returns the network as an ONNX model, if there is one; `threads`, whether threads have their colours.
     """
 
     name: str
@@ -186,12 +188,19 @@ class Shader(NamedTuple):
     size: str
     sampled: bool
     onnx: Callable[[], bytes] | None = None
+    threads: bool = False
 
 
 def colours(fabric: Fabric) -> Colours:
     """Return the colours of the yarns."""
     rows = (*linear_colours(fabric), *linear_colours(fabric, transmitted=True)[2:])
     return Colours(**{name: tuple(rgb.tolist()) for name, rgb in zip(Colours.model_fields, rows, strict=True)})
+
+
+def threads_of(fabric: Fabric) -> tuple[int, int]:
+    """Return after how many ends and picks their colours repeat."""
+    ends, picks = fabric.thread_colours()
+    return len(ends.diffuse), len(picks.diffuse)
 
 
 def descriptor(fabric: Fabric, level: int, tables: ClothTables, kinds: Collection[str]) -> Descriptor:
@@ -201,6 +210,7 @@ def descriptor(fabric: Fabric, level: int, tables: ClothTables, kinds: Collectio
         level=level,
         colours=colours(fabric),
         repeat=(int(tables.scalars["ends"]), int(tables.scalars["picks"])),
+        threads=threads_of(fabric),
         limits={"nodes": MOST_NODES, "cells": MOST_REPEAT_CELLS},
         kinds=sorted(kinds),
         scalars=tables.scalars,
@@ -221,17 +231,18 @@ def vectors(golden: Golden) -> dict[str, Any]:
     """Return the content of `golden.json`.
 
     `columns` names those of `queries`; `groups` has first row and end of each kind, and the range of a column is that
-    of its group. `components` and `bounds` are the answers; `transparency`, and `density` of wi in 1/sr, are empty for
+    of its group. `components` and `bounds` are the answers, `colour` is the patch BSDF in linear RGB; `transparency`, and `density` of wi in 1/sr, are empty for
     a model without them. `steady` is the share of the queries tried whose answer does not hang on the last digit of a
     place; the others are not listed.
     """
-    whole = golden.answers.shape[1] == ANSWER_COLUMNS
+    whole = golden.answers.shape[1] > DENSITY_COLUMN
     return {
         "columns": GOLDEN_COLUMNS,
         "queries": _short(golden.rows),
         "groups": golden.groups,
         "components": _short(golden.answers[:, :4]),
         "bounds": _short(golden.answers[:, 4:8]),
+        "colour": _short(golden.answers[:, COLOUR]),
         "transparency": _short(golden.answers[:, TRANSPARENCY_COLUMN]) if whole else [],
         "density": _short(golden.answers[:, DENSITY_COLUMN]) if whole else [],
         "steady": golden.steady,

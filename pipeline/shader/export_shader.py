@@ -95,7 +95,10 @@ def _source(shader: Shader) -> dict[str, bytes]:
     """Return the files of the source."""
     texts = {name: (_HOME / name).read_text(encoding="utf-8") for name in (*shader.sources, *ENTRIES)}
     name = shader.name
-    lines = ["// The model of this folder.", "", f'#include "{name}.slang"']
+    lines = ["// The model of this folder.", ""]
+    if shader.threads:
+        lines += ["/// Threads differ in colour.", "#define THREADS", ""]
+    lines += [f'#include "{name}.slang"']
     if shader.sampled:
         lines += ['#include "importance.slang"', "", "/// Directions can be drawn.", "#define SAMPLED"]
     lines += ["", f"Answer bsdf(Query query) {{ return {name}(query); }}", ""]

@@ -8,6 +8,7 @@ rays turn over curved cloth: their places there are square roots of small number
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final, NamedTuple
@@ -20,9 +21,11 @@ from pipeline.analytic.importance.surface import LobeSurface
 from pipeline.analytic.soft_nodes.answer import SMALLEST
 from pipeline.analytic.soft_nodes.features import read_behind, read_queries
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
-from pipeline.compiled.arrays import Float32, Mask
+from pipeline.compiled.arrays import Float32, Float64, Mask
+from pipeline.scenes.shade import coloured
 from pipeline.shader.constants import POINTS, WIDENING
 from pipeline.shader.tables import BEHIND, CURVATURE, Sides
+from pipeline.shader.threads import SeenTints
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.query import LOWEST_VIEWER, STEEPEST_CURVATURE, Queries
 from weaves.colour import LUMINANCE
@@ -37,6 +40,9 @@ STEADY: Final = 1e-5
 
 TRANSPARENCY_COLUMN, DENSITY_COLUMN, ANSWER_COLUMNS = 8, 9, 10
 """Columns of answers after components and bounds, and the number of all."""
+
+COLOUR: Final = slice(-3, None)
+"""Columns of golden answers that follow all others: the patch BSDF in linear RGB, 1/sr."""
 
 _SEED = 20
 _TRIALS = 4
@@ -85,8 +91,8 @@ class Golden(NamedTuple):
     """Queries with their answers.
 
     `rows`, (N, 12), are GOLDEN_COLUMNS; `answers` are components and bounds, (N, 8), and of models that know them
-    transparency and density of wi in the mixture of the lobes, 1/sr, (N, ANSWER_COLUMNS); `groups` has first row and
-    end of each of GROUPS; `steady` is the share of the queries tried that are steady.
+    transparency and density of wi in the mixture of the lobes, 1/sr, (N, ANSWER_COLUMNS), then COLOUR; `groups` has
+    first row and end of each of GROUPS; `steady` is the share of the queries tried that are steady.
     """
 
     rows: Float32
@@ -104,6 +110,9 @@ def rows_of(queries: Queries) -> Float32:
 Answering = Callable[[Queries], Float32]
 """Answers of N queries, all viewers on one side: components and bounds (N, 8), or all ANSWER_COLUMNS."""
 
+Colouring = Callable[[Queries], Float64]
+"""Colours of the components of N queries, all viewers on one side, (N, 4, 3); NaN for what cannot be golden."""
+
 
 def golden(sides: Sides, read: Answering | None = None) -> Golden:
     """Return golden queries of a cloth, of all kinds that it knows; `read` answers them, or the soft nodes do."""
@@ -113,15 +122,32 @@ def golden(sides: Sides, read: Answering | None = None) -> Golden:
         for name, group in GROUPS.items()
         if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
     }
-    ends, picks = sides.front.repeat
+    ends, picks = (math.lcm(int(n), len(rows)) for n, rows in zip(sides.front.repeat, sides.tints, strict=True))
     own, depth = read or partial(read_sides, sides), sides.front.plane - sides.front.lowest
-    return golden_of(groups, (int(ends), int(picks)), own, digits=_DIGITS_OF_LINES, depth=depth)
+    return golden_of(groups, (ends, picks), own, side_colours(sides), digits=_DIGITS_OF_LINES, depth=depth)
+
+
+def side_colours(sides: Sides) -> Colouring:
+    """Return the function that finds the colours of the components, by what is seen of the threads."""
+    means = sides.colours.reshape(3, 2, 3).astype(np.float64)
+    differ = max(map(len, sides.tints)) > 1
+    seen = [SeenTints(table, sides.tints) for table in (sides.front, sides.back) if table is not None and differ]
+
+    def colours(queries: Queries) -> Float64:
+        back = bool(queries.wo[0, 2] < 0.0)
+        through = queries.wi[:, 2] * queries.wo[:, 2] < 0.0
+        diffuse = np.where(through[:, None, None], means[2], means[1])
+        found = np.concatenate([np.broadcast_to(means[0], diffuse.shape), diffuse], axis=1)
+        return found * seen[back](queries.turned() if back else queries) if differ else found
+
+    return colours
 
 
 def golden_of(
     groups: Mapping[str, Group],
     repeat: tuple[int, int],
     read: Answering,
+    colours: Colouring,
     stretched: bool = True,
     digits: int = 1,
     depth: float = 0.0,
@@ -137,7 +163,7 @@ def golden_of(
         queries = _candidates(repeat, group, rng)
         if not stretched:
             queries = queries._replace(sigma_minor=queries.sigma)
-        steady, answer = _steady(read, queries, rng, digits)
+        steady, answer = _steady(partial(_in_colour, read, colours), queries, rng, digits)
         steady &= ~turning(queries, depth)
         chosen = np.flatnonzero(steady)[: group.rows]
         rows.append(rows_of(queries.take(chosen)))
@@ -228,10 +254,16 @@ def _front(rng: np.random.Generator, count: int, rise: tuple[float, float] = (_L
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), z]).astype(np.float32)
 
 
+def _in_colour(read: Answering, colours: Colouring, queries: Queries) -> Float32:
+    """Return answers, and the patch BSDF in colour, of N queries."""
+    answers = read(queries)
+    return np.column_stack([answers, coloured(answers[:, :4], colours(queries))]).astype(np.float32)
+
+
 def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits: int) -> tuple[Mask, Float32]:
-    """Return which queries are steady, and the answers of all, (N, ANSWER_COLUMNS)."""
+    """Return which queries are steady, and the answers of all."""
     answer = read(queries)
-    span = np.maximum(np.ptp(answer, axis=0), np.float32(1e-30))
+    span = np.maximum(np.nanmax(answer, axis=0) - np.nanmin(answer, axis=0), np.float32(1e-30))
     change = np.zeros(len(answer))
     # Places are kept from the corner of a cell: a small one has no more digits there than 1, a large one no fewer.
     place = digits * np.spacing(np.float32(1.0))

@@ -21,6 +21,7 @@ from pipeline.models.networks.texture import DEPTH_SCALE, LAYERS, STEEPEST, texe
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.models.runtimes import as_onnx
 from pipeline.models.selvage.model import LARGEST_FACTOR, Selvage
+from pipeline.scenes.shade import colours as linear_colours
 from pipeline.shader.constants import TEXTURE_WIDTH, shared_constants
 from pipeline.shader.descriptor import (
     CONVENTIONS,
@@ -32,6 +33,7 @@ from pipeline.shader.descriptor import (
     Shader,
     colours,
     descriptor,
+    threads_of,
     trained_ranges,
     why_outside,
 )
@@ -198,6 +200,7 @@ def selvage_shader(method: Selvage, fabric: Fabric, level: int | None, kinds: Co
         nodes_of(trained, sides),
         True,
         partial(as_onnx, method, fabric, tuple(about.onnx)),
+        max(about_tables.threads) > 1,
     )
 
 
@@ -262,6 +265,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         conventions=[*CONVENTIONS, "An ellipse counts as the circle of its area, curved cloth as flat."],
         colours=yarns,
         repeat=fabric.weave.repeat,
+        threads=threads_of(fabric),
         limits={"elements": MOST_ELEMENTS},
         kinds=[],
         scalars={},
@@ -293,7 +297,11 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         weights.files(),
         described,
         golden_of(
-            {"front": GROUPS["front"]}, fabric.weave.repeat, partial(_neumip_answers, method, fabric), stretched=False
+            {"front": GROUPS["front"]},
+            fabric.weave.repeat,
+            partial(_neumip_answers, method, fabric),
+            lambda queries: np.tile(linear_colours(fabric), (len(queries.u), 1, 1)),
+            stretched=False,
         ),
         f"{weights.count:,} elements",
         False,

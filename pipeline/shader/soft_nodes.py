@@ -17,7 +17,7 @@ SOFT_NODES: Final = "soft_nodes"
 
 SOFT_NODES_SOURCES: Final = (
     "soft_nodes.slang", "importance.slang", "buffers.slang", "arithmetic.slang", "horizons.slang", "query.slang",
-    "look.slang", "colours.slang", "shade.slang", "pieces.slang", "fixed_nodes.slang", "seen_areas.slang",
+    "look.slang", "colours.slang", "threads.slang", "shade.slang", "pieces.slang", "fixed_nodes.slang", "seen_areas.slang",
     "view_rays.slang", "view_lines.slang", "coverage.slang",
 )  # fmt: skip
 """Files of the source."""
@@ -40,6 +40,7 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
         golden(sides),
         nodes_of(level, sides),
         True,
+        threads=max(map(len, sides.tints)) > 1,
     )
 
 

@@ -32,6 +32,7 @@ from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
 from pipeline.shader.constants import FALL_ROWS, OTHER_ROW, POINTS, TEXTURE_WIDTH, constants
 from pipeline.shader.limits import MOST_HEIGHT, MOST_NODES, MOST_REPEAT_CELLS
+from pipeline.shader.threads import family_heights, thread_tints
 from pipeline.truth.geometry.heightfield import AXIS_DROP, BEND_RADIUS, HALF_LENGTH
 from weaves.errors import BadInput, one_line
 from weaves.fabric import Fabric
@@ -48,12 +49,13 @@ EVERY: Final = "all"
 class Sides(NamedTuple):
     """Tables of a cloth: its front, and its back if viewers behind it are wanted.
 
-    `colours`, (6, 3), are k_s, k_d and k_dt, each of warp and weft, linear RGB.
+    `colours`, (6, 3), are k_s, k_d and k_dt, each of warp and weft, linear RGB; `tints` those of `thread_tints`.
     """
 
     front: SoftNodeTable
     back: SoftNodeTable | None
     colours: Float32
+    tints: tuple[Float32, Float32]
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ _MEANINGS: Final = {
     "piece_starts": "first piece of every cell, pick by pick; their end",
     "pieces": "family (0 warp, 1 weft, 2 gap) and grid of every piece",
     "colours": "linear Rec. 709: k_s, k_d and k_dt, each of warp and weft",
+    "tints": "of ends, then picks: factors on k_s, k_d and k_dt, integrals of them less 1 up to the thread",
     "floats": "of every piece: bend radius, half length, drop of its float; greatest height of its cell",
     "spots": "of every line of nodes: places in x and y in the cell, shares of it, heights",
     "ray_points": "rays of the coverage: deviations along both axes of a footprint",
@@ -115,6 +118,7 @@ def tabulate_sides(fabric: Fabric, level: int, kinds: Collection[str], rims: boo
         tabulate(fabric, behind=behind, level=level, curved=curved, rims=rims),
         tabulate(fabric.back(), behind=True, level=level, rims=rims) if behind else None,
         np.concatenate([reflected, transmitted[2:]]).astype(np.float32),
+        thread_tints(fabric),
     )
 
 
@@ -127,10 +131,12 @@ def refuse_large_repeat(fabric: Fabric) -> None:
 
 
 def tables(sides: Sides) -> ClothTables:
-    """Return the buffers of a cloth without threads of their own; BadInput above MOST_NODES or MOST_HEIGHT."""
-    known = [_side(table) for table in (sides.front, sides.back) if table is not None]
+    """Return the buffers of a cloth; BadInput above MOST_NODES or MOST_HEIGHT."""
+    known = [_side(table, sides.tints) for table in (sides.front, sides.back) if table is not None]
     _refuse_large_tables(known)
-    shared = {"colours": sides.colours, "point_places": point_places(POINTS)}
+    shared = {
+        "colours": sides.colours, "point_places": point_places(POINTS), "tints": np.concatenate(sides.tints),
+    }  # fmt: skip
     first = known[0]
     own = len(first.integers) + len(_STARTS) + len(first.of_integers) + len(first.of_numbers) + len(shared)
     integers, numbers = _Buffer(own * len(known)), _Buffer(len(first.numbers) * len(known))
@@ -189,12 +195,13 @@ class _Side(NamedTuple):
     grid: npt.NDArray[np.uint8]
 
 
-def _side(table: SoftNodeTable) -> _Side:
+def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
     """Return what the shader reads of one side."""
     rows = _node_rows(table)
     groups, cells = _groups(table)
     behind, curvatures = int(len(table.behind_grid) > 0), len(table.grid_falls)
     least, greatest = map(float, table.shown)
+    warp_height, weft_height = family_heights(table)
     integers: dict[str, int | float] = {
         "ends": int(table.repeat[0]),
         "picks": int(table.repeat[1]),
@@ -209,6 +216,8 @@ def _side(table: SoftNodeTable) -> _Side:
         "falls_row": OTHER_ROW + behind * (AZIMUTHS // 2),
         "areas_row": rows.shape[1] - SEEN_ANGLES * FALL_ROWS,
         "rims": int(table.rims),
+        "end_tints": len(tints[0]),
+        "pick_tints": len(tints[1]),
     }
     numbers: dict[str, int | float] = {
         "thickness": float(table.thickness),
@@ -220,6 +229,8 @@ def _side(table: SoftNodeTable) -> _Side:
         "shown_greatest": greatest,
         "view_lines": table.view_lines,
         "spacing": table.spacing,
+        "warp_height": warp_height,
+        "weft_height": weft_height,
     }
     of_integers: dict[str, npt.NDArray[Any]] = {
         "groups": groups,

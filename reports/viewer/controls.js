@@ -63,7 +63,7 @@ class Viewer {
     next.turn = within(next.turn, ...turn);
     next.distance = within(next.distance, 4, 2000);
     next.lightTurn = ((next.lightTurn + 540) % 360) - 180;
-    next.lightTilt = within(next.lightTilt, 2, 90);
+    next.lightTilt = within(next.lightTilt, this.content.through ? -90 : 2, 90);
     next.wipe = within(next.wipe, 0, 1);
     this.state = next;
     this.shown?.(next);
@@ -288,7 +288,8 @@ function range(place, label, title, [low, high, step], read, write, text, log, b
 
 function makeRanges(viewer, bind) {
   const { content } = viewer;
-  const limits = { bend: [0, content.bends.length - 1, 1], width: [0, content.widths.length - 1, 1] };
+  const limits = { bend: [0, content.bends.length - 1, 1], width: [0, content.widths.length - 1, 1],
+    ...(content.through && { lightTilt: [-90, 90, 1] }) };
   for (const place of document.querySelectorAll("[data-range]")) {
     const { range: name, label, title, min, max, step, unit = "" } = place.dataset;
     const digits = (value) => (Math.abs(value) >= 100 || step === "1" ? value.toFixed(0) : value.toPrecision(2));

@@ -174,7 +174,7 @@ class Picture {
       [irradiance, irradiance, irradiance, 0],
       ...state.colours.map((colour) => four(colour)),
       [SHAPES.indexOf(state.shape), kind, components ? 1 : 0, radius],
-      [Math.cos(half), Math.sin(half), halfHeight, 0],
+      [Math.cos(half), Math.sin(half), halfHeight, this.content.through ? 1 : 0],
       ...arcs,
     ].flat());
   }

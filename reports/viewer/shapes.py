@@ -89,8 +89,11 @@ def arcs() -> Float64:
     return np.stack([x - x[middle], radii, 1.0 - 2.0 * (np.arange(len(radii)) % 2), along - along[middle]], axis=-1)
 
 
-def seen(camera: Viewpoint, size: int, ends: int) -> Seen:
-    """Return the pixels of a square picture of `size` pixels with lit cloth; `ends` are those of the repeat."""
+def seen(camera: Viewpoint, size: int, ends: int, through: bool = False) -> Seen:
+    """Return the pixels of a square picture of `size` pixels with lit cloth; `ends` are those of the repeat.
+
+    With `through` light from behind counts, where nothing is between it and the cloth.
+    """
     toward = direction(camera.turn, camera.tilt)
     turn = math.radians(camera.turn)
     right = np.array([math.cos(turn), math.sin(turn), 0.0])
@@ -108,9 +111,10 @@ def seen(camera: Viewpoint, size: int, ends: int) -> Seen:
     facing = -_dot(rays, places.n)
     cloth = (places.reach > 0.0) & (facing > 0.0)
     light = direction(camera.light_turn, camera.light_tilt)
-    lit = cloth & (places.n @ light > 0.0)
+    side = np.sign(places.n @ light)
+    lit = cloth & (side != 0.0 if through and camera.shape != "sphere" else side > 0.0)
     if camera.shape == "drape":
-        start = eyes + places.reach[:, None] * rays + _SHADOW * places.n
+        start = eyes + places.reach[:, None] * rays + _SHADOW * side[:, None] * places.n
         lit &= _on_drape(start, np.broadcast_to(light, rays.shape)).reach <= 0.0
     chosen = _Places(*(column[lit] for column in places))
     ray, reach = rays[lit], (places.reach / length)[lit]

@@ -26,17 +26,18 @@ from pipeline.atomic import atomic_write
 from pipeline.compiled.arrays import Float64
 from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
-from pipeline.scenes.shade import colours
+from pipeline.scenes.shade import coloured, colours, colours_of
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.networks import correction
 from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
+from pipeline.shader.threads import thread_tints
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
 from pipeline.truth.options import TruthOptions
 from reports.images.texture import png_bytes
 from reports.options import LEAST_TILE, MOST_TILE
-from reports.viewer.generate import SHADERS, network, shipped
+from reports.viewer.generate import KINDS, THREADS, network, shipped
 from reports.viewer.shapes import HALF_ARC, HALF_HEIGHT, VIEW_SPREAD, Seen, Viewpoint, arcs, seen, sphere_radius
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -57,6 +58,9 @@ VIEWS: Final = {
 
 TILES: Final = ("map_material",)
 """Methods that the page has as pictures at its views, beside the truth."""
+
+AGAINST_LIGHT: Final = {"Against the light": Viewpoint("drape", -20.0, 6.0, 330.0, 165.0, 20.0)}
+"""One more view of cloth that light comes through."""
 
 STILL: Final = "Drape"
 """View of the still picture, with which the page opens."""
@@ -114,7 +118,7 @@ def whole_page(shown: dict[str, object]) -> str:
         "FABRIC": html.escape(str(shown["fabric"]).replace("_", " ")),
         "STILL": str(shown["still"]),
         "STYLE": _text("page.css"),
-        **{name.upper(): shipped(name) for name in SHADERS},
+        **{name.upper(): shipped(name + (THREADS if shown["threads"] else "")) for name in KINDS},
         # No content can end the element.
         "CONTENT": json.dumps({key: value for key, value in shown.items() if key != "still"}).replace("<", "\\u003c"),
         "SCRIPT": "\n".join(_text(name) for name in SCRIPTS),
@@ -136,7 +140,9 @@ def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lamb
     of_shapes: list[dict[str, Any]] = []
     grids: list[str] = []
     pictures: list[dict[str, Any]] = []
-    steps = len(factors[0]) * len(factors[1]) + len(VIEWS)
+    through = sheer(fabric)
+    views = VIEWS | (AGAINST_LIGHT if through else {})
+    steps = len(factors[0]) * len(factors[1]) + len(views)
     for bend in factors[0]:
         for width in factors[1]:
             shape = bent(fabric, bend, width)
@@ -144,17 +150,20 @@ def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lamb
             of_shape = [(level, _nodes(shape, level)) for level in levels]
             # All levels of a shape have the same grid.
             about = {"bend": bend, "width": width, "grid": len(grids)}
-            grids.append(packed(of_shape[0][1].front.grid.ravel()))
+            front = of_shape[0][1].front
+            grids.append(packed(np.concatenate([front.grid.ravel(), front.behind_grid.ravel()])))
             kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
             of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
             progress(len(grids) / steps)
     still, irradiance = _still(fabric)
     methods = _methods(fabric) if truth else {}
-    for name, camera in VIEWS.items():
+    for name, camera in views.items():
         pictures.append(_view(fabric, name, camera, truth, methods))
         progress((len(grids) + len(pictures)) / steps)
     return {
         "fabric": fabric.name,
+        "threads": max(map(len, thread_tints(fabric))) > 1,
+        "through": through,
         "texture_width": TEXTURE_WIDTH,
         "colours": colours(fabric).tolist(),
         "warp": _yarn(fabric.warp),
@@ -180,6 +189,12 @@ def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lamb
         "irradiance": irradiance,
         "still": f"data:image/png;base64,{base64.b64encode(still).decode()}",
     }
+
+
+def sheer(fabric: Fabric) -> bool:
+    """Return whether light comes through a fabric: it has gaps, or yarns that transmit diffuse light."""
+    yarns = (fabric.average().warp, fabric.average().weft)
+    return all(yarn.width < 1.0 for yarn in yarns) or any(max(yarn.diffuse_transmission_rgb) > 0.0 for yarn in yarns)
 
 
 def bends(fabric: Fabric) -> tuple[float, ...]:
@@ -209,10 +224,12 @@ def packed(values: npt.NDArray[Any]) -> str:
 
 
 def _nodes(fabric: Fabric, level: int) -> Sides:
-    """Return the front of a fabric, of yarns without twist as if they had TWISTED."""
+    """Return the front of a fabric, of yarns without twist as if they had TWISTED, with light from behind if it is sheer."""
     yarns = {"warp": fabric.warp, "weft": fabric.weft}
     turned = {name: yarn.model_copy(update={"twist": _twist(yarn)}) for name, yarn in yarns.items()}
-    return tabulate_sides(fabric.model_copy(update=turned), level, ())
+    cloth = fabric.model_copy(update=turned)
+    sides = tabulate_sides(cloth, level, ())
+    return sides._replace(front=tabulate(cloth, behind=True, level=level)) if sheer(fabric) else sides
 
 
 def _twist(yarn: Yarn) -> float:
@@ -278,7 +295,7 @@ def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict
     view: dict[str, Any] = {"name": name, **camera._asdict(), "size": size}
     if size:
         ends = fabric.weave.repeat[0]
-        picture = seen(camera, size, ends)
+        picture = seen(camera, size, ends, sheer(fabric))
         answers = estimate(fabric, picture.queries.raised(), _PRECISION, 0)
         shown = colours(fabric)
         deviation = np.sqrt(np.square(answers.standard_error.astype(np.float64)) @ np.square(shown))
@@ -301,7 +318,8 @@ def _components(picture: Seen, values: npt.NDArray[np.floating]) -> Float64:
 def _still(fabric: Fabric) -> tuple[bytes, float]:
     """Return a picture by soft nodes as PNG, and the irradiance at which it is neither dark nor glaring."""
     picture = seen(VIEWS[STILL], STILL_SIZE, fabric.weave.repeat[0])
-    values = read_queries(tabulate(fabric), picture.queries).components @ colours(fabric)
+    components = read_queries(tabulate(fabric), picture.queries).components
+    values = coloured(components, colours_of(fabric, picture.queries))
     irradiance = float(_BRIGHT / max(np.percentile(values.max(axis=1), 97.0), 1e-6))
     pixels = np.zeros((*picture.cloth.shape, 4))
     pixels[picture.cloth, 3] = 1.0

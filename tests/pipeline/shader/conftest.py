@@ -38,7 +38,10 @@ FORMS = [("float32", ALLOWED["C++"]), ("float16", ALLOWED["16 bits"])]
 
 
 CLOTH = "gingham"
-"""The fabric of the trained `neumip`, and of the programs, which are those of every fabric."""
+"""The fabric of the trained `neumip`, and of the programs, which take every fabric."""
+
+ALIKE = "gauze"
+"""The fabric of the program of all whose threads do not differ in colour."""
 
 
 def bytes_of(folder):
@@ -79,7 +82,7 @@ def read(folder, type_of_numbers="float32"):
         buffers[name] = values if kind in ("int32", "uint8") else values.astype(np.float32)
     golden = json.loads((folder / about["golden"]).read_text())
     queries = np.array(golden["queries"], np.float32)
-    columns = (golden["components"], golden["bounds"], golden["transparency"], golden["density"])
+    columns = (golden[name] for name in ("components", "bounds", "transparency", "density", "colour"))
     answers = np.column_stack([np.array(column) for column in columns if column])
     return SimpleNamespace(about=about, buffers=buffers, queries=queries, answers=answers, groups=golden["groups"])
 
@@ -115,15 +118,15 @@ class _Groups(ctypes.Structure):
 
 @pytest.fixture(scope="session")
 def programs(exported, tmp_path_factory):
-    """A function that compiles the C++ form of a model once, and returns a function that runs it on rows.
+    """A function that compiles the C++ form of a model, of a fabric, once, and returns a function that runs it on rows.
 
     That one returns components and bounds, (N, 8), of queries, (N, 12). With the entry point `scatter` it takes random
     numbers beside them, (N, 15), and returns the columns of a Scatter, (N, 16).
     """
 
     @cache
-    def program(model=None):
-        source = exported(CLOTH, 2, "cpp", model=model) / "cpp" / "evaluate.cpp"
+    def program(model=None, fabric=CLOTH):
+        source = exported(fabric, 2, "cpp", model=model) / "cpp" / "evaluate.cpp"
         if shutil.which("g++") is None:
             pytest.skip("g++ is not installed")
         library = tmp_path_factory.mktemp("cpp") / "evaluate.so"

@@ -12,14 +12,14 @@ SIZE = 24
 """Pixels along each side of the pictures of the truth."""
 
 
-def shown_of(truth, levels, bends, still):
-    """Return what the page has of FABRIC at its own width, with pictures of the truth of `truth` pixels."""
+def shown_of(truth, levels, bends, still, name=FABRIC):
+    """Return what the page has of a fabric at its own width, with pictures of the truth of `truth` pixels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "DETAILS", levels)
         patch.setattr(module, "BEND_FACTORS", bends)
         patch.setattr(module, "NARROWER", (1.0,))
         patch.setattr(module, "STILL_SIZE", still)
-        return content(load_fabric(FABRIC), truth)
+        return content(load_fabric(name), truth)
 
 
 def viewer(shown, folder, **how):

@@ -8,12 +8,14 @@ import pytest
 from pipeline.analytic.soft_nodes.features import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.named import named_method, own_method
-from pipeline.scenes.shade import colours
+from pipeline.scenes.shade import coloured, colours
+from pipeline.shader.golden import read_sides, side_colours
+from pipeline.shader.tables import BEHIND, tabulate_sides
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.viewer.shapes import seen
-from reports.viewer.view import TILES, VIEWS, bent
-from tests.reports.viewer.conftest import FABRIC, SIZE, viewer
+from reports.viewer.view import AGAINST_LIGHT, TILES, VIEWS, bent
+from tests.reports.viewer.conftest import FABRIC, SIZE, shown_of, viewer
 from weaves.fabric import load_fabric
 
 pytestmark = pytest.mark.slow
@@ -38,8 +40,8 @@ def expected_of(name, fabric, camera):
     return squared(camera, lambda queries: own_method(name, "test", "method").predict(fabric, queries))
 
 
-def squared(camera, answer):
-    picture = seen(camera, SIZE, ENDS)
+def squared(camera, answer, through=False):
+    picture = seen(camera, SIZE, ENDS, through)
     found = np.where(picture.cloth, 0.0, -1.0)[..., None] * np.ones(4)
     found[picture.lit] = answer(picture.queries)
     return found
@@ -91,6 +93,22 @@ def test_a_shader_of_selvage_that_does_not_compile_is_named(whole, tmp_path):
         assert said == "Selvage: its shader does not compile here. Soft nodes are shown instead."
 
 
+def test_light_comes_through_sheer_cloth(tmp_path):
+    cloth = load_fabric("voile")
+    sides = tabulate_sides(cloth, 2, (BEHIND,))
+    (camera,), views = AGAINST_LIGHT.values(), len(VIEWS)
+    with viewer(shown_of(0, (2,), (1.0,), 32, "voile"), tmp_path) as page:
+        page.run(f"viewer.go({views})")
+        found = components(page, 2)
+        wanted = squared(camera, lambda queries: read_sides(sides, queries)[:, :4], through=True)
+        assert_equal(found, wanted)
+        # Gaps show the glow of the light: blacked out yarns leave it alone.
+        page.run(
+            "viewer.set({ colours: viewer.state.colours.map(() => [0, 0, 0]), left: '2' }).then(() => viewer.drawn)"
+        )
+        assert (pixels_of(page)[2][..., 3] == 255.0).all() and pixels_of(page)[2][..., :3].max() > 40.0
+
+
 def test_without_the_shader_of_soft_nodes_points_are_shown(whole, tmp_path):
     with viewer(whole, tmp_path) as own:
         own.run(
@@ -139,7 +157,8 @@ def test_colours_are_those_of_the_components(fresh):
     wanted = 255.0 * encoded(fresh, seen(camera, side, ENDS), side)
     box = pixels[(height - side) // 2 :, (width - side) // 2 :][:side, :side]
     apart = np.abs(box[..., :3] - wanted).max(axis=-1)
-    assert np.ptp(wanted) > 100.0 and (apart <= 1.0).mean() > 0.97
+    apart = apart[~np.isnan(apart)]
+    assert np.nanmax(wanted) > 100.0 and apart.size > 0.9 * box[..., 0].size and (apart <= 1.0).mean() > 0.97
 
 
 def pixels_of(page):
@@ -157,7 +176,9 @@ def pixels_of(page):
 def encoded(page, picture, side):
     """Return the sRGB values of Python for a square picture."""
     values = np.zeros((side, side, 3))
-    values[picture.lit] = read_queries(tabulate(CLOTH), picture.queries).components @ colours(CLOTH)
+    components = read_queries(tabulate(CLOTH), picture.queries).components
+    # Threads that are too far to be told apart are not a number, as are their pixels.
+    values[picture.lit] = coloured(components, side_colours(tabulate_sides(CLOTH, 2, ()))(picture.queries))
     colour = np.minimum(page.run("viewer.content.irradiance") * values, 1.0)
     return np.where(colour <= 0.0031308, 12.92 * colour, 1.055 * np.maximum(colour, 1e-6) ** (1 / 2.4) - 0.055)
 
