@@ -26,7 +26,7 @@ from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.sources import worn
 from pipeline.truth.conventions import COMPONENTS
 from reports.images.exr import RGB, write_exr
-from reports.images.tiles import STOPS, Bytes8, Tone, displayed, png
+from reports.images.tiles import STOPS, Bytes8, Tone, displayed, opaque, png
 from reports.images.video import refuse_missing, write_film
 from reports.options import ShotOptions
 from weaves.errors import BadInput, WorkFailed
@@ -197,10 +197,10 @@ class FilmMaker:
                 elif out.suffix == ".mp4":
                     write_film(out, map(self._shown, range(self.count)), self.size, RATE)
                 elif out.suffix == ".png":
-                    atomic_write(out, _png(self._shown(0)))
+                    atomic_write(out, png(opaque(self._shown(0)), 1))
                 else:
                     for frame in range(self.count):
-                        atomic_write(out / f"frame-{frame + 1:04}.png", _png(self._shown(frame)))
+                        atomic_write(out / f"frame-{frame + 1:04}.png", png(opaque(self._shown(frame)), 1))
         finally:
             self._pool.shutdown(cancel_futures=True)
 
@@ -208,7 +208,7 @@ class FilmMaker:
         """Return a frame as it is shown."""
         codes = np.zeros((self.size[1], self.size[0], 3), np.uint8)
         for part in self._parts(frame, layers=False):
-            codes[_place(part)] = displayed(part.planes["rgb"], self.how.tone, self.how.exposure)
+            codes[shown_at(part)] = displayed(part.planes["rgb"], self.how.tone, self.how.exposure)
         return codes
 
     def _write_exr(self, out: Path, method: str) -> None:
@@ -218,7 +218,7 @@ class FilmMaker:
             for name, plane in part.planes.items():
                 if name not in planes:
                     planes[name] = np.zeros((self.size[1], self.size[0], plane.shape[-1]), np.float32)
-                planes[name][_place(part)] = plane
+                planes[name][shown_at(part)] = plane
         channels = {channel: planes["rgb"][..., index] for index, channel in enumerate(RGB)}
         flat = {"A": "cloth", "depth.Z": "depth", "fabric.id": "fabric"}
         channels |= {name: planes[layer][..., 0] for name, layer in flat.items()}
@@ -255,10 +255,7 @@ class FilmMaker:
                 self._advance(self.pixels / (self.count * self.size[0] * self.size[1]))
 
 
-def _place(part: PicturePart) -> tuple[slice, slice]:
+def shown_at(part: PicturePart) -> tuple[slice, slice]:
+    """Return where a window is in its picture."""
     left, top, width, height = part.window
     return slice(top, top + height), slice(left, left + width)
-
-
-def _png(codes: Bytes8) -> bytes:
-    return png(np.concatenate([codes, np.full((*codes.shape[:2], 1), 255, np.uint8)], axis=-1), 1)

@@ -6,16 +6,19 @@ Pictures are the whole draft and a lit swatch, as PNG. Maps of the geometry are 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 from cyclopts import Parameter
 
-from jobs.terminal import Terminal, print_lines, print_table
+from jobs.terminal import Terminal, print_lines, print_table, progress
 from jobs.verbs.parameters import FabricName, Local
 from pipeline.atomic import atomic_write
-from pipeline.scenes.catalogue import load_scene
+from pipeline.cores import cores
 from pipeline.truth.options import TABLE_CELLS
 from reports.images import tiles
 from reports.images.draft import draft
@@ -27,17 +30,26 @@ from weaves.fabric import Fabric, load_fabric
 from weaves.surface import GAP, surface_maps
 from weaves.yarn import Yarn
 
+if TYPE_CHECKING:
+    from pipeline.models.fallback import Fallback
+
 TEXELS_PER_YARN: Final = 64
 """Texels of the maps across a yarn, at most."""
 
 MOST_TEXELS: Final = 2048
 """Texels of a side of the maps, at most: they take 36 bytes each."""
 
-SWATCH_SIZE: Final = "384x288"
+SWATCH_SIZE: Final = "1200x900"
 """Width and height of the picture of a swatch."""
 
-METHOD_OF_MANY_CELLS: Final = "point_sampled:4"
-"""Method of a swatch with more than `TABLE_CELLS` different cells: tables of others grow with them."""
+POINTS_OF_MANY_CELLS: Final = 4
+"""Points a pixel of a swatch with more than `TABLE_CELLS` different cells: tables of other methods grow with them."""
+
+WALKS_OF_SWATCH: Final = 1 << 14
+"""Walks of the table of light between yarns: a quarter of the usual ones, for a picture."""
+
+QUERIES_OF_PIXEL: Final = 12
+"""Queries that a pixel of a swatch counts for: it has 3, but smaller windows take less memory."""
 
 LEAST_YARNS: Final = 48
 """Yarns across a swatch, at least."""
@@ -64,7 +76,7 @@ def show(
     if out is not None:
         with Terminal().status("draft and maps" if maps else "draft"):
             paths = [*_drawn(cloth, out, draft), *(write_maps(cloth, out) if maps else [])]
-        print_lines(*paths, write_swatch(fabric, cloth, out, size))
+        print_lines(*paths, write_swatch(cloth, out, size))
 
 
 def _drawn(fabric: Fabric, folder: Path, *draws: Callable[[Fabric], bytes]) -> list[Path]:
@@ -94,19 +106,43 @@ def write_maps(fabric: Fabric, folder: Path) -> list[Path]:
     return paths
 
 
-def write_swatch(name: str, fabric: Fabric, folder: Path, size: str) -> Path:
-    """Write a picture of a lit swatch, the scene ``swatch`` with at least one and a half repeats; return its path."""
-    from jobs.verbs.render import dressed, look, make
+def write_swatch(fabric: Fabric, folder: Path, size: str) -> Path:
+    """Write a picture of a lit swatch with at least one and a half repeats, and return its path."""
+    from jobs.verbs.render import look, shown_at
+    from pipeline.scenes.bounces import light_between, tables_of
+    from pipeline.scenes.picture import answered, windows
+    from pipeline.scenes.swatch import Swatch
 
+    film = look(size=size, samples=1, directions=8, tone="srgb", exposure=0.0).size or (0, 0)
     period = max(*fabric.weave.repeat, *(len(colours.diffuse) for colours in fabric.thread_colours()))
-    yarns = min(max(LEAST_YARNS, 1.5 * period), MOST_YARNS)
-    scene = dressed(load_scene("swatch"), [name])
-    cloths = {key: cloth.model_copy(update={"yarns": (yarns, yarns)}) for key, cloth in scene.cloths.items()}
-    path = folder / f"{fabric.name}-swatch.png"
-    method = "selvage" if fabric.weave.different_cells() <= TABLE_CELLS else METHOD_OF_MANY_CELLS
-    how = look(size=size, samples=1, directions=8, tone="srgb", exposure=0.0)
-    make(scene.model_copy(update={"cloths": cloths}), method, 1, how, path)
+    swatch = Swatch(min(max(LEAST_YARNS, 1.5 * period), MOST_YARNS), film)
+    path, codes = folder / f"{fabric.name}-swatch.png", np.zeros((film[1], film[0], 3), np.uint8)
+    parts = windows(film, QUERIES_OF_PIXEL)
+    with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
+        method, alone = _method(fabric)
+        with alone:
+            method.prepare(fabric)
+            between = partial(light_between, tables=tables_of(WALKS_OF_SWATCH))
+            done = answered(swatch.frame, parts, {"swatch": fabric}, method, pool, ("swatch",), between)
+            for number, part in enumerate(done, 1):
+                codes[shown_at(part)] = tiles.displayed(part.planes["rgb"])
+                advance(number / len(parts))
+    atomic_write(path, tiles.png(tiles.opaque(codes), 1))
     return path
+
+
+def _method(fabric: Fabric) -> tuple[Fallback, AbstractContextManager[None]]:
+    """Return the method that answers for a swatch, and how it runs beside others on threads of one process."""
+    from pipeline.models.analytic.point_sampled import PointSampledOptions
+    from pipeline.models.fallback import Fallback
+
+    if fabric.weave.different_cells() > TABLE_CELLS:
+        points = PointSampledOptions(counts=[POINTS_OF_MANY_CELLS])
+        return Fallback(*points.methods(), points.kinds), nullcontext()
+    from pipeline.models.named import named_method  # torch
+    from pipeline.models.network import one_thread
+
+    return named_method("selvage", "show", "--method"), one_thread()
 
 
 def _print_fabric(fabric: Fabric) -> None:

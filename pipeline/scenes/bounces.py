@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.analytic.bounces.table import bounce_table, bounced
+from pipeline.analytic.bounces.table import WALKS, BounceTable, bounce_table, bounced
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.per_fabric import PerFabric
 from pipeline.scenes.options import Bounces
@@ -20,8 +20,16 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-_TABLES = PerFabric(bounce_table)
-_TABLES_THROUGH = PerFabric(partial(bounce_table, through=True))
+Tables = tuple[PerFabric[BounceTable], PerFabric[BounceTable]]
+"""Tables of light from the viewer's side, and of light from either side."""
+
+
+def tables_of(walks: int = WALKS) -> Tables:
+    """Return tables that are made of so many walks at their first use."""
+    return PerFabric(partial(bounce_table, walks=walks)), PerFabric(partial(bounce_table, walks=walks, through=True))
+
+
+_TABLES, _TABLES_THROUGH = tables_of()
 
 
 def check_bounces(bounces: Bounces, where: str) -> None:
@@ -45,12 +53,14 @@ def seen_light(between: Float32 | Float64, colours: Float32 | Float64) -> Float6
     return np.asarray(between[:, :2] * colours[:, 2:] + between[:, 2:])
 
 
-def light_between(fabric: Fabric, queries: Queries) -> Float64:
+def light_between(fabric: Fabric, queries: Queries, tables: Tables | None = None) -> Float64:
     """Return light of all bounces after the first by the family that is seen, twice, (N, 4, 3).
 
     First what lacks its diffuse colour: k_d, or k_dt if light and viewer are on different sides. Then what has left it
-    in the other way, in its mean colour. Tables are made at their first use, which takes seconds.
+    in the other way, in its mean colour. Tables are made at their first use, which takes seconds; all callers that name
+    none have the same ones.
     """
+    plain, of_both_sides = tables or (_TABLES, _TABLES_THROUGH)
     average, result = fabric.average(), np.zeros((len(queries.u), 4, 3))
     yarns = average.warp, average.weft
     diffuse = np.array([yarn.diffuse_rgb for yarn in yarns] + [yarn.diffuse_transmission_rgb for yarn in yarns])
@@ -63,9 +73,9 @@ def light_between(fabric: Fabric, queries: Queries) -> Float64:
         seen = queries.take(rows)
         seen, side = (seen.turned(), fabric.back()) if behind else (seen, fabric)
         if not through:
-            result[rows, :2] = bounced(_TABLES.of(side), seen.wi, seen.wo, diffuse[:2])
+            result[rows, :2] = bounced(plain.of(side), seen.wi, seen.wo, diffuse[:2])
             continue
-        light = bounced(_TABLES_THROUGH.of(side), seen.wi, seen.wo, diffuse)
+        light = bounced(of_both_sides.of(side), seen.wi, seen.wo, diffuse)
         crossed = other_side[rows, None, None]
         result[rows, :2] = np.where(crossed, light[:, 2:], light[:, :2])
         result[rows, 2:] = np.where(crossed, light[:, :2] * diffuse[:2], light[:, 2:] * diffuse[2:])

@@ -47,7 +47,8 @@ _AOVS: Final = {
 }
 """AOVs rendered by Mitsuba, and the number of channels of each."""
 _AOVS_BESIDE: Final = {"position": 3, "geo_normal": 3, "sh_normal": 3, "albedo": 3, "shape_index": 1}
-_LEAST_SIGMA = 1e-6
+LEAST_SIGMA: Final = 1e-6
+"""Least standard deviation of a footprint, in yarn spacings."""
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
 
@@ -101,7 +102,7 @@ def _gbuffer(
         found[name] = found[name] * camera.widening(found["position"])[:, None]
     places = places_of(loaded, key, cloth, found)
     axes, sizes, _ = np.linalg.svd(places.jacobian)
-    sigma = np.clip(options.pixel_sigma * sizes, _LEAST_SIGMA, options.largest_sigma)
+    sigma = np.clip(options.pixel_sigma * sizes, LEAST_SIGMA, options.largest_sigma)
     viewer = camera.to_viewer(places.position)
     side = np.where(dot(places.outward, viewer) < 0.0, -1.0, 1.0)
     straight = np.einsum("nij,nj->ni", places.frame, viewer)

@@ -14,7 +14,7 @@ windows nor the chunks of queries depend on the number of threads, so the bytes 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 from typing import Final, NamedTuple, Protocol
@@ -22,7 +22,7 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.compiled.arrays import Float32
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.fingerprint import fingerprint
 from pipeline.scenes.bounces import light_between, seen_light
 from pipeline.scenes.frame import SceneFrame, render
@@ -48,6 +48,9 @@ MOST_SAMPLES: Final = 8
 _AHEAD = 3  # windows under way: threads have work while a frame is traced
 
 Plane = npt.NDArray[np.float32]
+
+LightBetween = Callable[[Fabric, Queries], Float64]
+"""Turns queries into the light of all bounces after the first, as `light_between`."""
 
 
 class PictureMethod(Protocol):
@@ -142,11 +145,39 @@ def picture(
     methods that draw random numbers. With `layers`, components and what is seen are kept apart. Errors as
     `pipeline.scenes.frame.render`.
     """
-    fine, names = sharpened(loaded, side), (loaded.scene.name, frame, seed)
+    fine, whole = sharpened(loaded, side), (side * size[0], side * size[1])
+    yield from answered(
+        lambda window: render(fine, frame, whole, FilmWindow(*(side * edge for edge in window))),
+        windows(size, side**2 * (len(loaded.lights) + 1)),
+        {key: fabric for key, (_, fabric) in loaded.cloths.items()},
+        answerer,
+        pool,
+        (loaded.scene.name, frame, seed),
+        light_between if loaded.options.bounces == "all" else None,
+        side,
+        layers,
+    )
+
+
+def answered(
+    trace: Callable[[FilmWindow], SceneFrame],
+    parts: Iterable[FilmWindow],
+    fabrics: Mapping[str, Fabric],
+    answerer: PictureMethod,
+    pool: Executor,
+    names: Sequence[object],
+    between: LightBetween | None = light_between,
+    side: int = 1,
+    layers: bool = False,
+) -> Iterator[PicturePart]:
+    """Yield windows of a frame, each finished, that `trace` turns into queries.
+
+    `fabrics` are those of its G-buffers by their keys; `names` and the window are the seed of random numbers. `between`
+    gives the light of all bounces after the first.
+    """
     under_way: deque[_UnderWay] = deque()
-    for window in windows(size, side**2 * (len(loaded.lights) + 1)):
-        traced = render(fine, frame, (side * size[0], side * size[1]), FilmWindow(*(side * edge for edge in window)))
-        under_way.append(_UnderWay(fine, answerer, pool, window, traced, *names, *window))
+    for window in parts:
+        under_way.append(_UnderWay(fabrics, between, answerer, pool, window, trace(window), *names, *window))
         if len(under_way) == _AHEAD:
             yield under_way.popleft().part(side, layers)
     while under_way:
@@ -158,7 +189,8 @@ class _UnderWay:
 
     def __init__(
         self,
-        loaded: Loaded,
+        fabrics: Mapping[str, Fabric],
+        between: LightBetween | None,
         answerer: PictureMethod,
         pool: Executor,
         window: FilmWindow,
@@ -166,12 +198,15 @@ class _UnderWay:
         *names: object,
     ) -> None:
         self._answerer, self._pool, self._window, self._frame, self._names = answerer, pool, window, frame, names
-        self._fabrics = {key: fabric for key, (_, fabric) in loaded.cloths.items()}
+        self._fabrics = fabrics
         queries = {key: gbuffer.queries(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
         self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
-        all_bounces = loaded.options.bounces == "all"
-        self._between = {key: self._ask(_between, key, asked, "later") for key, asked in queries.items() if all_bounces}
+        self._between = {
+            key: self._ask(lambda fabric, part, _: between(fabric, part).astype(np.float32), key, asked, "later")
+            for key, asked in queries.items()
+            if between is not None
+        }
         rims = {key: gbuffer.rims(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._coverage = {key: self._ask(answerer.coverage, key, asked, "rim") for key, asked in rims.items()}
 
@@ -229,11 +264,6 @@ class _UnderWay:
             seed = int(fingerprint([*self._names, key, kind, start]), 16)
             asked.append(self._pool.submit(ask, self._fabrics[key], queries.take(slice(start, start + CHUNK)), seed))
         return asked
-
-
-def _between(fabric: Fabric, queries: Queries, seed: int) -> Float32:
-    """Return the light between yarns as methods answer."""
-    return light_between(fabric, queries).astype(np.float32)
 
 
 def _gathered(asked: Sequence[Future[Float32]], shape: tuple[int, ...]) -> Float32:

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.scenes import swatch
 from pipeline.scenes.scene import Cloth, Scene
 
 Floats = npt.NDArray[np.float64]
@@ -170,18 +171,16 @@ def _swatch(mi: Any) -> dict[str, Any]:
     """Return a square of herringbone with one soft fold on a board, under a lamp and a weak second one.
 
     Every angle of light and view between the crest and the valley is seen, and highlights show the floats.
-    `twillight show` puts its fabric there.
+    `twillight show` puts its fabric there, without Mitsuba: the numbers are those of `pipeline.scenes.swatch`.
     """
     y = np.linspace(-0.5, 0.5, 801)
-    wave = 0.01 + 0.05 * (1.0 + np.cos(2.0 * np.pi * y))
-    board = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.25}}
+    board = {"type": "diffuse", "reflectance": {"type": "rgb", "value": swatch.BOARD}}
     return {
         "type": "scene",
-        "cloth": _waves(mi, "swatch", np.linspace(-0.5, 0.5, 3), y, wave),
-        "board": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(20), "paint": board},
-        "lamp": sun([-0.55, 0.75, 0.75], 2.4),
-        "fill": sun([0.6, -0.5, 1.0], 0.5),
-        "camera": camera(mi, [0.0, -1.5, 1.6], [0.0, -0.02, 0.03], 34),
+        "cloth": _waves(mi, "swatch", np.linspace(-0.5, 0.5, 3), y, swatch.height(y)),
+        "board": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(swatch.HALF_BOARD), "paint": board},
+        **{f"lamp_{number}": sun(list(towards), power) for number, (towards, power) in enumerate(swatch.LIGHTS)},
+        "camera": camera(mi, list(swatch.EYE), list(swatch.TARGET), swatch.FIELD_OF_VIEW),
     }
 
 

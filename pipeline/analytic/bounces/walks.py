@@ -36,7 +36,7 @@ from pipeline.truth.footprint.sequences import derive, uniform
 from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, next_hit
 from pipeline.truth.geometry.heightfield import BLEND, GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
 from pipeline.truth.geometry.march import ray, wrap
-from pipeline.truth.geometry.pieces import cell_pieces, orbits
+from pipeline.truth.geometry.pieces import Cell, CellPiece, cell_pieces, leaders
 from pipeline.truth.geometry.visibility import visible
 
 _FEWEST: Final = 16
@@ -45,6 +45,8 @@ _OFF: Final = 1e-9
 """Distance from a wall at which walks go on, in yarn spacings: beyond its rounding, on the open side."""
 _IN_GAP: Final = 64
 """Points of a gap."""
+_OF_CELL: Final = 4
+"""Walks from a cell, at least."""
 _LONGEST: Final = 4
 """Yarns at which a walk counts the sun's light, from its third on."""
 _FOUR: Final = 1.16730397826141868
@@ -123,15 +125,16 @@ class _Place(NamedTuple):
 def starting_points(field: HeightField, count: int) -> Start:
     """Spread about so many points evenly over what is seen from straight above, in x = r sin v across each yarn.
 
-    Cells that a translation maps onto each other share their points.
+    Cells that a translation maps onto each other share their points. Of a cloth with very many
+    different cells some are chosen at random.
     """
-    pieces = [(orbit, piece) for orbit in orbits(field) for piece in cell_pieces(field, *orbit[0])]
-    yarns = [(orbit, piece) for orbit, piece in pieces if piece.family != GAP]
+    pieces, factor = _pieces(field, count)
+    yarns = [(cell, piece) for cell, piece in pieces if piece.family != GAP]
     areas = np.array([2.0 * piece.radius * (piece.along[1] - piece.along[0]) for _, piece in yarns])
     fewest = min(_FEWEST, max(count // len(yarns), 1))
     counts = np.maximum(np.ceil(count * areas / areas.sum()).astype(np.int64), fewest)
     shift = np.array([[uniform(np.uint64(0), number, d) for number in range(len(yarns))] for d in range(4)])
-    rows = [(*orbit[0], *piece.along, piece.radius, piece.family) for orbit, piece in yarns]
+    rows = [(*cell, *piece.along, piece.radius, piece.family) for cell, piece in yarns]
     of = np.repeat(np.arange(len(yarns)), counts)  # the piece of each point
     pick, end, low, high, radius, family = np.array(rows, np.float64)[of].T
     point = np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
@@ -139,7 +142,7 @@ def starting_points(field: HeightField, count: int) -> Start:
     v = np.pi * (numbers[0] - 0.5)
     across, along = 0.5 + radius * np.sin(v), low + (high - low) * numbers[1]
     x, y = np.where(family == WARP, (across, along), (along, across))
-    share = np.pi * radius * np.cos(v) * (high - low) / counts[of]
+    share = np.pi * radius * np.cos(v) * (high - low) / counts[of] * factor
     return Start(*np.stack([end + x, pick + y, share, numbers[2], numbers[3]]))
 
 
@@ -163,24 +166,37 @@ def transport(
     )
     faces = field, field if back is None else back
     start, scratch = starting_points(field, count), (np.empty(o, np.float32), np.empty(i, np.float32))
-    _see_gaps(*faces, *_gap_points(field), viewers, sums.seen)
+    _see_gaps(*faces, *_gap_points(field, count), viewers, sums.seen)
     _walk(*faces, ways, start, viewers, lights, sums, *scratch)
     return sums
 
 
-def _gap_points(field: HeightField) -> tuple[Float64, Float64, Float64]:
-    """Return places spread evenly over the gaps of the first cell of each kind, and the area that each stands for."""
-    columns = [np.empty((3, 0))]
-    for orbit in orbits(field):
-        pick, end = orbit[0]
-        for piece in cell_pieces(field, pick, end):
-            if piece.family == GAP:
-                (left, right), (low, high) = piece.box
-                x, y = (0.5 + _FOUR ** -np.arange(1.0, 3.0)[:, None] * np.arange(_IN_GAP)) % 1.0
-                share = np.full(_IN_GAP, (right - left) * (high - low) / _IN_GAP)
-                columns.append(np.stack([end + left + (right - left) * x, pick + low + (high - low) * y, share]))
-    x, y, area = np.concatenate(columns, axis=1)
-    return x, y, area
+def _gap_points(field: HeightField, count: int) -> tuple[Float64, Float64, Float64]:
+    """Return places spread evenly over the gaps of the first cell of each kind, and the area that each stands for.
+
+    They are `_IN_GAP` a gap, or about `count` in all if that is less.
+    """
+    pieces, factor = _pieces(field, count)
+    gaps = np.array([(*cell, *piece.box[0], *piece.box[1]) for cell, piece in pieces if piece.family == GAP])
+    if not len(gaps):
+        return np.empty(0), np.empty(0), np.empty(0)
+    points = min(_IN_GAP, max(count // len(gaps), 1))
+    pick, end, left, right, low, high = gaps.T[..., None]
+    x, y = (0.5 + _FOUR ** -np.arange(1.0, 3.0)[:, None] * np.arange(points)) % 1.0
+    area = (right - left) * (high - low) / points * factor * np.ones(points)
+    return (end + left + (right - left) * x).ravel(), (pick + low + (high - low) * y).ravel(), area.ravel()
+
+
+def _pieces(field: HeightField, count: int) -> tuple[list[tuple[Cell, CellPiece]], float]:
+    """Return the pieces of the first cell of each kind, or of one for every `_OF_CELL` points, chosen at random.
+
+    Also the number of all kinds of cells over that of the chosen ones.
+    """
+    cells, most = leaders(field), max(count // _OF_CELL, 1)
+    factor = max(len(cells) / most, 1.0)
+    if factor > 1.0:
+        cells = cells[np.sort(np.random.default_rng(0).permutation(len(cells))[:most])]
+    return [((pick, end), piece) for pick, end in cells.tolist() for piece in cell_pieces(field, pick, end)], factor
 
 
 @kernel

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 import weaves.draft
-from pipeline.compiled.arrays import Float64, Mask
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.geometry.heightfield import (
     BEND_RADIUS,
@@ -128,10 +128,14 @@ def _translations(shape: Cell, top: bytes) -> tuple[Cell, ...]:
 
 def orbits(field: HeightField) -> list[list[Cell]]:
     """Return the cells of the repeat in orbits, each orbit from its first cell on."""
-    length, height, _ = lattice(field)
-    first = np.stack(np.divmod(np.arange(height * length), length), axis=-1)
-    cells = (first[:, None] + np.array(translations(field))) % field.top.shape
+    cells = (leaders(field)[:, None] + np.array(translations(field))) % field.top.shape
     return [[(pick, end) for pick, end in orbit] for orbit in cells.tolist()]
+
+
+def leaders(field: HeightField) -> Index:
+    """Return the first cell of each orbit, (n, 2)."""
+    length, height, _ = lattice(field)
+    return np.stack(np.divmod(np.arange(height * length), length), axis=-1)
 
 
 def different_cells(field: HeightField) -> int:
@@ -142,8 +146,7 @@ def different_cells(field: HeightField) -> int:
 def first_cells(field: HeightField) -> Mask:
     """Return for each cell, (picks, ends), whether it is the first of its orbit."""
     first = np.zeros(field.top.shape, np.bool_)
-    for orbit in orbits(field):
-        first[orbit[0]] = True
+    first[tuple(leaders(field).T)] = True
     return first
 
 

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from pipeline.scenes.frame import render
-from pipeline.scenes.loading import load
+from pipeline.scenes.loading import FilmWindow, load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.shipped import SHIPPED
+from pipeline.scenes.swatch import Swatch
 from pipeline.truth.query import faults
 
 OPTIONS = SceneOptions(variant="scalar_rgb", environment_directions=4, largest_sigma=1e6)
@@ -76,3 +77,29 @@ def test_the_roll_and_the_sphere_are_curved_and_the_plane_is_not(shown):
             inner = gbuffer.wo[:, 2] > 0.1
             square = (np.square(gbuffer.u) + np.square(gbuffer.v))[inner] / 24**2
             np.testing.assert_allclose(gbuffer.curvature[inner], 4 / (4 + square) / 24, rtol=0.01)
+
+
+def test_the_swatch_in_closed_form_is_that_of_mitsuba():
+    """Places, footprints, directions, light, the board and the cloth's shadow; the mesh bends in 800 steps."""
+    size, window = (96, 72), FilmWindow(0, 0, 96, 72)
+    scene = SHIPPED["swatch"]
+    ours = Swatch(48.0, size).frame(window)
+    theirs = render(load(scene, SceneOptions(variant="scalar_rgb")), 0.0, size)
+    a, b = ours.gbuffers["swatch"], theirs.gbuffers["swatch"]
+    np.testing.assert_array_equal(a.pixel, b.pixel)
+    assert not len(b.rim)
+    for name, tolerance in {
+        "u": 1e-4,
+        "v": 1e-4,
+        "sigma": 2e-3,
+        "sigma_minor": 1e-4,
+        "curvature": 3e-4,
+        "wo": 1e-4,
+    }.items():
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), atol=tolerance, err_msg=name)
+    turned = (a.angle - b.angle + np.pi / 2) % np.pi - np.pi / 2
+    np.testing.assert_allclose(turned, 0.0, atol=1e-2)
+    for name in ("place", "wi", "irradiance"):
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), atol=1e-4, err_msg=name)
+    for name in ("backdrop", "depth", "normal"):
+        np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), atol=1e-4, err_msg=name)
