@@ -97,7 +97,7 @@ class PageInput:
     def shown(self) -> list[PictureFile]:
         """The pictures of fabrics, and those of scenes: the larger ones, where a scene has any."""
         larger = {picture.scene for picture in self.pictures if picture.larger}
-        return [one for one in self.pictures if one.fabric or one.larger == (one.scene in larger)]
+        return [file for file in self.pictures if file.fabric or file.larger == (file.scene in larger)]
 
     @property
     def own(self) -> list[str]:
