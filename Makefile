@@ -10,7 +10,7 @@ READY := .venv/installed
 # A run and its tests start many processes: compiled modules are kept, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: pictures viewer-shader gallery report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults lint budgets rooms pins clean
+.PHONY: pictures viewer-shader gallery report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults lint budgets rooms pins wheel clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -79,6 +79,10 @@ pictures: $(READY)
 	TWILLIGHT_WRITE_PICTURES=1 $(BIN)/pytest -q tests/test_task_pages.py tests/test_twillight_mitsuba.py tests/jobs/verbs/exchange/test_engines.py
 	$(BIN)/twillight list --pictures docs/pictures/presets --size 256x192
 	$(BIN)/python docs/pictures/cover.py
+
+# The package as one file in dist/, for `pip install dist/*.whl` elsewhere; nothing is compiled at install.
+wheel: $(READY)
+	@$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist .
 
 lint: $(READY)
 	$(BIN)/ruff check

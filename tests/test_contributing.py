@@ -109,7 +109,8 @@ def changed(text, diff, name):
 
     A part of a line may stand for it, if it is not a whole line.
     """
-    for old, new in re.findall(r"^([- ].*)\n((?:\+.*\n?)+)", diff, re.M):
+    for old, new in re.findall(r"^([- ].*)\n((?:\+.*\n?)*)", diff, re.M):
+        assert new, f"{name}: {old!r} changes nothing: a line with + is needed after it"
         whole = re.compile(f"^{re.escape(old[1:])}$", re.M)
         place = whole if whole.search(text) else re.compile(re.escape(old[1:]))
         assert len(place.findall(text)) == 1, f"{name}: {old[1:]!r} is there {len(place.findall(text))} times"

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 from jobs.cli import app
 from jobs.recipe.shipped import recipe_names
@@ -164,6 +165,16 @@ def test_estimators_kinds_of_rows_scenes_and_recipes_are_listed():
 
 def test_the_changelog_begins_with_the_package_version():
     assert re.search(r"^## (\S+)", text_of(ROOT / "CHANGELOG.md"), re.M)[1] == PROJECT["version"]
+
+
+def test_twillight_is_cited_alike_in_both_forms():
+    cited = yaml.safe_load(text_of(ROOT / "CITATION.cff"))
+    entry = text_of(ROOT / "BIBLIOGRAPHY.bib").partition("@software{Twillight,")[2].partition("\n}")[0]
+    fields = {name: value.strip("{}").replace("}", "") for name, value in re.findall(r"(\w+) += \{(.*)\}", entry)}
+    assert (cited["version"], cited["license"]) == (PROJECT["version"], PROJECT["license"])
+    assert [cited["authors"][0]["name"], cited["title"], cited["version"]] == [
+        fields[name] for name in ("author", "title", "version")
+    ]
 
 
 def test_reference_keys_that_docstrings_cite_are_in_the_bibliography():

@@ -4,8 +4,11 @@ import doctest
 import inspect
 import os
 import re
+import shutil
 import subprocess
 import sys
+import sysconfig
+import zipfile
 from pathlib import Path
 
 import fsspec
@@ -94,6 +97,36 @@ def test_the_door_opens_without_heavy_libraries_also_beside_a_folder_without_cod
     heavy = ["torch", "numba", "pyarrow", "scipy", "pandas", "matplotlib", "mitsuba", "distributed"]
     code = f"import twillight, sys; print([n for n in {heavy} if n in sys.modules])"
     assert run(code, tmp_path) == (0, "[]\n")
+
+
+@pytest.mark.external
+def test_the_wheel_has_every_file_but_documents_and_opens_in_an_empty_environment(tmp_path):
+    """Its libraries are those of this environment; the package is not."""
+    source, empty = tmp_path / "source", tmp_path / "empty"
+    rooms = ("weaves", "pipeline", "reports", "jobs")
+    for name in (*rooms, "twillight.py", "twillight_mitsuba.py", "pyproject.toml", "README.md", "LICENSE"):
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        source.mkdir(exist_ok=True)
+        copy(ROOT / name, source / name)
+    for cache in source.rglob("__pycache__"):
+        shutil.rmtree(cache)
+    files = {str(path.relative_to(source)) for room in rooms for path in (source / room).rglob("*") if path.is_file()}
+    build = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", tmp_path, source]
+    subprocess.run(build, check=True)
+    (wheel,) = tmp_path.glob("twillight-*-py3-none-any.whl")
+    lacks = files - set(zipfile.ZipFile(wheel).namelist())
+    assert {Path(name).suffix for name in lacks} == {".md", ".jpg", ".wif"}, lacks
+    subprocess.run([sys.executable, "-m", "venv", empty], check=True)
+    subprocess.run([empty / "bin" / "pip", "install", "-q", "--no-deps", wheel], check=True)
+    environment = {**os.environ, "PYTHONPATH": sysconfig.get_path("purelib")}  # without its .pth files
+    for call in (["twillight", "show", "denim"], ["twillight", "plan", "smoke"], ["python", "-c", OPENED]):
+        command = [empty / "bin" / call[0], *call[1:]]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    assert str(empty) in done.stdout and "selvage" in done.stdout
+
+
+OPENED = "import twillight, twillight_mitsuba; print(twillight.__file__, twillight.load_model('selvage').name)"
 
 
 @pytest.mark.parametrize("file", ["weaves/__init__.py", "pipeline/__init__.py", "reports/__init__.py", "jobs.py"])
