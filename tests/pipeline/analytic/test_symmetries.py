@@ -70,8 +70,8 @@ def test_an_ellipse_is_the_same_after_half_a_turn_and_with_its_axes_exchanged(me
 
 
 RECIPROCAL = {"summed_area": 3e-3, "averaged_normals": 3e-3, "soft_nodes": 0.02}
-"""Bounds of the sine: cosines of .3 % of shadows, because the faint tail of a ramp is the viewer's alone. Soft nodes see
-by rays and areas what they light by soft horizons; with rims the sine would be .12."""
+"""Bounds of the sine: cosines of .3 % of shadows, because the faint tail of a ramp is the viewer's alone. Soft nodes
+see by rays and areas what they light by soft horizons; with rims the sine would be .12."""
 
 
 @pytest.mark.parametrize("name", RECIPROCAL)
