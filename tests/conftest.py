@@ -1,6 +1,7 @@
 """What all tests share: one cache of compiled kernels, the lane of programs that are started, the order."""
 
 import os
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -41,6 +42,19 @@ def _few_walks():
         for name, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
             patch.setattr(bounces, name, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
         yield
+
+
+@pytest.fixture
+def described_here(monkeypatch, tmp_path):
+    """Describe code here: a process of its own for each is in tests/pipeline/models/added/test_apart.py."""
+    from pipeline.models.added import describe as describe_module
+
+    monkeypatch.setattr(describe_module, "run_apart", lambda work, *arguments: work(*arguments, lambda share: None))
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield
+    for name, module in list(sys.modules.items()):
+        if (getattr(module, "__file__", None) or "").startswith(str(tmp_path)):
+            del sys.modules[name]
 
 
 def pytest_itemcollected(item):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.bounces.table import bounce_table, bounced
-from tests.crosscheck.test_mitsuba import SCALE, SEEN, _estimated, _fabric, _shape
+from tests.crosscheck.test_mitsuba import SEEN, _estimated, _fabric, scene_of
 from tests.directions import unit
 from weaves.mesh import Mesh, repeat_mesh
 from weaves.surface import surface_at
@@ -46,47 +46,13 @@ def _walls_of_yarns(fabric, walls):
 
 
 def _scene(fabric, wi, wo, colours):
-    mesh, extent = repeat_mesh(fabric, STEPS), np.array(fabric.weave.repeat, np.float64)
-    heights = np.concatenate([part.vertices[:, 2] for part in mesh])
-    top, depth, centre = heights.max(), np.ptp(heights), np.array([*extent / 2, 0.0])
-    down, up = -wo[:2] / wo[2] * depth, wi[:2] / wi[2] * depth
-    reach = np.stack([np.zeros(2), down, up, down + up])
-    # Light between yarns comes from a few yarns around.
-    first = np.floor((reach.min(axis=0) - MARGIN) / extent).astype(int)
-    last = np.floor((reach.max(axis=0) + MARGIN) / extent + 1.0).astype(int)
-    parts = [mesh.warp, mesh.weft, *_walls_of_yarns(fabric, mesh.walls)]
-    shapes = {f"part_{k}": _shape(f"part_{k}", part, list(colours[k % 2]), centre) for k, part in enumerate(parts)}
-    copies = {
-        f"copy_{i - first[0]}_{j - first[1]}": {
-            "type": "instance",
-            "to_world": mi.ScalarTransform4f().translate([i * extent[0] * SCALE, j * extent[1] * SCALE, 0.0]),
-            "cloth": {"type": "ref", "id": "repeat"},
-        }
-        for i in range(first[0], last[0] + 1)
-        for j in range(first[1], last[1] + 1)
-    }
-    camera = np.eye(4)
-    camera[:2, :2] = np.diag([-extent[0] / 2, extent[1] / 2]) * SCALE
-    camera[:3, 2], camera[:3, 3] = -wo, np.array([0.0, 0.0, top * SCALE]) + wo
-    film = {"type": "hdrfilm", "width": SIDE, "height": SIDE, "rfilter": {"type": "box"}}
+    """Return the scene of all bounces, whose light comes from a few yarns around."""
+    mesh = repeat_mesh(fabric, STEPS)
+    meshes = [mesh.warp, mesh.weft, *_walls_of_yarns(fabric, mesh.walls)]
+    parts = [(f"part_{k}", part, list(colours[k % 2])) for k, part in enumerate(meshes)]
     path = {"type": "path", "max_depth": -1, "rr_depth": 100_000}
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "aov", "aovs": "n:geo_normal", "all": path},
-            "light": {"type": "directional", "direction": (-wi).tolist(), "irradiance": {"type": "rgb", "value": 1.0}},
-            "repeat": {"type": "shapegroup", **{name: shape for name, shape in shapes.items() if shape.face_count()}},
-            **copies,
-            "sensor": {
-                "type": "orthographic",
-                "near_clip": 1e-3,
-                "far_clip": 1e3 * SCALE,
-                "to_world": mi.ScalarTransform4f(camera),
-                "film": film | {"pixel_format": "rgb", "component_format": "float32"},
-                "sampler": {"type": "independent", "sample_count": 1},
-            },
-        }
-    )
+    integrator = {"type": "aov", "aovs": "n:geo_normal", "all": path}
+    return scene_of(fabric, wi, wo, parts, integrator, SIDE, MARGIN)
 
 
 def _rendered(fabric, wi, wo, colours):

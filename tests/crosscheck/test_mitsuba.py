@@ -80,16 +80,26 @@ def _shape(name, mesh, colour, centre):
 
 
 def _scene(fabric, wi, wo):
-    """Return one repeat about the origin, the copies that rays from it can meet, light and camera."""
+    """Return the scene of the first bounce; its picture has the colour of the yarn that is seen beside the light."""
     mesh = repeat_mesh(fabric, STEPS)
+    parts = zip(("warp", "weft", "walls"), mesh, ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]), strict=True)
+    path = {"type": "aov", "aovs": "seen:albedo", "direct": {"type": "path", "max_depth": 2}}
+    return scene_of(fabric, wi, wo, list(parts), path, SIDE)
+
+
+def scene_of(fabric, wi, wo, parts, integrator, side, margin=0.0):
+    """Return one repeat of meshes (name, mesh, colour) about the origin, all copies that its rays meet, and a camera.
+
+    Rays go on over a `margin` of yarns around.
+    """
     extent = np.array(fabric.weave.repeat, np.float64)
-    heights = np.concatenate([part.vertices[:, 2] for part in mesh])
-    top, depth = heights.max(), np.ptp(heights)
-    centre = np.array([*extent / 2, 0.0])
+    heights = np.concatenate([mesh.vertices[:, 2] for _, mesh, _ in parts])
+    top, depth, centre = heights.max(), np.ptp(heights), np.array([*extent / 2, 0.0])
     # A ray goes down from the top along -wo and then up along wi, through no more than the depth of the cloth.
     down, up = -wo[:2] / wo[2] * depth, wi[:2] / wi[2] * depth
-    reach = np.stack([np.zeros(2), down, up, down + up]) / extent
-    first, last = np.floor(reach.min(axis=0) - 1e-6).astype(int), np.floor(reach.max(axis=0) + 1.0 + 1e-6).astype(int)
+    reach, edge = np.stack([np.zeros(2), down, up, down + up]), margin + 1e-6 * extent
+    first = np.floor((reach.min(axis=0) - edge) / extent).astype(int)
+    last = np.floor((reach.max(axis=0) + edge) / extent + 1.0).astype(int)
     copies = {
         f"copy_{i - first[0]}_{j - first[1]}": {
             "type": "instance",
@@ -102,18 +112,16 @@ def _scene(fabric, wi, wo):
     # Columns: where the camera's x, y and z point. Its rays start above the plane z = top and go along -wo.
     camera = np.eye(4)
     camera[:2, :2] = np.diag([-extent[0] / 2, extent[1] / 2]) * SCALE
-    camera[:3, 2] = -wo
-    camera[:3, 3] = np.array([0.0, 0.0, top * SCALE]) + wo
+    camera[:3, 2], camera[:3, 3] = -wo, np.array([0.0, 0.0, top * SCALE]) + wo
+    film = {"type": "hdrfilm", "width": side, "height": side, "rfilter": {"type": "box"}}
     return mi.load_dict(
         {
             "type": "scene",
-            "integrator": {"type": "aov", "aovs": "seen:albedo", "direct": {"type": "path", "max_depth": 2}},
+            "integrator": integrator,
             "light": {"type": "directional", "direction": (-wi).tolist(), "irradiance": {"type": "rgb", "value": 1.0}},
             "repeat": {
                 "type": "shapegroup",
-                "warp": _shape("warp", mesh.warp, [1.0, 0.0, 0.0], centre),
-                "weft": _shape("weft", mesh.weft, [0.0, 1.0, 0.0], centre),
-                "walls": _shape("walls", mesh.walls, [0.0, 0.0, 0.0], centre),
+                **{name: _shape(name, mesh, colour, centre) for name, mesh, colour in parts if len(mesh.faces)},
             },
             **copies,
             "sensor": {
@@ -121,14 +129,7 @@ def _scene(fabric, wi, wo):
                 "near_clip": 1e-3,
                 "far_clip": 1e3 * SCALE,
                 "to_world": mi.ScalarTransform4f(camera),
-                "film": {
-                    "type": "hdrfilm",
-                    "width": SIDE,
-                    "height": SIDE,
-                    "rfilter": {"type": "box"},
-                    "pixel_format": "rgb",
-                    "component_format": "float32",
-                },
+                "film": film | {"pixel_format": "rgb", "component_format": "float32"},
                 "sampler": {"type": "independent", "sample_count": 1},
             },
         }

@@ -1,6 +1,5 @@
 """Methods from outside in recipes; the tests of what their code may be are in tests/pipeline/models/added."""
 
-import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from jobs.plan.plan import plan
 from jobs.plan.training import Training
 from jobs.recipe import added
 from jobs.recipe.load import load_recipe
-from pipeline.models.added import describe as describe_module
 from pipeline.models.added.added_code import GROUP
 from tests.jobs.identities import assert_changed, ids
 from tests.refusals import refusal
@@ -34,15 +32,7 @@ NETWORK = METHOD + "    network = load = covers\n"
 HERE = '\n[[models]]\nmodel = "theirs"\n'
 
 
-@pytest.fixture(autouse=True)
-def _in_this_process(monkeypatch, tmp_path):
-    """Describe code here: a process of its own for each is in tests/pipeline/models/added/test_apart.py."""
-    monkeypatch.setattr(describe_module, "run_apart", lambda work, *arguments: work(*arguments, lambda share: None))
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    yield
-    for name, module in list(sys.modules.items()):
-        if (getattr(module, "__file__", None) or "").startswith(str(tmp_path)):
-            del sys.modules[name]
+pytestmark = pytest.mark.usefixtures("described_here")
 
 
 @pytest.fixture

@@ -14,7 +14,6 @@ from pipeline.truth.geometry.heightfield import height_field, surface_at
 from pipeline.truth.geometry.pieces import reference_plane
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
 from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, direction, equal_queries, woven
 from tests.presets import slow
@@ -72,13 +71,6 @@ def test_the_mean_over_places_does_not_depend_on_the_size_of_the_footprint(degre
     if degrees > 70:
         flat = _answers(fabric, small, parallax=False).mean.mean(axis=0) @ COLOUR
         assert flat < 0.9 * far
-
-
-def test_a_viewer_behind_sees_the_back():
-    wi, wo = (np.float32([direction(*at)]) for at in ((160.0, 10.0), (125.0, 60.0)))
-    query = Queries.round([0.4], [1.1], [0.2], wi, wo)
-    behind, front = _answers(LOPSIDED, query), _answers(LOPSIDED.back(), query.turned())
-    np.testing.assert_array_equal(behind.mean, front.mean)
 
 
 @pytest.mark.parametrize("walls", [slow("left_out"), "rim"])

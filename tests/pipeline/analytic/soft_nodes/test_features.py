@@ -18,68 +18,42 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.analytic.methods import soft_table
+from tests.pipeline.truth.cloths import IMAGES, LOPSIDED
 from tests.presets import slow
-from weaves.draft import Draft, Matrix
+from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
 SIZES = {"narrow": (0.05, 0.24), "middle": (0.25, 1.0), "wide": (3.0, 8.0)}
 
 
 @pytest.fixture(scope="module")
-def lopsided():
-    """A cloth without symmetries of its own, its yarns unlike and with gaps."""
-    fabric = load_fabric("denim")
-    warp = fabric.warp.model_copy(update={"width": 0.8, "twist": 20.0})
-    draft = Matrix(rows=("##.#", ".##.", "#..#"))
-    return fabric.model_copy(update={"draft": draft, "warp": warp})
+def table():
+    return soft_table(LOPSIDED)
 
 
-@pytest.fixture(scope="module")
-def table(lopsided):
-    return soft_table(lopsided)
-
-
-def test_exchanging_warp_and_weft_permutes_the_features(lopsided, table):
-    """Against the cloth with its draft transposed, its yarns exchanged and its twists reversed."""
-    queries = draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0), lopsided.weave.repeat, 5, 0, 150)
-    warp, weft = (yarn.model_copy(update={"twist": -yarn.twist}) for yarn in (lopsided.weft, lopsided.warp))
-    rows = tuple(Draft(~lopsided.weave.warp_over.T).rows())
-    other = lopsided.model_copy(update={"draft": Matrix(rows=rows), "warp": warp, "weft": weft})
-    order = [1, 0, 2]
-    there = queries._replace(u=queries.v, v=queries.u, wi=queries.wi[:, order], wo=queries.wo[:, order])
-    own, transposed = read_queries(table, queries).features, read_queries(soft_table(other), there).features
-    difference = np.abs(EXCHANGED_SIGN * own[:, EXCHANGED] - transposed)
+@pytest.mark.parametrize("image", ["exchange", "mirror", "half a turn"])
+def test_a_cloth_drawn_in_another_way_has_the_features(table, image):
+    """Exchanging warp and weft permutes them. A mirror reverses the sense of the twists, as the half vector sees it."""
+    queries = draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0), LOPSIDED.weave.repeat, 5, 0, 150)
+    cloth, there = IMAGES[image](queries)
+    own, found = read_queries(table, queries).features, read_queries(soft_table(cloth), there).features
+    expected = EXCHANGED_SIGN * own[:, EXCHANGED] if image == "exchange" else own
     # A node on the border of two cells of a grid may read either.
+    difference = np.abs(expected - found)
     assert difference.max() < 0.05 and difference.mean() < 1e-4
-    assert np.abs(own[:, EXCHANGED] - transposed)[:, 28:30].min() > 0.1
+    if image == "exchange":
+        assert np.abs(own[:, EXCHANGED] - found)[:, 28:30].min() > 0.1
 
 
-@pytest.mark.parametrize(("x", "y"), [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
-def test_a_mirrored_cloth_has_the_features_of_mirrored_queries(lopsided, table, x, y):
-    """Except for the sense of the twists, which is that of the mirrored yarns, as the half vector sees it."""
-    ends, picks = lopsided.weave.repeat
-    queries = draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0), (ends, picks), 5, 0, 150)
-    warp, weft = (yarn.model_copy(update={"twist": x * y * yarn.twist}) for yarn in (lopsided.warp, lopsided.weft))
-    over = lopsided.weave.warp_over[:: int(y), :: int(x)]
-    mirrored = lopsided.model_copy(update={"draft": Matrix(rows=tuple(Draft(over).rows())), "warp": warp, "weft": weft})
-    signs = np.float32([x, y, 1.0])
-    there = queries._replace(
-        u=queries.u if x > 0 else ends - queries.u, v=queries.v if y > 0 else picks - queries.v,
-        wi=queries.wi * signs, wo=queries.wo * signs,
-    )  # fmt: skip
-    difference = np.abs(read_queries(table, queries).features - read_queries(soft_table(mirrored), there).features)
-    assert difference.max() < 0.05 and difference.mean() < 1e-4
-
-
-def test_the_last_features_are_the_cloths_own(lopsided, table):
-    asked = draw_queries(QueryOptions(), lopsided.weave.repeat, 1, 0, 20)
+def test_the_last_features_are_the_cloths_own(table):
+    asked = draw_queries(QueryOptions(), LOPSIDED.weave.repeat, 1, 0, 20)
     features = read_queries(table, asked).features
     np.testing.assert_array_equal(features[:, OF_QUERY:], np.tile(cloth_features(table), (20, 1)))
     assert np.ptp(features[:, :OF_QUERY], axis=0).min() > 0.0
 
 
-def test_rows_do_not_depend_on_each_other(lopsided, table):
-    asked = draw_queries(QueryOptions(), lopsided.weave.repeat, 3, 0, 60)
+def test_rows_do_not_depend_on_each_other(table):
+    asked = draw_queries(QueryOptions(), LOPSIDED.weave.repeat, 3, 0, 60)
     whole, part = read_queries(table, asked), read_queries(table, asked.take(slice(20, 40)))
     for all_rows, some in zip(whole, part, strict=True):
         np.testing.assert_array_equal(some, all_rows[20:40])

@@ -1,5 +1,4 @@
 import re
-import sys
 
 import pytest
 
@@ -9,16 +8,7 @@ from pipeline.models.added.describe import describe
 from tests.pipeline.models.stand_ins import METHOD, TRAINED
 from weaves.errors import BadInput
 
-
-@pytest.fixture(autouse=True)
-def _in_this_process(monkeypatch, tmp_path):
-    """Describe code here: a process of its own for each is in tests/pipeline/models/added/test_apart.py."""
-    monkeypatch.setattr(describe_module, "run_apart", lambda work, *arguments: work(*arguments, lambda share: None))
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    yield
-    for name, module in list(sys.modules.items()):
-        if (getattr(module, "__file__", None) or "").startswith(str(tmp_path)):
-            del sys.modules[name]
+pytestmark = pytest.mark.usefixtures("described_here")
 
 
 @pytest.fixture

@@ -114,15 +114,6 @@ def test_every_ray_of_an_even_footprint_ends(name):
     assert areas[1].max() < 1.02
 
 
-@pytest.mark.parametrize("walls", ["left_out", "rim"])
-def test_an_even_footprint_sees_no_parallax(walls):
-    """The answer is that of the truth, whatever the walls; views to 85 degrees."""
-    fabric = woven("denim")
-    queries = _queries(fabric, 60, 6, sigma=(4.0, 8.0), steepest=85.0)
-    truth = estimate(fabric, queries, RAYS.model_copy(update={"walls": walls}), 1)
-    assert _error(SoftNodes(2, walls=walls), fabric, queries, truth) < 0.03
-
-
 @pytest.mark.parametrize("name", ["denim", slow("satin_8")])
 def test_rims_are_seen_as_the_truth_sees_them(name):
     """Steep views meet walls: nodes that leave them out are off by more."""
@@ -170,18 +161,6 @@ def test_light_does_not_depend_on_how_finely_one_looks(name, degrees):
         narrow += nodes.predict(fabric, asked).sum(axis=1).mean(dtype=np.float64)
         wide += estimate(fabric, equal_queries(*look, sigma=3.0 * max(fabric.weave.repeat)), exact, 1).mean.sum()
     assert narrow == pytest.approx(wide, rel=0.01)
-
-
-def test_lines_turn_with_the_viewer():
-    """A plain weave of equal yarns is the same cloth after half a turn; its lines lie elsewhere."""
-    fabric = woven("polyester_lining")
-    table = tabulate(fabric)
-    queries = _queries(fabric, 40, 8)
-    turn = np.float32([-1, -1, 1])
-    ends, picks = fabric.weave.repeat
-    turned = queries._replace(u=ends - queries.u, v=picks - queries.v, wi=queries.wi * turn, wo=queries.wo * turn)
-    here, there = (query_sums(table, asked)[0] for asked in (queries, turned))
-    np.testing.assert_allclose(here[:, :, :3], there[:, :, :3], rtol=2e-2, atol=2e-3)
 
 
 @pytest.mark.parametrize("kind", ["round", "behind"])
