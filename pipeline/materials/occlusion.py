@@ -24,7 +24,7 @@ from pipeline.truth.geometry.pieces import different_cells
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 
-AZIMUTHS: Final = 16
+_AZIMUTHS: Final = 16
 _GRIDS: Final = {64: 16, 1024: 8}  # nodes along a piece, by the most different cells
 _COARSEST: Final = 4
 
@@ -37,8 +37,8 @@ def lit_coverage(fabric: Fabric, shown: Layout) -> Float32:
     side = cloth_side(fabric, TruthOptions())
     cells = different_cells(side.front)
     grid = next((nodes for most, nodes in _GRIDS.items() if cells <= most), _COARSEST)
-    table = horizon_map(side.front, side.back, grid, AZIMUTHS)
-    turns = 2.0 * math.pi * np.arange(AZIMUTHS) / AZIMUTHS
+    table = horizon_map(side.front, side.back, grid, _AZIMUTHS)
+    turns = 2.0 * math.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
     return _texels(side.front, table, np.stack([np.cos(turns), np.sin(turns)], axis=-1), shown, samples(shown))
 
 

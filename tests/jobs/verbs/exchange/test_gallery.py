@@ -59,7 +59,7 @@ def test_the_page_searches_by_weave_and_fibre_and_opens_from_a_folder(tmp_path):
     )
     press = "[...document.querySelectorAll('button')].find(b => b.textContent === '{}').click()"
     address = f"file://{tmp_path}/index.html"
-    with opened(address, tmp_path / "profile", ready="document.getElementById('count').textContent") as page:
+    with opened(address, tmp_path / "profile", ready="document.getElementById('count')?.textContent") as page:
         assert len(page.run(shown)) == len(cards)
         page.run(press.format("satin"))
         assert page.run(shown) == ["satin 8", "silk charmeuse"]
