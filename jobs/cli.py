@@ -22,7 +22,7 @@ class VerbEntry(NamedTuple):
     function: str
     """Module of `jobs.verbs` and its function."""
     line: str
-    """What it does."""
+    """Its purpose."""
     examples: tuple[str, ...]
     """Arguments of calls that its help shows."""
 

@@ -73,8 +73,7 @@ def with_widths(table: Mapping[str, Any]) -> dict[str, Any]:
         found["yarns_per_cm"] = validated(_Sett, {"sett": found.pop("sett")}, "").sett
     for axis, family in enumerate(("warp", "weft")):
         yarn = found.get(family)
-        given = {key: yarn[key] for key in Count.model_fields if key in yarn} if isinstance(yarn, Mapping) else {}
-        if given:
+        if isinstance(yarn, Mapping) and (given := {key: yarn[key] for key in Count.model_fields if key in yarn}):
             try:
                 width = _width(given, yarn, found.get("yarns_per_cm"), axis)
             except BadInput as error:

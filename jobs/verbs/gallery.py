@@ -34,9 +34,9 @@ def gallery(
     if len({cloth.name for cloth in cloths.values()}) < len(cloths):
         raise BadInput("gallery", "FABRICS", ", ".join(cloths), "two have the same name; each needs its own")
     cards = []
-    for name, cloth in tracked(list(cloths.items()), f"{len(cloths)} fabrics"):
+    for cloth in tracked(list(cloths.values()), f"{len(cloths)} fabrics"):
         print_lines(f"{cloth.name}: picture, live page, maps, GLB, shader", stderr=True)
         cards.append(write_fabric(cloth, out, size, truth, language))
-        write_swatch(name, cloth, out / cloth.name, PICTURE_SIZE).replace(out / cloth.name / PICTURE)
+        write_swatch(cloth, out / cloth.name, PICTURE_SIZE).replace(out / cloth.name / PICTURE)
     atomic_write(out / INDEX, gallery_page(cards).encode())
     print_lines(f"{out / INDEX}: {len(cards)} fabrics; open it in a browser")

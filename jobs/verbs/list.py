@@ -27,7 +27,7 @@ def print_lists(
         from jobs.verbs.show import write_swatch  # numba, which the lists need not wait for
 
         for name in tracked(preset_names(), "pictures"):
-            print_lines(write_swatch(name, load_fabric(name), pictures, size))
+            print_lines(write_swatch(load_fabric(name), pictures, size))
         return
     fabrics, weave = [read_toml(PRESETS / f"{name}.toml") for name in preset_names()], TypeAdapter(Weave)
     rows = []

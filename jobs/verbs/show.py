@@ -138,7 +138,7 @@ def _method(fabric: Fabric) -> tuple[Fallback, AbstractContextManager[None]]:
 
     if fabric.weave.different_cells() > TABLE_CELLS:
         points = PointSampledOptions(counts=[POINTS_OF_MANY_CELLS])
-        return Fallback(*points.methods(), points.kinds), nullcontext()
+        return Fallback(points.methods()[0], points.kinds), nullcontext()
     from pipeline.models.named import named_method  # torch
     from pipeline.models.network import one_thread
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def family_heights(table: SoftNodeTable) -> tuple[float, float]:
 
 
 class SeenTints:
-    """What footprints see of the threads of one side of a cloth."""
+    """Colours of the threads of one side of a cloth, as footprints see them."""
 
     def __init__(self, table: SoftNodeTable, tints: tuple[Float32, Float32]) -> None:
         self._table, self._tints = table, tints
@@ -103,10 +103,11 @@ class SeenTints:
 
 def _moved(table: SoftNodeTable, wo: Float64, curvature: float, height: float) -> tuple[float, float]:
     """Return by how much a place of a height is displaced towards the viewer."""
-    of = sight(*wo.astype(np.float32), np.float32(curvature if len(table.falls) else 0.0))
+    x, y, z = wo.astype(np.float32)
+    of = sight(x, y, z, np.float32(curvature if len(table.falls) else 0.0))
     over = height - table.plane
-    length = 2.0 * over * of.run / (1.0 + math.sqrt(max(1.0 + of.bent * over, 0.0)))
-    return length * of.ex, length * of.ey
+    length = 2.0 * over * float(of.run) / (1.0 + math.sqrt(max(1.0 + float(of.bent) * over, 0.0)))
+    return length * float(of.ex), length * float(of.ey)
 
 
 def _across(rows: Float64, centre: Float64, sigma: Float64) -> Float64:
@@ -117,11 +118,11 @@ def _across(rows: Float64, centre: Float64, sigma: Float64) -> Float64:
     def until(place: Float64) -> Float64:
         thread = np.floor(place)
         own = rows[thread.astype(int) % len(rows)]
-        return own[..., 9:] + (place - thread)[..., None] * (own[..., :9] - 1.0)
+        return np.asarray(own[..., 9:] + (place - thread)[..., None] * (own[..., :9] - 1.0))
 
     sums = sum(w * (until(centre + sigma * x) - until(centre - sigma * x)) for w, x in zip(weight, z, strict=True))
     found = 1.0 + sums / (sigma * 2.0 * (weight * z).sum())[:, None]
-    return np.where((sigma < SPREAD_OUT * len(rows))[:, None], found, 1.0)
+    return np.asarray(np.where((sigma < SPREAD_OUT * len(rows))[:, None], found, 1.0))
 
 
 def by_copy(table: SoftNodeTable) -> SoftNodeTable:
@@ -161,12 +162,15 @@ def by_copy(table: SoftNodeTable) -> SoftNodeTable:
 
     nodes = np.ascontiguousarray(of_nodes(table.nodes.transpose(1, 0, 2)).transpose(1, 0, 2))
     names = ("evenly", "mean", "sharpness", "behind_mean", "behind_sharpness", "falls", "areas")
+    copied: dict[str, Any] = {
+        name: getattr(table, name)[of_pieces] for name in ("pieces", "bounds", "floats", "crowns")
+    }
+    copied |= {name: of_nodes(getattr(table, name)) for name in names}
     return table._replace(
         repeat=np.array([wide, high]), kinds=np.array([wide, high]), starts=np.array(starts), nodes=nodes, spots=spots,
         uniform=math.inf, groups=np.array(rows, np.uint32), group_starts=group_starts.astype(np.uint32),
         cell_groups=cell_groups.ravel().astype(np.uint32), piece_starts=piece_starts,
-        **{name: getattr(table, name)[of_pieces] for name in ("pieces", "bounds", "floats", "crowns")},
-        **{name: of_nodes(getattr(table, name)) for name in names},
+        **copied,
     )  # fmt: skip
 
 
