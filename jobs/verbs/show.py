@@ -119,7 +119,7 @@ def write_swatch(fabric: Fabric, folder: Path, size: str) -> Path:
     path, codes = folder / f"{fabric.name}-swatch.png", np.zeros((film[1], film[0], 3), np.uint8)
     parts = windows(film, QUERIES_OF_PIXEL)
     with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
-        method, alone = _method(fabric)
+        method, alone = method_of(fabric)
         with alone:
             method.prepare(fabric)
             between = partial(light_between, tables=tables_of(WALKS_OF_SWATCH))
@@ -131,7 +131,7 @@ def write_swatch(fabric: Fabric, folder: Path, size: str) -> Path:
     return path
 
 
-def _method(fabric: Fabric) -> tuple[Fallback, AbstractContextManager[None]]:
+def method_of(fabric: Fabric) -> tuple[Fallback, AbstractContextManager[None]]:
     """Return the method that answers for a swatch, and how it runs beside others on threads of one process."""
     from pipeline.models.analytic.point_sampled import PointSampledOptions
     from pipeline.models.fallback import Fallback
