@@ -80,7 +80,7 @@ def test_the_layers_of_an_exr_sum_to_its_colour_and_say_what_they_are(render, tm
 @pytest.mark.slow
 def test_a_swatch_of_a_fabric_is_the_scene_swatch_and_shows_its_repeat(monkeypatch, tmp_path):
     """Tables of light between yarns have fewer walks; a satin of more threads than a swatch has gets more yarns."""
-    path = jobs.verbs.show.write_swatch(load_fabric("denim"), tmp_path, "32x24")
+    path = jobs.verbs.show.write_swatch(load_fabric("denim"), tmp_path, (32, 24))
     assert path == tmp_path / "denim-swatch.png"
     assert main(["render", "swatch", "--fabric", "denim", "--size", "32x24", "--out", str(tmp_path / "a.png")]) == 0
     np.testing.assert_allclose(codes_of(path), codes_of(tmp_path / "a.png"), atol=3)
@@ -89,7 +89,7 @@ def test_a_swatch_of_a_fabric_is_the_scene_swatch_and_shows_its_repeat(monkeypat
     wide = load_fabric("denim").model_copy(update={"name": "wide", "draft": Satin(ends=100, move=3)})
     asked = Mock(return_value=[])
     monkeypatch.setattr(pipeline.scenes.picture, "answered", asked)
-    jobs.verbs.show.write_swatch(wide, tmp_path, "32x24")
+    jobs.verbs.show.write_swatch(wide, tmp_path, (32, 24))
     assert asked.call_args.args[0].__self__.yarns == 150.0
 
 
