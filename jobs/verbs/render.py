@@ -74,11 +74,17 @@ def look(
         raise BadInput(WHERE, "--directions", directions, error.allowed) from error
     if not -STOPS <= exposure <= STOPS:
         raise BadInput(WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
-    sides = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", size)
-    film = (int(sides[1]), int(sides[2])) if sides else None
-    if size and not (film and min(film) >= 1 and max(film) <= MOST_PIXELS):
-        raise BadInput(WHERE, "--size", size, f"must be WIDTHxHEIGHT, such as 1024x1024, each from 1 to {MOST_PIXELS}")
+    film = size_of(size, WHERE) if size else None
     return RenderLook(film, round(samples**0.5), options, tone, exposure)
+
+
+def size_of(size: str, where: str) -> tuple[int, int]:
+    """Return width and height of a picture from the command line; BadInput if they cannot be used."""
+    sides = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", size)
+    film = (int(sides[1]), int(sides[2])) if sides else (0, 0)
+    if not 1 <= min(film) <= max(film) <= MOST_PIXELS:
+        raise BadInput(where, "--size", size, f"must be WIDTHxHEIGHT, such as 1024x1024, each from 1 to {MOST_PIXELS}")
+    return film
 
 
 def render(

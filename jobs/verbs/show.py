@@ -74,9 +74,12 @@ def show(
         raise BadInput("show", "", "--out is missing", "a folder is needed for pictures")
     _print_fabric(cloth)
     if out is not None:
+        from jobs.verbs.render import size_of  # modules that the numbers need not wait for
+
+        film = size_of(size, "show")
         with Terminal().status("draft and maps" if maps else "draft"):
             paths = [*_drawn(cloth, out, draft), *(write_maps(cloth, out) if maps else [])]
-        print_lines(*paths, write_swatch(cloth, out, size))
+        print_lines(*paths, write_swatch(cloth, out, film))
 
 
 def _drawn(fabric: Fabric, folder: Path, *draws: Callable[[Fabric], bytes]) -> list[Path]:
@@ -106,20 +109,19 @@ def write_maps(fabric: Fabric, folder: Path) -> list[Path]:
     return paths
 
 
-def write_swatch(fabric: Fabric, folder: Path, size: str) -> Path:
-    """Write a picture of a lit swatch with at least one and a half repeats, and return its path."""
-    from jobs.verbs.render import look, shown_at
+def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
+    """Write a picture of a lit swatch, width and height in pixels, of one and a half repeats or more; return its path."""
+    from jobs.verbs.render import shown_at
     from pipeline.scenes.bounces import light_between, tables_of
     from pipeline.scenes.picture import answered, windows
     from pipeline.scenes.swatch import Swatch
 
-    film = look(size=size, samples=1, directions=8, tone="srgb", exposure=0.0).size or (0, 0)
     period = max(*fabric.weave.repeat, *(len(colours.diffuse) for colours in fabric.thread_colours()))
-    swatch = Swatch(min(max(LEAST_YARNS, 1.5 * period), MOST_YARNS), film)
-    path, codes = folder / f"{fabric.name}-swatch.png", np.zeros((film[1], film[0], 3), np.uint8)
-    parts = windows(film, QUERIES_OF_PIXEL)
+    swatch = Swatch(min(max(LEAST_YARNS, 1.5 * period), MOST_YARNS), size)
+    path, codes = folder / f"{fabric.name}-swatch.png", np.zeros((size[1], size[0], 3), np.uint8)
+    parts = windows(size, QUERIES_OF_PIXEL)
     with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
-        method, alone = _method(fabric)
+        method, alone = method_of(fabric)
         with alone:
             method.prepare(fabric)
             between = partial(light_between, tables=tables_of(WALKS_OF_SWATCH))
@@ -131,7 +133,7 @@ def write_swatch(fabric: Fabric, folder: Path, size: str) -> Path:
     return path
 
 
-def _method(fabric: Fabric) -> tuple[Fallback, AbstractContextManager[None]]:
+def method_of(fabric: Fabric) -> tuple[Fallback, AbstractContextManager[None]]:
     """Return the method that answers for a swatch, and how it runs beside others on threads of one process."""
     from pipeline.models.analytic.point_sampled import PointSampledOptions
     from pipeline.models.fallback import Fallback

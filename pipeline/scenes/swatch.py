@@ -43,6 +43,10 @@ def height(y: Floats) -> Floats:
     return np.asarray(0.01 + 0.05 * (1.0 + np.cos(2.0 * np.pi * y)))
 
 
+def _slope(y: Floats) -> Floats:
+    return np.asarray(-0.1 * np.pi * np.sin(2.0 * np.pi * y))
+
+
 class Swatch(NamedTuple):
     """A square of cloth and its picture."""
 
@@ -93,8 +97,8 @@ class Swatch(NamedTuple):
         down: Floats,
     ) -> tuple[GBuffer, Floats]:
         """Return the G-buffer and the normals of the places of the cloth."""
-        y, turn = position[:, 1], 2.0 * np.pi
-        slope, bend = -0.05 * turn * np.sin(turn * y), -0.05 * turn**2 * np.cos(turn * y)
+        y = position[:, 1]
+        slope, bend = _slope(y), -0.2 * np.pi**2 * np.cos(2.0 * np.pi * y)
         level = 1.0 / np.sqrt(1.0 + np.square(slope))
         along = np.stack([np.zeros_like(y), level, level * slope], axis=-1)
         normal = np.stack([np.zeros_like(y), -level * slope, level], axis=-1)
@@ -133,8 +137,7 @@ def _met(start: Floats, ray: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
         distance = (0.06 - start[:, 2]) / ray[:, 2]
         for _ in range(_STEPS):
             y = start[:, 1] + distance * ray[:, 1]
-            slope = -0.1 * np.pi * np.sin(2.0 * np.pi * y)
             above = start[:, 2] + distance * ray[:, 2] - height(y)
-            distance = distance - above / (ray[:, 2] - slope * ray[:, 1])
+            distance = distance - above / (ray[:, 2] - _slope(y) * ray[:, 1])
         x, y = (start[:, axis] + distance * ray[:, axis] for axis in (0, 1))
         return distance, (np.abs(x) <= 0.5) & (np.abs(y) <= 0.5) & (distance > 0.0)

@@ -79,7 +79,7 @@ def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
 
 def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path):
     code, text, _ = twillight("show", "denim", "--out", "shown", "--maps", "--size", "32x24")
-    kinds = ("drawdown.png", "colours.png", "height.png", "normals.png", "maps.exr", "swatch.png")
+    kinds = ("draft.png", "height.png", "normals.png", "maps.exr", "swatch.png")
     names = [f"denim-{kind}" for kind in kinds]
     assert code == 0 and all(name in text for name in names)
     assert sorted(path.name for path in (tmp_path / "shown").iterdir()) == sorted(names)

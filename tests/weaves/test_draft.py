@@ -41,6 +41,15 @@ def test_drawing_reads_back(matrix):
     assert Matrix(rows=draft.rows()).build() == draft and draft.text().count("██") == matrix.sum()
 
 
+@given(matrices)
+def test_the_loom_of_a_draft_weaves_it_with_as_few_shafts_and_treadles_as_can_be(matrix):
+    loom = Draft(matrix).loom()
+    assert loom.build() == Draft(matrix) and loom.threading[0] == loom.treadling[0] == 1
+    assert (len(loom.tie_up), len(loom.tie_up[0])) == tuple(
+        len(np.unique(lines, axis=0)) for lines in (matrix, matrix.T)
+    )
+
+
 @settings(deadline=None)
 @given(hnp.arrays(np.bool_, hnp.array_shapes(min_dims=2, max_dims=2, max_side=4)))
 def test_cloth_hangs_together_unless_some_yarns_lie_on_all_others(matrix):

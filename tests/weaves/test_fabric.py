@@ -1,10 +1,12 @@
 import json
+import math
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.presets import PRESETS
+from weaves.count import Count, cover
 from weaves.draft import cells
 from weaves.fabric import Fabric, load_fabric
 from weaves.yarn import Yarn
@@ -74,6 +76,35 @@ def test_the_physical_size_is_left_out_where_it_is_unknown():
     assert "yarns_per_cm" not in denim.model_dump() and "yarns_per_cm" not in denim.to_toml()
     sized = Fabric.model_validate(denim.model_dump() | {"yarns_per_cm": [24, 19.5]})
     assert sized.yarns_per_cm == (24.0, 19.5) and sized.optics() == denim.optics()
+
+
+def test_counts_and_sett_give_widths():
+    """Peirce's diameter of cotton, 1 / (28 sqrt(Ne)) inches; tex and Ne of one yarn; and area = mass / density."""
+    table = denim.model_dump(mode="json")
+    for yarn, count in (("warp", {"ne": 24}), ("weft", {"tex": 40, "fibre_density": 1.3, "packing": 0.7})):
+        del table[yarn]["width"]
+        table[yarn] |= count
+    fabric = Fabric.model_validate(table | {"sett": [30, 20]})
+    assert fabric.yarns_per_cm == (30.0, 20.0) and Fabric.model_validate(fabric.model_dump()) == fabric
+    assert fabric.warp.width == pytest.approx(25.4 / (28 * 24**0.5) * 3.0, rel=2e-3)
+    area = 0.25 * math.pi * (fabric.weft.width / 2.0) ** 2  # mm^2
+    assert area * 1.3 * 0.7 == pytest.approx(40 / 1000)  # mg/mm
+    assert Count(ne=24).diameter == pytest.approx(Count(tex=24.606).diameter, rel=1e-4)
+
+
+def test_cover_and_cut_off_of_a_cloth():
+    """Round yarns hide the gaps between them from cos(angle) = width on; closed cloth lets none pass."""
+    yarns = [denim.warp.model_copy(update={"width": width}) for width in (0.5, 0.8)]
+    closed = cover(*yarns)
+    assert closed[:4] == pytest.approx((0.5, 0.8, 0.9, 0.1))
+    assert [math.cos(math.radians(angle)) for angle in closed[4:]] == pytest.approx([0.8, 0.5])
+    assert cover(denim.warp, yarns[0])[2:] == (1.0, 0.0, 0.0, 0.0)
+
+
+def test_the_loom_of_a_file_is_its_own():
+    rows = {"family": "loom", "threading": [2, 1], "tie_up": [[0, 1, 0], [1, 0, 0]], "treadling": [1, 2]}
+    loomed = Fabric.model_validate(denim.model_dump() | {"draft": rows})
+    assert loomed.loom().threading == (2, 1) and denim.loom().threading == (1, 2, 3, 4)
 
 
 def test_optics_see_shape_but_neither_colour_name_or_source_nor_how_the_draft_was_written():

@@ -25,6 +25,13 @@ def with_warp(**change):
     return {**GOOD, "warp": {**GOOD["warp"], **change}}
 
 
+def counted(sett=None, **change):
+    table = with_warp(**change)
+    if "width" not in change:
+        del table["warp"]["width"]
+    return table | ({"sett": sett} if sett else {})
+
+
 def with_draft(**draft):
     return {**GOOD, "draft": draft}
 
@@ -52,6 +59,16 @@ def with_draft(**draft):
         (with_warp(diffuse={"wavelengths": [400, 500], "value": [0, 1]}), "warp.diffuse.value = [0, 1]: unknown key; "
          "did you mean 'values'? known: values, wavelengths (and 1 more)"),
         ({**GOOD, "yarns_per_cm": [float("nan"), 20.0]}, "yarns_per_cm.0 = nan: Input should be a finite number"),
+        (counted(tex=25), "warp.tex = 25: sett = [ends per cm, picks per cm] is needed with it"),
+        (counted([30, 20], packing=0.5), "warp.packing = 0.5: give one of tex and ne with it"),
+        (counted([30, 20], tex=25, ne=20), "warp.tex = 25: give one of tex and ne with it"),
+        (counted([30, 20], tex=25, width=0.5), "warp.width = 0.5: follows from tex and sett"),
+        (counted([30, 20], ne=-1), "warp.ne = -1: Input should be greater than or equal to 0.1"),
+        (counted([30, "x"], tex=25), "sett.1 = 'x': Input should be a valid number"),
+        (counted([30, 20], tex=250), "warp.tex = 250: at 30 ends per cm yarns of 0.591 mm have 1.77 of their spacing; "
+         "with this count the sett may be from 0.846 to 16.9, or more with a larger packing"),
+        (counted([30, 20], texx=25), "warp.texx = 25: unknown key; did you mean 'tex'?"),
+        ({**GOOD, "sett": [30, 20], "yarns_per_cm": [30, 20]}, "sett = [30, 20]: yarns_per_cm states the same"),
         ({}, "name is missing: it is required (and 3 more)"),
     ],
 )  # fmt: skip

@@ -4,11 +4,14 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from reports.images import tiles
+from reports.images import draft, tiles
 from reports.images.exr import Exr
 from reports.images.tiles import EXPOSURE, displayed, encoded
 from weaves.colour import linear_rgb
+from weaves.draft import Draft, Matrix
 from weaves.fabric import load_fabric
+
+SIDE = draft.LARGEST_CELL
 
 
 def decoded(png):
@@ -35,21 +38,40 @@ def test_difference_is_blue_where_dark_and_red_where_bright():
     assert np.ptp(same[:3]) < 4 and dark[2] > dark[0] and bright[0] > bright[2] and outside[3] == 0
 
 
-def test_drawdowns_start_at_the_bottom_left_and_in_colours_show_the_thread_on_top():
-    fabric = load_fabric("denim")
-    picture = decoded(tiles.drawdown(fabric))
-    middle = tiles.CELL_PIXELS // 2
-    cells = picture[middle :: tiles.CELL_PIXELS, middle :: tiles.CELL_PIXELS, 0][::-1] < 128
-    picks, ends = fabric.weave.warp_over.shape
-    assert (cells[:picks, :ends] == fabric.weave.warp_over).all()
-    assert (cells[picks : 2 * picks, :ends] == fabric.weave.warp_over).all()
+def centres(pixels, rows, columns, top=0, left=0):
+    """Return the colours in the middle of cells of so many pixels, (rows, columns, 3)."""
+    found = pixels[(top + np.arange(rows)) * SIDE + SIDE // 2]
+    return found[:, (left + np.arange(columns)) * SIDE + SIDE // 2, :3]
+
+
+def test_a_draft_shows_the_loom_that_weaves_its_drawdown_in_the_colours_of_the_threads():
+    """Threading, tie-up and treadling, read from the picture, lift what the drawdown shows; first end left, below."""
     fabric = load_fabric("houndstooth")
-    picture = decoded(tiles.colours(fabric))
-    side = len(picture) // tiles.CELLS
-    cells = picture[side // 2 :: side, side // 2 :: side, :3][::-1]
-    dark = np.arange(tiles.CELLS) % 8 < 4
-    over = np.tile(fabric.weave.warp_over, (4, 4))
-    assert ((cells.max(axis=-1) < 100) == np.where(over, dark[None, :], dark[:, None])).all()
+    pixels, count = decoded(draft.draft(fabric)), 16
+    shafts = treadles = 4
+    assert pixels.shape[:2] == ((count + 4 + 3) * SIDE + 1,) * 2
+    dark = [centres(pixels, *place).max(axis=-1) < 100 for place in (
+        (shafts, count, 2, 0), (shafts, treadles, 2, count + 1), (count, treadles, shafts + 3, count + 1),
+        (1, count), (count, 1, shafts + 3, count + treadles + 2), (count, count, shafts + 3, 0),
+    )]  # fmt: skip
+    threading, tie_up, treadling, warp, weft, cells = (part.astype(int) for part in dark)
+    lifted = treadling @ tie_up.T @ threading > 0
+    assert (lifted[::-1] == np.tile(fabric.weave.warp_over, (4, 4))).all()
+    assert (cells == np.where(lifted, warp, weft)).all() and warp[0].tolist() == [1, 1, 1, 1, 0, 0, 0, 0] * 2
+
+
+def test_floats_have_outlines_and_the_largest_draft_fits():
+    """In a draft of one colour, lines run along the thread on top; 256 ends and shafts are three pixels each."""
+    plain = load_fabric("voile")
+    white = plain.model_copy(update={"warp": plain.weft})
+    pixels = decoded(draft.drawdown(white))[..., 0]
+    side = draft.MOST_THREADS // draft.LEAST_THREADS
+    lines = pixels[::side, side // 2 :: side] < pixels[side // 2, side // 2]  # above each cell
+    over = np.tile(white.weave.warp_over, (8, 8))[::-1]
+    assert (lines[1:-1] == (~over[1:] | ~over[:-1])).all()
+    over = np.random.default_rng(1).random((256, 256)) < 0.5
+    large = plain.model_copy(update={"draft": Matrix(rows=tuple(Draft(over).rows()))})
+    assert decoded(draft.draft(large)).shape[:2] == ((2 * 256 + 3) * 3 + 1,) * 2
 
 
 @pytest.mark.parametrize("draw", [tiles.height, tiles.normals])

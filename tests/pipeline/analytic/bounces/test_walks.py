@@ -3,22 +3,43 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.bounces.walks import starting_points, transport
+from pipeline.analytic.bounces.walks import _gap_points, _see_gaps, starting_points, transport
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.geometry.pieces import different_cells
 from tests.directions import sphere, unit
 from tests.pipeline.truth.cloths import LOPSIDED, cylinders, woven
+from weaves.count import cover
+from weaves.draft import Draft, Matrix
 
 CLOSED = woven("silk_charmeuse", width=1.0, blend=1.0)
 
 
-@pytest.mark.parametrize("fabric", [LOPSIDED, woven("satin_8"), woven("voile")], ids=["narrow", "satin", "open"])
+MANY = Matrix(rows=tuple(Draft(np.random.default_rng(1).random((64, 48)) < 0.5).rows()))
+
+
+@pytest.mark.parametrize(
+    "fabric",
+    [LOPSIDED, woven("satin_8"), woven("voile"), woven("voile").model_copy(update={"draft": MANY})],
+    ids=["narrow", "satin", "open", "many cells"],
+)
 def test_starting_points_cover_what_is_seen_from_above(fabric):
-    """Their areas sum to the plane less the gaps, of one cell of each kind."""
+    """Their areas sum to the plane less the gaps, of one cell of each kind, also where only some cells are chosen."""
     field = height_field(fabric)
     start = starting_points(field, 4096)
-    gap = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width)
+    gap = cover(fabric.warp, fabric.weft).openness
     assert start.area.sum() == pytest.approx(different_cells(field) * (1.0 - gap), rel=2e-3)
+    assert _gap_points(field, 4096)[2].sum() == pytest.approx(different_cells(field) * gap)
+
+
+def test_gaps_close_at_the_cut_off_angle():
+    """Of light inclined by .97 of it a twentieth still passes gaps between almost straight yarns, at 1.03 nothing."""
+    fabric = woven("gauze", bend=2.0, relief=0.8)
+    closed, faces = cover(fabric.warp, fabric.weft), (height_field(fabric), height_field(fabric.back()))
+    for angle, azimuth in ((closed.cut_off_along_warp, 90.0), (closed.cut_off_along_weft, 0.0)):
+        viewers, seen = np.array([unit(share * angle, azimuth) for share in (0.0, 0.97, 1.03)]), np.zeros(3)
+        _see_gaps(*faces, *_gap_points(faces[0], 1 << 14), viewers, seen)
+        passed = seen / viewers[:, 2] / different_cells(faces[0])
+        assert passed[0] == pytest.approx(closed.openness) and 0.03 < passed[1] / passed[0] < 0.12 and passed[2] == 0.0
 
 
 def test_round_yarns_side_by_side_give_each_other_what_lines_of_sight_say():
