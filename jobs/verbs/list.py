@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from jobs.recipe.load import load_recipe, recipe_names
-from jobs.terminal import print_lines, print_table, tracked
+from jobs.terminal import print_lines, print_table
 from jobs.verbs.parameters import Local
 from weaves.fabric import load_fabric, preset_names
 
@@ -21,7 +21,7 @@ def print_lists(
     if pictures is not None:
         from jobs.verbs.show import write_swatch  # numba, which the lists need not wait for
 
-        for name in tracked(preset_names(), "pictures"):
+        for name in preset_names():
             print_lines(write_swatch(name, load_fabric(name), pictures, size))
         return
     fabrics = [load_fabric(name) for name in preset_names()]
