@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -146,12 +147,18 @@ def view(
 
 
 def _write(verb: str, name: str, kind: str, path: Path, options: Mapping[str, Any], **flags: str) -> None:
-    """Export a fabric and print what was written; in messages, options have the names that they have in the verb."""
+    """Export a fabric and print what was written."""
+    with named_flags(verb, **flags):
+        print_lines(export(load_fabric(name), kind, path, **options))
+
+
+@contextmanager
+def named_flags(verb: str, **flags: str) -> Iterator[None]:
+    """Name options of exports in messages as the verb does, as flags; `flags` are those that differ."""
     try:
-        sentence = export(load_fabric(name), kind, path, **options)
+        yield
     except BadInput as error:
         if error.where != "export":
             raise
         key = error.key and f"--{flags.get(error.key, error.key)}"
         raise BadInput(verb, key, error.value, error.allowed) from error
-    print_lines(sentence)

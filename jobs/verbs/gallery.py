@@ -6,10 +6,12 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter
 
-from jobs.terminal import print_lines, tracked
+from jobs.terminal import print_lines
+from jobs.verbs.exchange import named_flags
 from jobs.verbs.parameters import NOTHING, Local
 from jobs.verbs.show import write_swatch
-from pipeline.atomic import atomic_write
+from pipeline.atomic import atomic_write, refuse_unwritable
+from pipeline.materials.planes import layout
 from reports.exports.gallery import INDEX, PICTURE, gallery_page, write_fabric
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric, preset_names
@@ -23,7 +25,6 @@ def gallery(
     *,
     out: Annotated[Local, Parameter(help="Folder of the site; files of the same names are replaced.")],
     size: Annotated[int, Parameter(help="Texels of the longer side of maps, a power of two.")] = 1024,
-    truth: Annotated[int, Parameter(help="Pixels of the pictures by the truth in live pages; 0: none.")] = 0,
     language: Annotated[list[str], Parameter(help="Of shaders, as for `export`, beside Slang; several.")] = NOTHING,
 ) -> None:
     """Write the site, and print where it opens.
@@ -33,10 +34,15 @@ def gallery(
     cloths = {name: load_fabric(name) for name in fabrics or preset_names()}
     if len({cloth.name for cloth in cloths.values()}) < len(cloths):
         raise BadInput("gallery", "FABRICS", ", ".join(cloths), "two have the same name; each needs its own")
+    with named_flags("gallery"):
+        for cloth in cloths.values():
+            layout(cloth, size)  # a size that one of them cannot have ends the work before it begins
+    refuse_unwritable(out / INDEX)
     cards = []
-    for cloth in tracked(list(cloths.values()), f"{len(cloths)} fabrics"):
-        print_lines(f"{cloth.name}: picture, live page, maps, GLB, shader", stderr=True)
-        cards.append(write_fabric(cloth, out, size, truth, language))
+    for number, cloth in enumerate(cloths.values(), 1):
+        print_lines(f"{number} of {len(cloths)}: {cloth.name}", stderr=True)
+        with named_flags("gallery"):
+            cards.append(write_fabric(cloth, out, size, language))
         write_swatch(cloth, out / cloth.name, PICTURE_SIZE).replace(out / cloth.name / PICTURE)
     atomic_write(out / INDEX, gallery_page(cards).encode())
     print_lines(f"{out / INDEX}: {len(cards)} fabrics; open it in a browser")

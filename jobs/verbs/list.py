@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from pydantic import TypeAdapter
 
 from jobs.recipe.shipped import RECIPES, recipe_names
-from jobs.terminal import print_lines, print_table, tracked
+from jobs.terminal import print_lines, print_table
 from jobs.verbs.parameters import Local
 from weaves.fabric import PRESETS, Weave, load_fabric, preset_names
 from weaves.validation import read_toml
@@ -26,7 +26,7 @@ def print_lists(
     if pictures is not None:
         from jobs.verbs.show import write_swatch  # numba, which the lists need not wait for
 
-        for name in tracked(preset_names(), "pictures"):
+        for name in preset_names():
             print_lines(write_swatch(load_fabric(name), pictures, size))
         return
     fabrics, weave = [read_toml(PRESETS / f"{name}.toml") for name in preset_names()], TypeAdapter(Weave)

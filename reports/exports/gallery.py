@@ -43,11 +43,11 @@ class Card(NamedTuple):
     files: tuple[tuple[str, str, int], ...]
 
 
-def write_fabric(fabric: Fabric, site: Path, size: int, truth: int, languages: Sequence[str]) -> Card:
+def write_fabric(fabric: Fabric, site: Path, size: int, languages: Sequence[str]) -> Card:
     """Write the files of a fabric into the folder of its name, and return its card.
 
-    `size` counts the texels of the longer side of maps, `truth` the pixels of the live page's tiles, `languages` are
-    those of the shader beside Slang.
+    `size` counts the texels of the longer side of maps, `languages` are those of the shader beside Slang; the live page
+    has no tiles.
 
     Raises
     ------
@@ -55,16 +55,16 @@ def write_fabric(fabric: Fabric, site: Path, size: int, truth: int, languages: S
         If a number, a language or the fabric cannot be used; as `reports.exports.export.export`.
     """
     name = fabric.name
+    home = site / name
+    home.mkdir(parents=True, exist_ok=True)
+    export(fabric, "viewer", home / "live.html", truth=0)
     with tempfile.TemporaryDirectory(prefix="twillight-") as made:
         maps, shader = Path(made) / f"{name}-maps", Path(made) / f"{name}-shader"
         export(fabric, "maps", maps, size=size)
         export(fabric, "shader", shader, language=list(languages))
-        home = site / name
-        home.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(maps / SAMPLE, home / f"{name}.glb")
         for folder in (maps, shader):
             shutil.make_archive(str(home / folder.name), "zip", made, folder.name)
-    export(fabric, "viewer", home / "live.html", truth=truth)
     atomic_write(home / f"{name}.toml", fabric.to_toml().encode())
     files = {
         "live page": "live.html",
