@@ -5,7 +5,7 @@ function reveal() {
   for (let part = target.querySelector(":scope > details") ?? target; part; part = part.parentElement) {
     if (part.matches("details")) part.open = true;
   }
-  target.scrollIntoView();
+  target.scrollIntoView({ behavior: "instant" });
 }
 
 addEventListener("hashchange", reveal);
