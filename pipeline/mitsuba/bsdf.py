@@ -31,7 +31,7 @@ REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)
 """Components."""
 
 WITHOUT_CLOTH: Final = ContextVar("WITHOUT_CLOTH", default=False)
-"""True while a scene is rendered in which nothing wears cloth: Dr.Jit records the BSDFs of other scenes all the same."""
+"""True while a scene without cloth is rendered: Dr.Jit records the BSDFs of other scenes all the same."""
 
 
 def wears_cloth(shape: Any) -> bool:
