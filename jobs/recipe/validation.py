@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
@@ -204,13 +204,19 @@ def _check_models(recipe: Recipe, where: str) -> None:
             raise BadInput(where, f"models.{index}.name", options.name, allowed)
         for name in () if options.any_physics else (name for name in _LEARNT if not hasattr(options, name)):
             if (value := getattr(truth, name)) != (own := getattr(_PLAIN, name)):
-                allowed = f"{options.name} (models.{index}) knows {name} = {own!r} only"
-                raise BadInput(where, f"dataset.truth.{name}", value, allowed)
+                raise _only_known(where, index, options.name, name, own, value)
         for name in ("footprint", "parallax", "walls"):
             wanted = getattr(truth, name)
             if (own := getattr(options, name, wanted)) != wanted:
+                if get_args(type(options).model_fields[name].annotation) == (own,):
+                    raise _only_known(where, index, options.name, name, own, wanted)
                 raise BadInput(where, f"models.{index}.{name}", own, f"must be that of dataset.truth, {wanted!r}")
         largest = getattr(options, "largest_curvature", queries.curvature[1])
         if largest < queries.curvature[1]:
             allowed = f"must not be below that of dataset.queries.curvature, {queries.curvature[1]:g}"
             raise BadInput(where, f"models.{index}.largest_curvature", largest, allowed)
+
+
+def _only_known(where: str, index: int, model: str, name: str, own: object, value: object) -> BadInput:
+    """Return the refusal of a physics that a model cannot be told to have."""
+    return BadInput(where, f"dataset.truth.{name}", value, f"{model} (models.{index}) knows {name} = {own!r} only")

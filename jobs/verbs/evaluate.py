@@ -72,16 +72,15 @@ def evaluate(
     BadInput as `pipeline.shards.evaluate.evaluate_file`, and if an option, the model, the seed or the number of threads
     cannot be used.
     """
-    chosen = given(truth)
-    options, cloth = _truth_options(chosen), load_fabric(fabric)
-    answerer = truth_answerer(cloth, options, seed)
+    chosen, cloth = given(truth), load_fabric(fabric)
     threads: AbstractContextManager[None] = nullcontext()
-    if model is not None:
+    if model is None:
+        answerer = truth_answerer(cloth, _truth_options(chosen), seed)
+    else:
         from pipeline.models.network import one_thread
 
         threads = one_thread()
-        if idle := list((chosen | ({"seed": seed} if seed else {})).items()):
-            (name, value), *_ = idle
+        for name, value in (chosen | ({"seed": seed} if seed else {})).items():
             allowed = "leave it out with --model: it is an option of the ground truth"
             raise BadInput(WHERE, _flag(name), value, allowed)
         answerer = _model_answerer(model, cloth, extrapolate)

@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
+from jobs.plan.task import STAGES
 from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.terminal import print_lines, print_table
-from jobs.verbs.parameters import NOTHING, OUT, Add, Out, SceneName
+from jobs.verbs.parameters import NOTHING, ON, OUT, Add, Out, SceneName
 from jobs.verbs.records import records_file
 from jobs.verbs.require_recipe import EFFORT, savings, write_recipe
+from jobs.verbs.run import work
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.requirement import Requirement
 from pipeline.truth.query import Queries
@@ -51,6 +53,7 @@ def require(
     set_: Annotated[
         list[str], Parameter(name="--set", help="Changed option of the method, such as hidden=64.")
     ] = NOTHING,
+    run: Annotated[bool, Parameter(negative="", help="Run the general recipe first; what is done is skipped.")] = False,
     add: Add = NOTHING,
     out: Out = OUT,
 ) -> None:
@@ -75,7 +78,14 @@ def require(
         allowed = f"{general.name} has no such method; {nearest_name(method, names)}"
         raise BadInput("require", "--method", method, allowed)
     described = load_scene(scene)
-    records = read_records([records_file(out, general.name)])
+    if run:
+        work(recipe, STAGES, out, ON, add)
+    try:
+        page = records_file(out, general.name)
+    except BadInput as error:
+        first = f"`twillight run {recipe}` must run first, or --run here; `twillight plan {recipe}` says how long"
+        raise BadInput(error.where, error.key, error.value, first) from error
+    records = read_records([page])
     sizes = size_table(records)
     if sizes.empty:
         raise BadInput(str(out), "recipe", recipe, "its page has no errors by size of footprint; run the recipe again")

@@ -3,7 +3,9 @@
 The boundary surface lies at the height of the cloth's highest point. A camera ray enters it at a point of the footprint
 with direction -wo, and the cloth falls away below it by kappa s^2 / 2 at distance s [Kuznetsov2022Curved]: seen from
 the cloth, the ray is a parabola. It hits a yarn, or rises and leaves the boundary again, or passes through a gap to the
-other side. Every point of the footprint is taken to see the viewer under the same angle to its own normal.
+other side. Footprints lie on the boundary here, not on the reference plane below it, where colours have theirs: a ray
+that leaves again meets the boundary alone, and no yarn stands out over it. Every point of the footprint is taken to see
+the viewer under the same angle to its own normal.
 
 Opacity is the share of rays that hit a yarn, coverage the share that do not leave the boundary again. They differ at
 gaps alone: what the patch BSDF and the transparency say of the cloth already counts gaps, coverage does not.

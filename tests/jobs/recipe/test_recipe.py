@@ -106,7 +106,7 @@ def test_a_recipe_may_be_of_the_fabric_plane(files):
 @pytest.mark.parametrize(
     ("network", "words"),
     [
-        ('model = "selvage"', ["models.1.parallax = True", "of dataset.truth, False"]),
+        ('model = "selvage"', ["dataset.truth.parallax = False", "selvage (models.1) knows parallax = True only"]),
         ('model = "unified_btf"', ["models.1.truth.parallax = True", "of dataset.truth, False"]),
     ],
 )

@@ -86,4 +86,10 @@ def test_a_method_that_was_not_measured_or_that_only_an_old_page_has_is_refused(
     write_records(path, [*read_records([path]), *records], this_machine(1))
     assert "the page of wide: method = 'sums'" in require.refused() and require("--method", "point_sampled")[0] == 0
     path.unlink()
-    assert "no page of the recipe wide" in require.refused()
+    assert "no page of the recipe wide with Records: `twillight run wide.toml` must run first" in require.refused()
+
+
+def test_the_general_recipe_may_run_first(require, monkeypatch):
+    ran = []
+    monkeypatch.setattr(verb, "work", lambda recipe, stages, *_: ran.append((recipe, stages)))
+    assert require("--run")[0] == 0 and ran == [("wide.toml", verb.STAGES)]

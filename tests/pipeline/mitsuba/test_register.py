@@ -103,3 +103,5 @@ def test_the_plugins_are_there_again_after_a_change_of_variant_which_must_have_r
     mi.set_variant(next(name for name in mi.variants() if name.startswith("scalar_spectral")))
     with pytest.raises(BadInput, match="must have RGB colours"):
         module.register()
+    with pytest.raises(RuntimeError, match="must have RGB colours"):
+        mi.load_dict({"type": "twillight", "fabric": "denim"})

@@ -272,6 +272,25 @@ def test_an_even_sky_lights_both_sides_of_a_sheet_with_pi():
     assert not faults(gbuffer.queries((4, 4)))
 
 
+def test_shadows_of_an_even_sky_are_soft():
+    """A wall of height 1 along x = 0 takes (1 - x / sqrt(x^2 + 1)) / 2 of the sky's irradiance pi. One shadow ray to
+    each of 64 directions would be off by .085 rms."""
+
+    def walled(mi):
+        upright = mi.ScalarTransform4f().rotate([0, 1, 0], 90).scale([1, 99, 1])
+        wall = {"type": "rectangle", "to_world": upright, "paint": {"type": "diffuse"}}
+        return {**floor(mi), "wall": wall, "s": {"type": "constant", "radiance": 1.0}}
+
+    gbuffer = shot(walled, eye=(1.5, -1.0, 3.0))
+    total, above = np.zeros(len(gbuffer.pixel)), gbuffer.wi[:, 2] > 0
+    np.add.at(total, gbuffer.place[above], gbuffer.wi[above, 2] * gbuffer.irradiance[above, 0])
+    x = gbuffer.u / 100 * 8 - 4
+    chosen = x > 0.05
+    expected = math.pi * (1 + x / np.hypot(x, 1)) / 2
+    assert chosen.sum() > 1000 and x[chosen].max() > 1.0
+    assert np.sqrt(np.mean(np.square(total - expected)[chosen])) < 0.05
+
+
 def test_frames_move_the_camera_to_the_right():
     """A camera 0.4 further right sees a place of the floor that lies 0.4 further along x."""
     still, moved = shot(floor), shot(floor, frame=4.0)
