@@ -18,7 +18,8 @@ def test_a_hidden_patch_has_no_error():
 @pytest.mark.parametrize("estimator", list(ESTIMATORS))
 def test_every_answer_has_a_stage_and_both_errors(estimator):
     fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=(1.0, 32.0), max_angle=75.0), fabric.weave.repeat, 5, 0, 40)
+    known = QueryOptions(sigma=(1.0, 32.0), max_angle=75.0) if estimator == "node_table" else QueryOptions()
+    queries = draw_queries(known, fabric.weave.repeat, 5, 0, 40)
     raw, answers = (call(fabric, queries, answering(estimator, max_count=1024), 1) for call in (uncalibrated, estimate))
     assert np.isin(raw.stage, list(FRONT_FACTORS)).all()
     np.testing.assert_array_equal(answers.mean, raw.mean[:, :4].astype(np.float32))

@@ -109,8 +109,8 @@ def test_tables_converge_with_their_nodes():
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_a_lamp_at_the_eye_lights_all_that_is_seen(estimator):
     """Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction."""
-    fabric = woven("cotton_twill", blend=0.0)
-    queries = draw_queries(QueryOptions(sigma=(1.5, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 40)
+    fabric, least = woven("cotton_twill", blend=0.0), 1.5 if estimator == "node_table" else 0.3
+    queries = draw_queries(QueryOptions(sigma=(least, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 40)
     options = answering(estimator, max_count=256)
     found = estimate(fabric, queries._replace(wi=queries.wo), options, 1).mean[:, 2:].sum(axis=1)
     # Tables interpolate the horizon of light and viewer alike: a node is seen and lit, or neither.

@@ -82,13 +82,14 @@ def test_nodes_that_are_left_keep_a_share_of_the_requested_error():
         assert doubts.left[0] == pytest.approx(kept, rel=1e-4, abs=1e-300)
 
 
-def test_refined_answers_are_closer_than_the_table():
+@pytest.mark.parametrize(("parallax", "sigma", "angle"), [(True, (0.3, 2.0), 60.0), (False, (0.05, 0.5), 89.0)])
+def test_refined_answers_are_closer_than_the_table(parallax, sigma, angle):
     fabric = load_fabric("polyester_lining")
-    queries = draw_queries(QueryOptions(sigma=(0.3, 2.0), max_angle=60.0), fabric.weave.repeat, 35, 0, 120)
-    exact = uncalibrated(fabric, queries, fixed(1 << 15), 2).mean[:, :4]
+    queries = draw_queries(QueryOptions(sigma=sigma, max_angle=angle), fabric.weave.repeat, 35, 0, 120)
+    exact = uncalibrated(fabric, queries, fixed(1 << 15, parallax=parallax), 2).mean[:, :4]
     errors = {}
     for error in (1.0, 0.005):
-        found = uncalibrated(fabric, queries, TruthOptions(relative_error=error), 5)
+        found = uncalibrated(fabric, queries, TruthOptions(relative_error=error, parallax=parallax), 5)
         errors[error] = np.linalg.norm(found.mean[:, :4] - exact, axis=1) / np.linalg.norm(exact, axis=1)
     # Only refined answers: what was sampled as a whole, or went to the fine table, says nothing of refinement.
     refined = (found.stage == REFINED) & (errors[1.0] != errors[0.005])
