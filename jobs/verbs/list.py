@@ -24,10 +24,13 @@ def print_lists(
 ) -> None:
     """Print a table of fabrics and a table of recipes; or, of fabrics, write pictures."""
     if pictures is not None:
-        from jobs.verbs.show import write_swatch  # numba, which the lists need not wait for
+        # Libraries that the lists need not wait for.
+        from jobs.verbs.render import size_of
+        from jobs.verbs.show import write_swatch
 
+        film = size_of(size, "list")
         for name in preset_names():
-            print_lines(write_swatch(load_fabric(name), pictures, size))
+            print_lines(write_swatch(load_fabric(name), pictures, film))
         return
     fabrics, weave = [read_toml(PRESETS / f"{name}.toml") for name in preset_names()], TypeAdapter(Weave)
     rows = []

@@ -82,9 +82,9 @@ def require(
         work(recipe, STAGES, out, ON, add)
     try:
         page = records_file(out, general.name)
-    except BadInput as error:
+    except BadInput as missing:
         first = f"`twillight run {recipe}` must run first, or --run here; `twillight plan {recipe}` says how long"
-        raise BadInput(error.where, error.key, error.value, first) from error
+        raise BadInput(missing.where, missing.key, missing.value, first) from missing
     records = read_records([page])
     sizes = size_table(records)
     if sizes.empty:
