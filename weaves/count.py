@@ -66,20 +66,20 @@ def with_widths(table: Mapping[str, Any]) -> dict[str, Any]:
     BadInput for a number out of its range, a count without a sett or beside a width or a second count, and yarns that
     would be wider than their spacing.
     """
-    found = dict(table)
-    if "sett" in found:
-        if "yarns_per_cm" in found:
-            raise BadInput("", "sett", found["sett"], "yarns_per_cm states the same; give one of the two")
-        found["yarns_per_cm"] = validated(_Sett, {"sett": found.pop("sett")}, "").sett
+    read = dict(table)
+    if "sett" in read:
+        if "yarns_per_cm" in read:
+            raise BadInput("", "sett", read["sett"], "yarns_per_cm states the same; give one of the two")
+        read["yarns_per_cm"] = validated(_Sett, {"sett": read.pop("sett")}, "").sett
     for axis, family in enumerate(("warp", "weft")):
-        yarn = found.get(family)
+        yarn = read.get(family)
         if isinstance(yarn, Mapping) and (given := {key: yarn[key] for key in Count.model_fields if key in yarn}):
             try:
-                width = _width(given, yarn, found.get("yarns_per_cm"), axis)
+                width = _width(given, yarn, read.get("yarns_per_cm"), axis)
             except BadInput as error:
                 raise BadInput("", f"{family}.{error.key}", error.value, error.allowed) from error
-            found[family] = {key: value for key, value in yarn.items() if key not in given} | {"width": width}
-    return found
+            read[family] = {key: value for key, value in yarn.items() if key not in given} | {"width": width}
+    return read
 
 
 def _width(given: dict[str, Any], yarn: Mapping[str, Any], per_cm: Any, axis: int) -> float:

@@ -110,7 +110,7 @@ def write_maps(fabric: Fabric, folder: Path) -> list[Path]:
 
 
 def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
-    """Write a picture, (width, height) in pixels, of a lit swatch of 1.5 repeats or more, and return its path."""
+    """Write a picture, (width, height) in pixels, of a lit swatch of 1.5 repeats or more; return its path."""
     from jobs.verbs.render import shown_at
     from pipeline.scenes.bounces import light_between, tables_of
     from pipeline.scenes.picture import answered, windows

@@ -16,10 +16,10 @@ from reports.images.tiles import Bytes8, encoded, opaque, png
 from weaves.draft import Bools
 from weaves.fabric import Fabric
 
-LEAST_THREADS: Final = 16
+LEAST_SHOWN: Final = 16
 """Least ends, and picks, that are shown: smaller repeats stand several times."""
 
-MOST_THREADS: Final = 512
+MOST_SHOWN: Final = 512
 """Most ends, and picks, that are shown: of structures up to 256 threads, all."""
 
 LARGEST_CELL: Final = 24
@@ -61,7 +61,7 @@ class _Cells(NamedTuple):
 def drawdown(fabric: Fabric) -> bytes:
     """Return the drawdown of the repeat of weave and colours as PNG bytes, from 16 to 512 threads in each direction."""
     cells = _drawdown(fabric)
-    return png(opaque(cells.drawn(max(1, MOST_THREADS // max(cells.colour.shape)))), 1)
+    return png(opaque(cells.drawn(max(1, MOST_SHOWN // max(cells.colour.shape)))), 1)
 
 
 def draft(fabric: Fabric) -> bytes:
@@ -91,7 +91,7 @@ def draft(fabric: Fabric) -> bytes:
 def _drawdown(fabric: Fabric) -> _Cells:
     """Return the cells of the drawdown: lines follow the thread on top."""
     warp, weft = (encoded(threads.diffuse) for threads in fabric.thread_colours())
-    ends, picks = (np.arange(min(max(extent, LEAST_THREADS), MOST_THREADS)) for extent in fabric.repeat)
+    ends, picks = (np.arange(min(max(extent, LEAST_SHOWN), MOST_SHOWN)) for extent in fabric.repeat)
     picks = picks[::-1]
     over = fabric.weave.warp_over[picks[:, None] % fabric.weave.repeat[1], ends % fabric.weave.repeat[0]]
     colour = np.where(over[..., None], warp[ends % len(warp)][None], weft[picks % len(weft)][:, None])

@@ -65,7 +65,7 @@ def test_floats_have_outlines_and_the_largest_draft_fits():
     plain = load_fabric("voile")
     white = plain.model_copy(update={"warp": plain.weft})
     pixels = decoded(draft.drawdown(white))[..., 0]
-    side = draft.MOST_THREADS // draft.LEAST_THREADS
+    side = draft.MOST_SHOWN // draft.LEAST_SHOWN
     lines = pixels[::side, side // 2 :: side] < pixels[side // 2, side // 2]  # above each cell
     over = np.tile(white.weave.warp_over, (8, 8))[::-1]
     assert (lines[1:-1] == (~over[1:] | ~over[:-1])).all()
