@@ -36,7 +36,7 @@ SCENES: Final = 2
 SCENE_BENCH: Final = 5
 """Measurements in scenes and the files they write (`reports.measure.scene`)."""
 
-VIEWER: Final = 3
+VIEWER: Final = 4
 """The page of a live fabric: its shaders, scripts and views (`reports.viewer`)."""
 
 EXTREMES: Final = 1

@@ -231,9 +231,9 @@ def vectors(golden: Golden) -> dict[str, Any]:
     """Return the content of `golden.json`.
 
     `columns` names those of `queries`; `groups` has first row and end of each kind, and the range of a column is that
-    of its group. `components` and `bounds` are the answers, `colour` is the patch BSDF in linear RGB; `transparency`, and `density` of wi in 1/sr, are empty for
-    a model without them. `steady` is the share of the queries tried whose answer does not hang on the last digit of a
-    place; the others are not listed.
+    of its group. `components` and `bounds` are the answers, `colour` is the patch BSDF in linear RGB; `transparency`,
+    and `density` of wi in 1/sr, are empty for a model without them. `steady` is the share of the queries tried whose
+    answer does not hang on the last digit of a place; the others are not listed.
     """
     whole = golden.answers.shape[1] > DENSITY_COLUMN
     return {

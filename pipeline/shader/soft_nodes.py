@@ -17,8 +17,8 @@ SOFT_NODES: Final = "soft_nodes"
 
 SOFT_NODES_SOURCES: Final = (
     "soft_nodes.slang", "importance.slang", "buffers.slang", "arithmetic.slang", "horizons.slang", "query.slang",
-    "look.slang", "colours.slang", "threads.slang", "shade.slang", "pieces.slang", "fixed_nodes.slang", "seen_areas.slang",
-    "view_rays.slang", "view_lines.slang", "coverage.slang",
+    "look.slang", "colours.slang", "threads.slang", "shade.slang", "pieces.slang", "fixed_nodes.slang",
+    "seen_areas.slang", "view_rays.slang", "view_lines.slang", "coverage.slang",
 )  # fmt: skip
 """Files of the source."""
 

@@ -1,8 +1,8 @@
 """The shaders of the viewer in GLSL ES 3.00: made by slangc, kept compressed in the package, equal for all fabrics.
 
 `points.frag.gz` draws points and tiles, `nodes.frag.gz` soft nodes, `selvage.frag.gz` the pretrained network; each is
-there once more for cloth whose threads differ in colour (`points_threads.frag.gz`, …). `make viewer-shader` writes them after a change of the source or of the network; their second lines name the source that they
-were made of.
+there once more for cloth whose threads differ in colour (`points_threads.frag.gz`, …). `make viewer-shader` writes them
+after a change of the source or of the network; their second lines name the source that they were made of.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ HOME: Final = Path(__file__).parent
 _SOURCES: Final = Path(languages.__file__).parent
 
 KINDS: Final = {"points": "#define ONE_POINT\n", "nodes": "", "selvage": "#define SELVAGE\n"}
-"""What programs draw, and how their source begins."""
+"""Programs by what they draw, and how their source begins."""
 
 THREADS: Final = "_threads"
 """End of the names of programs for cloth whose threads differ in colour."""

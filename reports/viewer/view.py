@@ -215,7 +215,7 @@ def packed(values: npt.NDArray[Any]) -> str:
 
 
 def _nodes(fabric: Fabric, level: int) -> Sides:
-    """Return the front of a fabric, of yarns without twist as if they had TWISTED, with light from behind if it is sheer."""
+    """Return the front of a fabric, with light from behind if sheer; yarns without twist as if they had TWISTED."""
     yarns = {"warp": fabric.warp, "weft": fabric.weft}
     turned = {name: yarn.model_copy(update={"twist": _twist(yarn)}) for name, yarn in yarns.items()}
     cloth = fabric.model_copy(update=turned)
