@@ -137,8 +137,8 @@ def side_colours(sides: Sides) -> Colouring:
         back = bool(queries.wo[0, 2] < 0.0)
         through = queries.wi[:, 2] * queries.wo[:, 2] < 0.0
         diffuse = np.where(through[:, None, None], means[2], means[1])
-        found = np.concatenate([np.broadcast_to(means[0], diffuse.shape), diffuse], axis=1)
-        return found * seen[back](queries.turned() if back else queries) if differ else found
+        own = np.concatenate([np.broadcast_to(means[0], diffuse.shape), diffuse], axis=1)
+        return own * seen[back](queries.turned() if back else queries) if differ else own
 
     return colours
 

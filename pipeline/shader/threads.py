@@ -21,7 +21,6 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable
 from pipeline.analytic.soft_nodes.shade import DIFFUSE, SPECULAR
 from pipeline.analytic.soft_nodes.view_lines import GAUSS_PLACES, GAUSS_WEIGHTS, MOST_GAUSS
-from pipeline.analytic.soft_nodes.wide import sight
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.truth.footprint.mixture import footprints, narrow_axis
 from pipeline.truth.query import Queries
@@ -41,30 +40,30 @@ _NEAR: Final = 64  # threads that have sums of their own, at least
 
 def thread_tints(fabric: Fabric) -> tuple[Float32, Float32]:
     """Return the factors of the ends and of the picks after which colours repeat, each (n, TINT_COLUMNS)."""
-    found = []
+    rows = []
     for colours in fabric.thread_colours():
         own = np.concatenate(colours, axis=1)
         mean = own.mean(axis=0)
         tints = np.divide(own, mean, out=np.ones_like(own), where=mean > 0.0)
         until = np.cumsum(tints - 1.0, axis=0) - (tints - 1.0)
-        found.append(np.concatenate([tints, until], axis=1).astype(np.float32))
-    return found[0], found[1]
+        rows.append(np.concatenate([tints, until], axis=1).astype(np.float32))
+    return rows[0], rows[1]
 
 
 def family_heights(table: SoftNodeTable) -> tuple[float, float]:
     """Return the mean heights of warp and weft as seen from above; the reference plane if none is seen."""
     shares = table.evenly.reshape(-1, COLUMNS).astype(np.float64)
-    borders = table.starts[[0, table.kinds[0], table.kinds.sum()]] * (BLOCK_NODES // COLUMNS)
-    found = []
-    for start, stop in itertools.pairwise(borders):
-        of_nodes = shares[start:stop]
-        whole = of_nodes.sum()
-        found.append(float((of_nodes * table.spots[start:stop, 3]).sum() / whole) if whole > 0.0 else table.plane)
-    return found[0], found[1]
+    starts = table.starts * (BLOCK_NODES // COLUMNS)
+
+    def height(lines: slice) -> float:
+        whole = shares[lines].sum()
+        return float((shares[lines] * table.spots[lines, 3]).sum() / whole) if whole > 0.0 else table.plane
+
+    return height(slice(starts[0], starts[1])), height(slice(starts[1], starts[2]))
 
 
 class SeenTints:
-    """Colours of the threads of one side of a cloth, as footprints see them."""
+    """Mean factors of the threads that footprints see on one side of a cloth."""
 
     def __init__(self, table: SoftNodeTable, tints: tuple[Float32, Float32]) -> None:
         self._table, self._tints = table, tints
@@ -87,9 +86,7 @@ class SeenTints:
         for family, (own, size, (centre, deviation)) in enumerate(zip(parts, sizes, columns, strict=True)):
             rows = self._tints[family].astype(np.float64)
             threads = np.arange(size) + size * np.rint((centre[:, None] - np.arange(size) - 0.5) / size).astype(int)
-            rays = zip(wo, queries.curvature, strict=True)
-            moved = np.array([_moved(self._table, *ray, heights[family]) for ray in rays])
-            across = _across(rows, centre + moved[:, family], deviation)
+            across = _across(rows, centre + _moved(self._table, queries, heights[family])[:, family], deviation)
             reach = BELL_ENDS * np.minimum(deviation, LONGEST) + run * (self._table.highest - self._table.lowest) + 2.0
             for kind, (place, first) in enumerate(((SPECULAR, 0), (DIFFUSE, 3))):
                 column = np.where(through & (kind == 1), 6, first)[:, None] + np.arange(3)
@@ -101,13 +98,14 @@ class SeenTints:
         return result
 
 
-def _moved(table: SoftNodeTable, wo: Float64, curvature: float, height: float) -> tuple[float, float]:
-    """Return by how much a place of a height is displaced towards the viewer."""
-    x, y, z = wo.astype(np.float32)
-    of = sight(x, y, z, np.float32(curvature if len(table.falls) else 0.0))
-    over = height - table.plane
-    length = 2.0 * over * float(of.run) / (1.0 + math.sqrt(max(1.0 + float(of.bent) * over, 0.0)))
-    return length * float(of.ex), length * float(of.ey)
+def _moved(table: SoftNodeTable, queries: Queries, height: float) -> Float64:
+    """Return by how much places of a height are displaced towards the viewers of N queries, (N, 2)."""
+    wo = queries.raised().wo.astype(np.float64)
+    level = np.hypot(wo[:, 0], wo[:, 1])
+    run, over = level / wo[:, 2], height - table.plane
+    bent = 2.0 * run * run * (queries.curvature if len(table.falls) else 0.0)
+    length = 2.0 * over * run / (1.0 + np.sqrt(np.maximum(1.0 + bent * over, 0.0)))
+    return np.asarray((length / np.maximum(level, 1e-9))[:, None] * wo[:, :2])
 
 
 def _across(rows: Float64, centre: Float64, sigma: Float64) -> Float64:
@@ -121,8 +119,8 @@ def _across(rows: Float64, centre: Float64, sigma: Float64) -> Float64:
         return np.asarray(own[..., 9:] + (place - thread)[..., None] * (own[..., :9] - 1.0))
 
     sums = sum(w * (until(centre + sigma * x) - until(centre - sigma * x)) for w, x in zip(weight, z, strict=True))
-    found = 1.0 + sums / (sigma * 2.0 * (weight * z).sum())[:, None]
-    return np.asarray(np.where((sigma < SPREAD_OUT * len(rows))[:, None], found, 1.0))
+    means = 1.0 + sums / (sigma * 2.0 * (weight * z).sum())[:, None]
+    return np.asarray(np.where((sigma < SPREAD_OUT * len(rows))[:, None], means, 1.0))
 
 
 def by_copy(table: SoftNodeTable) -> SoftNodeTable:
@@ -162,15 +160,13 @@ def by_copy(table: SoftNodeTable) -> SoftNodeTable:
 
     nodes = np.ascontiguousarray(of_nodes(table.nodes.transpose(1, 0, 2)).transpose(1, 0, 2))
     names = ("evenly", "mean", "sharpness", "behind_mean", "behind_sharpness", "falls", "areas")
-    copied: dict[str, Any] = {
-        name: getattr(table, name)[of_pieces] for name in ("pieces", "bounds", "floats", "crowns")
-    }
-    copied |= {name: of_nodes(getattr(table, name)) for name in names}
+    columns: dict[str, Any] = {name: of_nodes(getattr(table, name)) for name in names}
+    columns |= {name: getattr(table, name)[of_pieces] for name in ("pieces", "bounds", "floats", "crowns")}
     return table._replace(
         repeat=np.array([wide, high]), kinds=np.array([wide, high]), starts=np.array(starts), nodes=nodes, spots=spots,
         uniform=math.inf, groups=np.array(rows, np.uint32), group_starts=group_starts.astype(np.uint32),
         cell_groups=cell_groups.ravel().astype(np.uint32), piece_starts=piece_starts,
-        **copied,
+        **columns,
     )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ HOME: Final = Path(__file__).parent
 _SOURCES: Final = Path(languages.__file__).parent
 
 KINDS: Final = {"points": "#define ONE_POINT\n", "nodes": "", "selvage": "#define SELVAGE\n"}
-"""Kinds of programs, and how their source begins."""
+"""Programs by what they draw, and how their source begins."""
 
 THREADS: Final = "_threads"
 """End of the names of programs for cloth whose threads differ in colour."""

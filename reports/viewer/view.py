@@ -224,7 +224,7 @@ def packed(values: npt.NDArray[Any]) -> str:
 
 
 def _nodes(fabric: Fabric, level: int) -> Sides:
-    """Return the front of a fabric, yarns without twist as if they had TWISTED; if it is sheer, lit from behind too."""
+    """Return the front of a fabric, with light from behind if sheer; yarns without twist as if they had TWISTED."""
     yarns = {"warp": fabric.warp, "weft": fabric.weft}
     turned = {name: yarn.model_copy(update={"twist": _twist(yarn)}) for name, yarn in yarns.items()}
     cloth = fabric.model_copy(update=turned)

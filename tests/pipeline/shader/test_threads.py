@@ -35,9 +35,8 @@ def test_colours_are_those_of_methods():
     fabric, queries = load_fabric("gingham"), looks((0.05, 0.4, 2.0, 8.0))
     sides = tabulate_sides(fabric, 2, ())
     components = read_sides(sides, queries)[:, :4]
-    found, wanted = (
-        coloured(components, c) for c in (side_colours(sides)(queries), footprint_colours(fabric, queries))
-    )
+    own, others = side_colours(sides)(queries), footprint_colours(fabric, queries)
+    seen, wanted = coloured(components, own), coloured(components, others)
     means = coloured(components, np.broadcast_to(sides.colours[:4], (len(queries.u), 4, 3)))
-    apart, of_means = (np.sqrt(np.square(a - wanted).mean() / np.square(wanted).mean()) for a in (found, means))
+    apart, of_means = (np.sqrt(np.square(a - wanted).mean() / np.square(wanted).mean()) for a in (seen, means))
     assert apart < 0.01 < 0.1 < of_means
