@@ -33,6 +33,15 @@ def test_blender_renders_the_sample_and_the_maps(tmp_path, monkeypatch):
     grey = np.abs(lit[:, 2] - lit[:, 0]) < 0.1
     assert len(lit) > 0.6 * plane[..., 0].size and 0.1 < grey.mean() < 0.4
     assert (lit[~grey, 2] > 1.3 * lit[~grey, 0]).mean() > 0.9
+    # Voile with the sun behind it: yarns let light through, denim none.
+    assert main(["export", "voile", "--maps", "pictures/voile", "--size", "128"]) == 0
+    behind = [
+        scripts[1].replace("radians(50), 0", "radians(130), 0").replace("/denim", f"/{name}")
+        for name in ("voile", "denim")
+    ]
+    for script, least, most in zip(behind, (0.1, 0.0), (1.0, 0.02), strict=True):
+        exec(compile(script, "docs/blender.md", "exec"), {})
+        assert least <= np.median(shown("plane.png").max(axis=-1)) <= most
 
 
 def shown(name):
