@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from jobs.plan.task import Places, Progress, Stage, Task
+from jobs.plan.truth_cost import SECONDS_A_POINT, row_seconds, table_seconds
 from jobs.recipe.recipe import Recipe
 from pipeline import versions
 from pipeline.atomic import link
 from pipeline.fingerprint import fingerprint
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
-from pipeline.truth.options import TruthOptions
 
 if TYPE_CHECKING:
     from pipeline.shards.manifest import ShardEntry
@@ -25,13 +25,7 @@ if TYPE_CHECKING:
 DATASETS: Final = "datasets"
 """Folder of all data sets, relative to the output folder."""
 
-SECONDS_A_POINT: Final = 3.5e-7
-"""One point of the truth, on one core of a server of 2021."""
-
-_POINTS_A_ROW: Final = 1700  # for 2 % relative error, on average
-_SAVED: Final = 0.25  # share of the time of sampling that `auto` takes: tables answer most rows
-_OF_TABLE: Final = 250  # points that take as long as a row of `node_table`
-_START: Final = 0.2  # seconds until a shard's tables are there
+_START: Final = 0.1  # seconds of any shard
 
 
 class Shard(Task):
@@ -69,7 +63,15 @@ class Shard(Task):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        return _START + self.rows * SECONDS_A_POINT * _points(self.shard)
+        shard = self.shard
+        if isinstance(shard, ExtraShardTask) and not isinstance(shard.extra, AngularSamples):
+            return _START + self.rows * SECONDS_A_POINT * shard.extra.points
+        flat, truth = True, shard.extra.truth if isinstance(shard, ExtraShardTask) else shard.truth
+        if isinstance(shard, ShardTask):
+            flat = shard.queries.curvature[1] == 0.0
+        first = shard.start == 0 and shard.split != "validation"  # others find the table in their process
+        table = table_seconds(truth, shard.fabric) if first else 0.0
+        return _START + table + self.rows * row_seconds(truth, shard.fabric, flat)
 
     @property
     def rows(self) -> int:
@@ -134,22 +136,3 @@ def _rows(recipe: Recipe) -> Iterator[tuple[str, AnyShardTask]]:
                 yield role, ShardTask(**part, split=kind, seed=dataset.seed, queries=dataset.queries, truth=truth)
             else:
                 yield role, ExtraShardTask(**part, extra=kind)
-
-
-def _points(shard: AnyShardTask) -> float:
-    """Estimate the points of a row."""
-    if isinstance(shard, ShardTask):
-        return points_a_row(shard.truth)
-    extra = shard.extra
-    return points_a_row(extra.truth) if isinstance(extra, AngularSamples) else float(extra.points)
-
-
-def points_a_row(truth: TruthOptions) -> float:
-    """Return how many points take as long as a row, estimated.
-
-    Points grow a little slower than 1 / error^2, within the limits of the options.
-    """
-    if truth.estimator == "node_table":
-        return _OF_TABLE
-    points = min(max(_POINTS_A_ROW * (0.02 / truth.relative_error) ** 1.5, truth.min_count), truth.max_count)
-    return points * _SAVED if truth.estimator == "auto" else float(points)

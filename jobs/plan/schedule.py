@@ -22,8 +22,10 @@ LEAST_GAIN: Final = 0.05
 # Seconds of work that count as much as what is assumed before: of everything, of a stage, of a kind. The first tasks of
 # a run, which load kernels and are short, say little about other stages.
 _WEIGHTS: Final = (200.0, 30.0, 0.5)
-_LEAST_SHARE: Final = 0.05  # of a task under way, from which its own speed is known
+_SURE_SHARE: Final = 0.2  # of a task under way, from which its own speed alone counts
+_LONGER: Final = 0.5  # a task that takes longer than estimated goes on for this share of its time
 _MOST_LOAD: Final = 0.02  # of the driver's time that goes into estimates
+_SHORTEST: Final = 1e-3  # seconds of a task, at least
 _SECONDS_BETWEEN: Final = 1.0  # two estimates
 
 
@@ -96,26 +98,29 @@ class Estimate:
     """Seconds that tasks take.
 
     What finished tasks took is compared with their cost, by kind, by stage and overall. A kind of which little was done
-    is assumed to be as its stage, and a stage as everything. Before anything was done a cost is taken as it is.
+    is assumed to be as its stage, and a stage as everything. Before anything was done a cost is taken as it is. Means
+    are geometric: a short task that waited for its kernels, or a wrong cost of one kind, moves no other by much.
     """
 
     def __init__(self) -> None:
-        self._sums: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])  # seconds and costs, by kind
+        self._sums: dict[str, list[float]] = defaultdict(
+            lambda: [0.0, 0.0]
+        )  # costs; with logarithms of ratios; by kind
         self._end = self._next = -math.inf  # of the run, as last estimated; when the next estimate is due
 
     def learn(self, task: Task, seconds: float) -> None:
         """Take the time of a finished task."""
         for kind in _kinds(task):
-            self._sums[kind][0] += seconds
-            self._sums[kind][1] += task.cost
+            self._sums[kind][0] += task.cost
+            self._sums[kind][1] += task.cost * math.log(max(seconds, _SHORTEST) / task.cost)
 
     def seconds(self, task: Task) -> float:
         """Return how long a task takes on one worker."""
-        ratio = 1.0
+        ratio = 0.0  # its logarithm
         for kind, weight in zip(_kinds(task), _WEIGHTS, strict=True):
-            seconds, cost = self._sums.get(kind, (0.0, 0.0))
-            ratio = (seconds + ratio * weight) / (cost + weight)
-        return ratio * task.cost
+            cost, ratios = self._sums.get(kind, (0.0, 0.0))
+            ratio = (ratios + ratio * weight) / (cost + weight)
+        return math.exp(ratio) * task.cost
 
     def seconds_left(self, tasks: Sequence[Task], under_way: Mapping[str, tuple[float, float]], workers: int) -> float:
         """Return how long a run goes on, by a simulation of its schedule, which is renewed now and then.
@@ -144,9 +149,10 @@ class Estimate:
 
 def _rest(seconds: float, elapsed: float, share: float) -> float:
     """Return how long a task under way goes on; `seconds` is the estimate of the whole."""
-    if share >= _LEAST_SHARE:
-        return elapsed * (1 - share) / share
-    return max(seconds - elapsed, 0.1 * elapsed)
+    if share == 0.0:
+        return max(seconds - elapsed, _LONGER * elapsed)
+    sure = min(share / _SURE_SHARE, 1.0) ** 2
+    return (1.0 - share) * (sure * elapsed / share + (1.0 - sure) * max(seconds, elapsed))
 
 
 def _kinds(task: Task) -> tuple[str, str, str]:

@@ -10,7 +10,6 @@ by Gauss's rule, which the shader has for its lines of nodes.
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import Any, Final
 

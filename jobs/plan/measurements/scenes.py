@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
-from jobs.plan.dataset import SECONDS_A_POINT, points_a_row
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Made, Place, Progress, TaskPart
+from jobs.plan.truth_cost import bounce_seconds, row_seconds
 from pipeline.fingerprint import file_sha256
 from pipeline.models.options import RoundFootprint, setting_of
 from pipeline.scenes.catalogue import load_scene
@@ -94,8 +94,15 @@ class _Shot(Measurement):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         options = self.options
-        points = points_a_row(options.truth) + (options.frames - 1) * points_a_row(options.frame_truth)
-        return 10.0 + options.size[0] * options.size[1] * _QUERIES_A_PIXEL * SECONDS_A_POINT * points
+        cloths = [cloth.fabric for cloth in self.cloths.values()]
+        tables = sum(bounce_seconds(fabric) for fabric in cloths)
+        rows = [
+            row_seconds(options.truth, fabric, flat=False)
+            + (options.frames - 1) * row_seconds(options.frame_truth, fabric, flat=False)
+            for fabric in cloths
+        ]
+        pixels = options.size[0] * options.size[1]
+        return 5.0 + tables + pixels * _QUERIES_A_PIXEL * sum(rows) / len(rows)
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render the queries and answer them."""
@@ -103,7 +110,7 @@ class _Shot(Measurement):
         from reports.measure.scene.shot import read_shot, shoot
 
         shot, picture = (out / path for path in self.products)
-        shoot(self.found, self.options, shot)
+        shoot(self.found, self.options, shot, progress)
         write_truth(read_shot(shot), picture)
 
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
-from jobs.plan.dataset import SECONDS_A_POINT, points_a_row
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.task import Coloured, Progress
+from jobs.plan.truth_cost import SECONDS_A_POINT, bounce_seconds, row_seconds, table_seconds
 from jobs.recipe.recipe import Recipe
 from pipeline import versions
 from pipeline.scenes.options import View, ViewOptions
@@ -57,7 +57,7 @@ class TruthPicture(Measurement):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        return _seconds(self.extent[0] * self.extent[1], self.truth)
+        return bounce_seconds(self.fabric) + _seconds(self.fabric, self.extent[0] * self.extent[1], self.truth)
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render it."""
@@ -99,7 +99,7 @@ class TruthFrames(Measurement):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         width, height = self.options.frame_size
-        return _seconds(width * height * self.options.frames, self.options.frame_truth)
+        return _seconds(self.fabric, width * height * self.options.frames, self.options.frame_truth)
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render them."""
@@ -134,7 +134,7 @@ class TruthEdge(Measurement):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         pixels = max(round(self.options.depth / self.options.pixel), 1) * self.options.rows
-        return _seconds(pixels, self.options.truth)
+        return 0.3 + pixels * row_seconds(self.options.truth, self.fabric, flat=False)
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render it."""
@@ -178,5 +178,5 @@ class LivePage(Measurement):
         write_page(self.fabric, out / self.products[0], self.pixels)
 
 
-def _seconds(pixels: int, truth: TruthOptions) -> float:
-    return 0.3 + pixels * SECONDS_A_POINT * points_a_row(truth)
+def _seconds(fabric: Fabric, pixels: int, truth: TruthOptions) -> float:
+    return 0.3 + table_seconds(truth, fabric) + pixels * row_seconds(truth, fabric)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -160,8 +161,8 @@ class Shot:
         return np.concatenate(list(parts)).astype(np.float64)
 
 
-def shoot(name: str, options: ShotOptions, path: Path) -> None:
-    """Work out a scene's frames with the truth's answers and write them to `path`.
+def shoot(name: str, options: ShotOptions, path: Path, progress: Callable[[float], None] = lambda share: None) -> None:
+    """Work out a scene's frames with the truth's answers and write them to `path`; `progress` receives their share.
 
     Raises
     ------
@@ -199,6 +200,7 @@ def shoot(name: str, options: ShotOptions, path: Path) -> None:
             columns |= {_RIM + "coverage": of_rims[sampled]}
             parts[key].append(columns)
         bases.append(base)
+        progress((frame + 1) / (options.frames + 1))
     arrays = {"base": np.array(bases, np.float32)}
     keys = [key for key, found in parts.items() if sum(len(part["frame"]) for part in found)]
     if not keys:

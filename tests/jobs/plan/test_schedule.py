@@ -75,13 +75,30 @@ def test_a_kind_takes_what_its_tasks_took_and_others_what_their_stage_took():
     assert estimate.seconds(other) == pytest.approx(100.0, rel=0.02)
 
 
+def test_one_wrong_cost_moves_no_other_kind_by_much():
+    """A second that took ten minutes, among tasks that took what they cost."""
+    estimate = Estimate()
+    for number in range(10):
+        estimate.learn(costly(f"a {number}", 5.0), 5.0)
+    estimate.learn(costly("odd 1", 1.0), 600.0)
+    assert estimate.seconds(costly("a 11", 100.0)) == pytest.approx(100.0, rel=0.01)
+    assert estimate.seconds(costly("b 1", 100.0)) == pytest.approx(100.0, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("elapsed", "share", "left"), [(30.0, 0.75, 10.0), (10.0, 0.0, 90.0), (200.0, 0.0, 100.0), (60.0, 0.01, 113.6)]
+)
+def test_a_task_under_way_is_judged_by_its_share_when_that_is_sure(elapsed, share, left):
+    """One that takes longer than estimated goes on; a first share, which includes its start, says little."""
+    a = costly("a", 100.0)
+    began = {a.id: (time.monotonic() - elapsed, share)}
+    assert Estimate().seconds_left([a], began, 1) == pytest.approx(left, rel=0.01)
+
+
 def test_the_longest_chain_and_the_number_of_workers_count():
     a, b = costly("a", 10.0), costly("b", 10.0)
     c = costly("c", 10.0, [a])
     whole = 10.0
     for workers, lengths in ((1, 3), (2, 2), (9, 2)):
         assert Estimate().seconds_left([a, b, c], {}, workers) == pytest.approx(lengths * whole)
-    # A task that is 3/4 done after 30 s goes on for 10 s.
-    began = time.monotonic() - 30.0
-    assert Estimate().seconds_left([a], {a.id: (began, 0.75)}, 1) == pytest.approx(10.0, rel=0.01)
     assert Estimate().seconds_left([], {}, 1) == 0.0
