@@ -78,14 +78,6 @@ def _tile(colours: str, share: npt.NDArray[np.float32], differences: Exr) -> byt
     return png(rgba)
 
 
-def overview(exrs: Sequence[Exr], columns: int) -> bytes:
-    """Return several renderings of one size as a sheet of `columns`."""
-    pictures = [_tone_mapped(exr) for exr in exrs]
-    pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % columns)
-    rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
-    return png(np.concatenate(rows, axis=0))
-
-
 def drawdown(fabric: Fabric) -> bytes:
     """Return the drawdown, warp over in black, the first pick at the bottom."""
     picks, ends = (np.arange(CELLS) % count for count in fabric.weave.warp_over.shape)
