@@ -95,7 +95,9 @@ def strips(
 
 def _first_of_each_kind(cells: Sequence[dict[str, str]], kinds: Mapping[str, str]) -> list[dict[str, str]]:
     """Return cells with the first one of each kind in front; methods from outside are kinds of their own."""
-    first, others, met = [], [], set()
+    first: list[dict[str, str]] = []
+    others: list[dict[str, str]] = []
+    met: set[str] = set()
     for cell in cells:
         kind = kinds.get(cell["method"], cell["method"])
         (others if kind in met - {ADDED_MODEL} else first).append(cell)
