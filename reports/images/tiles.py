@@ -76,14 +76,6 @@ def _tile(colours: str, share: npt.NDArray[np.float32], differences: Exr) -> byt
     return png(rgba)
 
 
-def overview(exrs: Sequence[Exr], columns: int) -> bytes:
-    """Return several renderings of one size as a sheet of `columns`."""
-    pictures = [_tone_mapped(exr) for exr in exrs]
-    pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % columns)
-    rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
-    return png(np.concatenate(rows, axis=0))
-
-
 def height(fabric: Fabric) -> bytes:
     """Return the height map, black to white from the lowest to the highest point; gaps are black."""
     surface = _surface(fabric)

@@ -101,9 +101,9 @@ def _by_role(
         for row in rows(own[of_baseline(own)]) if paper else ():
             _paper_arrow(axes, scheme, (row.x, row.y), math.sqrt(PAPER[0]))
         axes.set(title=f"{role.capitalize()} fabrics", xlabel=cost, xscale="log", yscale="log")
-        _tick(axes.yaxis, axes.get_ylim(), worded)
+        _tick(axes.yaxis, axes.get_ylim(), worded, 9)
         axes.margins(0.12)
-        _tick(axes.xaxis, axes.get_xlim(), lambda value: f"{value:,.0f}")
+        _tick(axes.xaxis, axes.get_xlim(), lambda value: f"{value:,.0f}", 7)
     panels[0].set_ylabel(error)
     _legend(figure, scheme, colours, math.sqrt(PAPER[0]) if paper else math.nan)
     place_labels(figure, labels, scheme)
@@ -162,10 +162,10 @@ def _plain(value: float) -> str:
     return f"{value:.3g}".replace("e-0", "e−")
 
 
-def _tick(axis: Axis, limits: tuple[float, float], worded: Callable[[float], str], most: int | None = None) -> None:
-    """Label a logarithmic axis at 1, 2 and 5 of every decade; at its powers alone where those are many."""
+def _tick(axis: Axis, limits: tuple[float, float], worded: Callable[[float], str], most: int) -> None:
+    """Label a logarithmic axis at 1, 2 and 5 of every decade; at its powers alone where those are more than `most`."""
     low, high = limits
-    subs = (1.0, 2.0, 5.0) if high < 1e3 * low else (1.0,)
+    subs = (1.0, 2.0, 5.0) if 3.0 * math.log10(high / low) < most else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs, numticks=most))
     axis.set_major_formatter(FuncFormatter(lambda value, _: worded(value)))
     axis.set_minor_locator(NullLocator())

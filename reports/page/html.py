@@ -158,7 +158,7 @@ def _pictures(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> dict[str, 
     """Return fabrics, and the pictures of fabrics and scenes in their order."""
     views = strips(
         page.shown,
-        {fabric.name: role for fabric, role in page.fabrics},
+        [fabric.name for fabric, _ in page.fabrics],
         [*page.options.views, *page.options.scenes.names],
         [frames["pictures"], scene_table(first_training(page.records))],
         page.models,

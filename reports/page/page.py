@@ -114,6 +114,3 @@ def _tiles(page: PageInput) -> Iterator[tuple[str, bytes]]:
     for fabric, _ in page.fabrics:
         for kind, draw in (("drawdown", drawdown), ("height", tiles.height), ("normals", tiles.normals)):
             yield f"{fabric.name}-{kind}.png", draw(fabric)
-    spheres = [exr for (fabric, scene), exr in truths.items() if fabric and scene == "sphere"]
-    if spheres:
-        yield "overview.png", tiles.overview(spheres, columns=-(-len(spheres) // 2))

@@ -45,14 +45,13 @@ class Strip:
 
     fabric: str
     scene: str
-    role: str = ""
     cells: list[dict[str, str]] = field(default_factory=list)
     """Each with `stem`, `method`, `label` and `mse`."""
 
 
 def strips(
     pictures: Sequence[PictureFile],
-    order: Mapping[str, str],
+    order: Sequence[str],
     scenes: Sequence[str],
     errors: Sequence[pd.DataFrame],
     methods: Sequence[ModelNote] = (),
@@ -65,8 +64,8 @@ def strips(
     ----------
     pictures : sequence of PictureFile
         What there is to show.
-    order : mapping
-        The fabrics in their order, each with its role.
+    order : sequence of str
+        The fabrics in their order.
     scenes : sequence of str
         Views and scenes in their order.
     errors : sequence of DataFrame
@@ -82,13 +81,15 @@ def strips(
     }
     views: dict[tuple[str, str], Strip] = {}
     for file in sorted(pictures, key=lambda file: (file.method != TRUTH, kinds.get(file.method) != ADDED_MODEL)):
-        strip = views.setdefault((file.fabric, file.scene), Strip(file.fabric, file.scene, order.get(file.fabric, "")))
+        strip = views.setdefault((file.fabric, file.scene), Strip(file.fabric, file.scene))
         value = mse.get((file.fabric, file.scene, file.method, file.setting), math.nan)
         cell = {"stem": file.stem, "method": file.method, "label": display(file.method, file.setting)}
         strip.cells.append(cell | {"mse": beyond_noise(value, scientific)})
     for strip in views.values():
         strip.cells[:] = _first_of_each_kind(strip.cells, kinds)
-    fabrics, places = ({name: index for index, name in enumerate(names)} for names in (order, dict.fromkeys(scenes)))
+    fabrics, places = (
+        {name: index for index, name in enumerate(names)} for names in (order, list(dict.fromkeys(scenes)))
+    )
     return sorted(views.values(), key=lambda s: (fabrics.get(s.fabric, len(fabrics)), places.get(s.scene, len(places))))
 
 

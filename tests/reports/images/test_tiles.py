@@ -84,9 +84,7 @@ def test_maps_repeat_with_the_weave(draw):
     assert draw is tiles.height or picture[..., 2].min() >= 127, "normals point up in blue"
 
 
-def test_overview_is_a_sheet_and_hex_colour_inverts_the_fabrics_own():
-    one = exr(np.full((4, 4, 3), 0.2), np.ones((4, 4)))
-    assert decoded(tiles.overview([one] * 3, columns=2)).shape == (8 * tiles.SCALE, 8 * tiles.SCALE, 4)
+def test_hex_colour_inverts_the_fabrics_own():
     assert tiles.hex_colour(linear_rgb("#3b5bdb")) == "#3b5bdb"
 
 

@@ -41,11 +41,11 @@ def test_strips_are_in_order_and_say_their_errors():
         pd.DataFrame([("denim", "sphere", "woven", "", 2e-3)], columns=["fabric", "scene", "method", "setting", "mse"]),
         pd.DataFrame([("attic", "woven", "", 5e-4)], columns=["scene", "method", "setting", "mse"]),
     ]
-    found = strips(pictures, {"basket": "seen", "denim": "unseen"}, ["sphere", "plane", "attic"], errors)
+    found = strips(pictures, ["basket", "denim"], ["sphere", "plane", "attic"], errors)
     assert [(strip.fabric, strip.scene) for strip in found] == [
         ("basket", "plane"), ("denim", "sphere"), ("denim", "plane"), ("", "attic"),
     ]  # fmt: skip
-    assert found[1].role == "unseen" and [cell["method"] for cell in found[1].cells] == ["truth", "woven"]
+    assert [cell["method"] for cell in found[1].cells] == ["truth", "woven"]
     assert [strip.cells[-1]["mse"] for strip in found[1:]] == ["2.00e−3", "–", "5.00e−4"]
 
 
@@ -54,7 +54,7 @@ def test_the_first_of_each_kind_and_methods_from_outside_stand_in_front():
     kinds = {"wide": "woven", "wider": "woven", "own": ADDED_MODEL}
     notes = [ModelNote(name, "", kind=kinds.get(name, name)) for name in names[1:]]
     pictures = [file(name) for name in names] + [file("point_sampled", "k = 16")]
-    (strip,) = strips(pictures, {}, ["attic"], [], notes)
+    (strip,) = strips(pictures, [], ["attic"], [], notes)
     order = ["truth", "own", "wide", "points", "wider", "points, k\u00a0=\u00a016"]
     assert [cell["label"] for cell in strip.cells] == order
 
