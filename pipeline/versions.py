@@ -30,7 +30,7 @@ BOUND: Final = 2
 FALLBACK: Final = 9
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
-SCENES: Final = 2
+SCENES: Final = 3
 """The shipped scenes, and the queries of any scene."""
 
 SCENE_BENCH: Final = 5

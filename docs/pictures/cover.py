@@ -35,13 +35,13 @@ EXPOSURE: Final = 1.5
 
 def folds(mi: Any) -> Any:
     """Return the cloth: a wave swept along a line. Its length, and its height over the mean, grow with the distance."""
-    s = np.linspace(math.log(0.05), 5.9, 9000)
+    s = np.linspace(math.log(0.05), 5.9, 4000)
     away = 30.0 * np.exp(s) - 30.0
     wave = 0.082 * (away + 40.0) * np.sin(2.0 * np.pi * s / 0.92 + 0.7 * np.sin(1.9 * s) + 0.5)
     height = wave - 0.10 * away + 0.012 * away * s
     height -= np.interp(20.0, away, height) + 19.0
     length, along = developed(np.stack([away, height], axis=-1))
-    x = 30.0 * np.sinh(np.linspace(-7.6, 7.6, 240))  # small triangles near the camera
+    x = 30.0 * np.sinh(np.linspace(-7.6, 7.6, 160))  # small triangles near the camera
     line, across, up = [math.cos(TURN), math.sin(TURN), 0], [-math.sin(TURN), math.cos(TURN), 0], [0, 0, 1]
     points = np.multiply.outer(x, line) + (np.multiply.outer(away, across) + np.multiply.outer(height, up))[:, None]
     normal = np.multiply.outer(along[:, 0], up) - np.multiply.outer(along[:, 1], across)
@@ -50,11 +50,11 @@ def folds(mi: Any) -> Any:
 
 
 def sky(mi: Any) -> dict[str, Any]:
-    """Return an evening sky: warm at the horizon, most where the sun is, and blue above."""
+    """Return an evening sky, warm at the horizon and blue above; nothing shines from below."""
     height = np.sin(np.linspace(0.5, -0.5, 64) * np.pi)[:, None, None]
-    blue, warm, ground = np.array([[0.30, 0.46, 0.85], [1.05, 0.66, 0.38], [0.30, 0.22, 0.18]])
+    blue, warm = np.array([[0.30, 0.46, 0.85], [1.05, 0.66, 0.38]])
     above = np.exp(-np.maximum(height, 0.0) / 0.22)
-    texels = np.broadcast_to(np.where(height < 0.0, ground, blue + above * (warm - blue)), (64, 128, 3))
+    texels = np.broadcast_to(np.where(height < 0.0, 0.0, blue + above * (warm - blue)), (64, 128, 3))
     upright = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
     return {"type": "envmap", "to_world": upright, "bitmap": mi.Bitmap(np.ascontiguousarray(texels, np.float32))}
 
@@ -87,14 +87,13 @@ class OneColour:
 
     def colours(self, fabric: Any, queries: Any, seed: int) -> Any:
         """Return the colours of the components of N queries, (N, 4, 3)."""
-        side = queries.wi[:, 2] > 0.0
-        _, first, back = np.unique(np.column_stack([queries.u, queries.v, queries.wo, side]), True, True, axis=0)
+        _, first, back = np.unique(np.column_stack([queries.u, queries.v, queries.wo]), True, True, axis=0)
         return self._method.colours(fabric, queries.take(first), seed)[back.ravel()]
 
 
 def rendered(size: tuple[int, int], side: int = 1) -> Any:
     """Return the picture in linear RGB; `side`: rays along each side of a pixel."""
-    loaded = load(SCENE, SceneOptions(environment_directions=9, environment_samples=256))
+    loaded = load(SCENE, SceneOptions(environment_directions=9, environment_samples=256, largest_sigma=4.0))
     rgb = np.empty((*size[::-1], 3), np.float32)
     with ThreadPoolExecutor(cores()) as pool:
         for part in picture(loaded, OneColour(), pool, size, side=side):
