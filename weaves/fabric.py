@@ -26,10 +26,7 @@ from weaves.yarn import Yarn
 
 PRESETS = Path(__file__).parent / "presets"
 
-Weave = Annotated[
-    Plain | Rib | Basket | Twill | Herringbone | Satin | Matrix | Loom,
-    Field(discriminator="family"),
-]
+Weave = Annotated[Plain | Rib | Basket | Twill | Herringbone | Satin | Matrix | Loom, Field(discriminator="family")]
 """The weave families; a file chooses one by `family`."""
 
 

@@ -34,9 +34,7 @@ def _listed(value: Any) -> Any:
 
 
 Steps = Annotated[
-    tuple[Annotated[StrictInt, Field(ge=1, le=64)], ...],
-    BeforeValidator(_listed),
-    Field(min_length=1, max_length=16),
+    tuple[Annotated[StrictInt, Field(ge=1, le=64)], ...], BeforeValidator(_listed), Field(min_length=1, max_length=16)
 ]
 
 

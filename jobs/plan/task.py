@@ -12,13 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
 
-from pydantic import (
-    BaseModel,
-    SerializationInfo,
-    SerializerFunctionWrapHandler,
-    WrapSerializer,
-    model_serializer,
-)
+from pydantic import BaseModel, SerializationInfo, SerializerFunctionWrapHandler, WrapSerializer, model_serializer
 
 from pipeline.fingerprint import IDENTITY, fingerprint
 from weaves.fabric import Fabric

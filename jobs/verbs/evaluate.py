@@ -37,8 +37,7 @@ class TruthFlags:
     frame: Annotated[str | None, Parameter(help="Normal of the cosines inside the yarns: ply or macro.")] = None
     normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None
     parallax: Annotated[
-        bool | None,
-        Parameter(negative="--no-parallax", help="Footprints are patches of view rays, or of the plane."),
+        bool | None, Parameter(negative="--no-parallax", help="Footprints are patches of view rays, or of the plane.")
     ] = None
     walls: Annotated[str | None, Parameter(help="What a ray sees that meets a yarn's end: rim or left_out.")] = None
 

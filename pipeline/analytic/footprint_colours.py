@@ -24,14 +24,7 @@ from pipeline.analytic.soft_nodes.shade import DIFFUSE, SPECULAR
 from pipeline.analytic.soft_nodes.wide import RESOLVED, Sight, density, form, sight, touched, where_seen
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.footprint.mixture import (
-    COARSE_LINE,
-    Footprints,
-    along_axes,
-    footprints,
-    line_points,
-    narrow_axis,
-)
+from pipeline.truth.footprint.mixture import COARSE_LINE, Footprints, along_axes, footprints, line_points, narrow_axis
 from pipeline.truth.geometry.heightfield import WARP
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric

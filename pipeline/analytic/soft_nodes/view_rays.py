@@ -19,15 +19,7 @@ from typing import Final, NamedTuple
 
 from pipeline.analytic.soft_nodes.nodes import CURVE, FAMILY, SHIFT, SoftNodeTable
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
-from pipeline.truth.geometry.heightfield import (
-    AXIS_DROP,
-    BEND_RADIUS,
-    BETA,
-    HALF_LENGTH,
-    INVERSE_RADIUS,
-    RADIUS,
-    WEFT,
-)
+from pipeline.truth.geometry.heightfield import AXIS_DROP, BEND_RADIUS, BETA, HALF_LENGTH, INVERSE_RADIUS, RADIUS, WEFT
 
 FOOTPRINT_ENDS: Final = 2.4
 """Deviations at which a footprint of rays ends."""

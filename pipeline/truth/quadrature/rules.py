@@ -288,13 +288,7 @@ def _shares(patch: QueryPatch, part: Float64, a: float, b: float, shares: Float6
 
 @allocating_kernel
 def integrate(
-    patch: QueryPatch,
-    part: Float64,
-    level: int,
-    split: int,
-    grid: Float64,
-    states: Index,
-    sums: Float64,
+    patch: QueryPatch, part: Float64, level: int, split: int, grid: Float64, states: Index, sums: Float64
 ) -> int:
     """Write the sums over a part with 2^(level + 1) nodes an axis; return the points used."""
     n, rule = 2 << level, (2 << level) - 2
