@@ -30,7 +30,8 @@ def row_seconds(truth: TruthOptions, fabric: Fabric, flat: bool = True) -> float
 
     Points grow a little slower than 1 / error^2, within the limits of the options.
     """
-    points = min(max(_POINTS_A_ROW * (0.02 / truth.relative_error) ** 1.5, truth.min_count), truth.max_count)
+    wanted: float = _POINTS_A_ROW * (0.02 / truth.relative_error) ** 1.5
+    points = min(max(wanted, truth.min_count), truth.max_count)
     sampled = points * SECONDS_A_POINT * (1.0 + _OPEN_POINT * (1.0 - _width(fabric)))
     if not flat or not _tabulated(truth, fabric):
         return sampled
