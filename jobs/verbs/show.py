@@ -140,7 +140,8 @@ def method_of(fabric: Fabric) -> tuple[Fallback, AbstractContextManager[None]]:
 
     if fabric.weave.different_cells() > TABLE_CELLS:
         points = PointSampledOptions(counts=[POINTS_OF_MANY_CELLS])
-        return Fallback(*points.methods(), points.kinds), nullcontext()
+        (method,) = points.methods()
+        return Fallback(method, points.kinds), nullcontext()
     from pipeline.models.named import named_method  # torch
     from pipeline.models.network import one_thread
 
