@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from jobs.plan.task import Places, Progress, Stage, Task
-from jobs.plan.truth_cost import SECONDS_A_POINT, row_seconds, table_seconds
+from jobs.plan.truth_cost import TruthCost
 from jobs.recipe.recipe import Recipe
 from pipeline import versions
 from pipeline.atomic import link
 from pipeline.fingerprint import fingerprint
-from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
 
 if TYPE_CHECKING:
@@ -70,9 +69,9 @@ class Shard(Task):
             truth, flat = shard.extra.truth, True
         else:
             return _START + self.rows * SECONDS_A_POINT * shard.extra.points
+        answers = TruthCost(truth, shard.fabric)
         first = shard.start == 0 and shard.split != "validation"  # others find the table in their process
-        table = table_seconds(truth, shard.fabric) if first else 0.0
-        return _START + table + self.rows * row_seconds(truth, shard.fabric, flat)
+        return _START + (answers.table if first else 0.0) + self.rows * answers.row(flat)
 
     @property
     def rows(self) -> int:

@@ -8,7 +8,7 @@ Rays go on below gaps: points of open cloth take longer.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 from pipeline.truth.options import NARROWEST_RIMS, TABLE_CELLS, TruthOptions
 from weaves.draft import Draft
@@ -25,43 +25,50 @@ _OPEN_POINT: Final = 5.0  # a point takes longer by this for each yarn spacing o
 _BOUNCES, _BOUNCES_THROUGH = 4.0, 16.0  # seconds of a table of light between yarns; of light through them too
 
 
-def row_seconds(truth: TruthOptions, fabric: Fabric, flat: bool = True) -> float:
-    """Return the time of one row, of flat cloth or of curved.
+class TruthCost(NamedTuple):
+    """The truth of one fabric."""
 
-    Points grow a little slower than 1 / error^2, within the limits of the options.
-    """
-    wanted: float = _POINTS_A_ROW * (0.02 / truth.relative_error) ** 1.5
-    points = min(max(wanted, truth.min_count), truth.max_count)
-    sampled = points * SECONDS_A_POINT * (1.0 + _OPEN_POINT * (1.0 - _width(fabric)))
-    if not flat or not _tabulated(truth, fabric):
-        return sampled
-    found = _ROW + _ROW_A_CELL * min(_cells(fabric.weave), _MOST_CELLS)
-    return found + (_SAMPLED * sampled if truth.estimator == "auto" else 0.0)
+    truth: TruthOptions
+    fabric: Fabric
 
+    def row(self, flat: bool = True) -> float:
+        """Return the time of one row, of flat cloth or of curved.
 
-def table_seconds(truth: TruthOptions, fabric: Fabric) -> float:
-    """Return the time in which the table of a fabric is made; 0 if there is none."""
-    if not _tabulated(truth, fabric):
-        return 0.0
-    return _TABLE_A_CELL * _cells(fabric.weave) * (_OPEN_TABLE if _width(fabric) < 1.0 else 1.0)
+        Points grow a little slower than 1 / error^2, within the limits of the options.
+        """
+        truth = self.truth
+        points: float = min(max(_POINTS_A_ROW * (0.02 / truth.relative_error) ** 1.5, truth.min_count), truth.max_count)
+        sampled = points * SECONDS_A_POINT * (1.0 + _OPEN_POINT * (1.0 - self._width))
+        if not flat or not self._is_tabulated:
+            return sampled
+        looked_up = _ROW + _ROW_A_CELL * min(_cells(self.fabric.weave), _MOST_CELLS)
+        return looked_up + (_SAMPLED * sampled if truth.estimator == "auto" else 0.0)
 
+    @property
+    def table(self) -> float:
+        """The time in which the table of the fabric is made; 0 if there is none."""
+        if not self._is_tabulated:
+            return 0.0
+        return _TABLE_A_CELL * _cells(self.fabric.weave) * (_OPEN_TABLE if self._width < 1.0 else 1.0)
 
-def bounce_seconds(fabric: Fabric) -> float:
-    """Return the time in which a fabric's table of light between yarns is made, which pictures of it need."""
-    through = any(any(yarn.diffuse_transmission_rgb) for yarn in (fabric.warp, fabric.weft))
-    return _BOUNCES_THROUGH if through or _width(fabric) < 1.0 else _BOUNCES
+    @property
+    def bounces(self) -> float:
+        """The time in which the table of light between yarns is made, which pictures of the fabric need."""
+        through = any(any(yarn.diffuse_transmission_rgb) for yarn in (self.fabric.warp, self.fabric.weft))
+        return _BOUNCES_THROUGH if through or self._width < 1.0 else _BOUNCES
 
+    @property
+    def _is_tabulated(self) -> bool:
+        """True if tables answer most rows."""
+        truth = self.truth
+        known = truth.frame == "ply" and (truth.walls != "rim" or 0.5 * self._width >= NARROWEST_RIMS)
+        return truth.estimator in ("auto", "node_table") and known and _cells(self.fabric.weave) <= TABLE_CELLS
 
-def _tabulated(truth: TruthOptions, fabric: Fabric) -> bool:
-    """Return whether tables answer most rows of a fabric."""
-    known = truth.frame == "ply" and (truth.walls != "rim" or 0.5 * _width(fabric) >= NARROWEST_RIMS)
-    return truth.estimator in ("auto", "node_table") and known and _cells(fabric.weave) <= TABLE_CELLS
+    @property
+    def _width(self) -> float:
+        return min(self.fabric.warp.width, self.fabric.weft.width)
 
 
 @lru_cache(maxsize=4096)
 def _cells(draft: Draft) -> int:
     return draft.different_cells()
-
-
-def _width(fabric: Fabric) -> float:
-    return min(fabric.warp.width, fabric.weft.width)

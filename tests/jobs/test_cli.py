@@ -37,7 +37,7 @@ def test_help_lists_the_verbs_in_the_order_of_work(twillight):
 def test_every_help_ends_with_examples_that_are_understood(twillight, verb):
     code, text, _ = twillight(*verb.split(), "--help")
     shown = [line.strip() for line in text.partition("Examples:")[2].splitlines() if line.strip()]
-    assert code == 0 and shown == [f"twillight {verb} {tokens}".strip() for tokens in VERBS[verb].examples]
+    assert code == 0 and shown == [f"twillight {verb} {tokens}".strip() for tokens in VERBS[verb]["examples"]]
     for call in shown:
         app.parse_args(shlex.split(call)[1:], exit_on_error=False, print_error=False)
 

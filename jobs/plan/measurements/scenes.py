@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Made, Place, Progress, TaskPart
-from jobs.plan.truth_cost import bounce_seconds, row_seconds
+from jobs.plan.truth_cost import TruthCost
 from pipeline.fingerprint import file_sha256
 from pipeline.models.options import RoundFootprint, setting_of
 from pipeline.scenes.catalogue import load_scene
@@ -94,15 +94,13 @@ class _Shot(Measurement):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         options = self.options
-        cloths = [cloth.fabric for cloth in self.cloths.values()]
-        tables = sum(bounce_seconds(fabric) for fabric in cloths)
-        rows = [
-            row_seconds(options.truth, fabric, flat=False)
-            + (options.frames - 1) * row_seconds(options.frame_truth, fabric, flat=False)
-            for fabric in cloths
-        ]
+        fabrics = [cloth.fabric for cloth in self.cloths.values()]
+        first = [TruthCost(options.truth, fabric) for fabric in fabrics]
+        rows = sum(answer.row(flat=False) for answer in first) / len(first)
+        further = sum(TruthCost(options.frame_truth, fabric).row(flat=False) for fabric in fabrics) / len(first)
         pixels = options.size[0] * options.size[1]
-        return 5.0 + tables + pixels * _QUERIES_A_PIXEL * sum(rows) / len(rows)
+        answers = pixels * _QUERIES_A_PIXEL * (rows + (options.frames - 1) * further)
+        return 5.0 + sum(answer.bounces for answer in first) + answers
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render the queries and answer them."""

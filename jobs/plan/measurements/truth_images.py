@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, Self
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.task import Coloured, Progress
-from jobs.plan.truth_cost import SECONDS_A_POINT, bounce_seconds, row_seconds, table_seconds
+from jobs.plan.truth_cost import SECONDS_A_POINT, TruthCost
 from jobs.recipe.recipe import Recipe
 from pipeline import versions
 from pipeline.scenes.options import View, ViewOptions
@@ -18,7 +18,8 @@ from reports.options import EdgeOptions, FrameOptions, PictureOptions, select
 from reports.page.content import PictureFile
 from weaves.fabric import Fabric
 
-_LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 10.0, 512, 5
+_START = 0.3  # seconds of any image
+_LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 37.0, 512, 5
 
 
 class TruthPicture(Measurement):
@@ -57,7 +58,8 @@ class TruthPicture(Measurement):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        return bounce_seconds(self.fabric) + _seconds(self.fabric, self.extent[0] * self.extent[1], self.truth)
+        answers = TruthCost(self.truth, self.fabric)
+        return _START + answers.bounces + answers.table + self.extent[0] * self.extent[1] * answers.row()
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render it."""
@@ -99,7 +101,8 @@ class TruthFrames(Measurement):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         width, height = self.options.frame_size
-        return _seconds(self.fabric, width * height * self.options.frames, self.options.frame_truth)
+        answers = TruthCost(self.options.frame_truth, self.fabric)
+        return _START + answers.table + width * height * self.options.frames * answers.row()
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render them."""
@@ -134,7 +137,7 @@ class TruthEdge(Measurement):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         pixels = max(round(self.options.depth / self.options.pixel), 1) * self.options.rows
-        return 0.3 + pixels * row_seconds(self.options.truth, self.fabric, flat=False)
+        return _START + pixels * TruthCost(self.options.truth, self.fabric).row(flat=False)
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render it."""
@@ -176,7 +179,3 @@ class LivePage(Measurement):
         from reports.viewer.view import write_page
 
         write_page(self.fabric, out / self.products[0], self.pixels)
-
-
-def _seconds(fabric: Fabric, pixels: int, truth: TruthOptions) -> float:
-    return 0.3 + table_seconds(truth, fabric) + pixels * row_seconds(truth, fabric)

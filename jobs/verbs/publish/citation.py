@@ -26,7 +26,7 @@ _FORMS: Final = {
 
 @dataclass(frozen=True)
 class Citation:
-    """Facts for a citation, also on the command line; empty: not known, or the default."""
+    """A reference to a data set, also on the command line; empty: not known, or the default."""
 
     title: Annotated[str, Parameter(help="Title; default: what it holds, with the name of its recipe.")] = ""
     author: Annotated[tuple[str, ...], Parameter(help='Author, "Family, Given" or a group; several.')] = AUTHORS

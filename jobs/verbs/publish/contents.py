@@ -85,7 +85,7 @@ class About(NamedTuple):
     licence: str
     """SPDX identifier."""
     citation: Citation
-    """Title, authors and place for a citation."""
+    """Reference to the data set."""
     truth_version: int
     """Version of the ground truth that answered the rows; 0 if the shards do not name it."""
 
