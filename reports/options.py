@@ -89,7 +89,7 @@ class ShotOptions(_Seeded):
 
     size: tuple[Side, Side] = (96, 72)
     """Width and height of a frame, in pixels."""
-    frames: int = Field(default=6, ge=3, le=1024)
+    frames: int = Field(default=6, ge=1, le=1024)
     """Frames of the camera's way, from the first on, for aliasing; pictures are compared at the first."""
     options: SceneOptions = SceneOptions(environment_directions=8)
     """How scenes become queries."""
@@ -111,6 +111,8 @@ class SceneErrorOptions(_Seeded):
 class SceneBenchOptions(SceneErrorOptions, ShotOptions):
     """Scenes that every method renders."""
 
+    frames: int = Field(default=6, ge=3, le=1024)
+    """As for `ShotOptions`; aliasing needs three."""
     picture_size: tuple[Side, Side] | None = None
     """Width and height of the pictures on the page, which are rendered besides; left out: those of the frames."""
     names: tuple[str, ...] = ()

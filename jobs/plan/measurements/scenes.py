@@ -134,7 +134,7 @@ class LargerShot(_Shot):
         """Return the shots of a recipe's scenes, in its order; none if it wants no larger pictures."""
         if options.picture_size is None:
             return []
-        first = {"size": options.picture_size, "frames": 1}  # fewer than recipes may have: no aliasing is measured
+        first = {"size": options.picture_size, "frames": 1}
         return [cls.of(name, select(ShotOptions, options).model_copy(update=first)) for name in options.names]
 
 
