@@ -128,7 +128,7 @@ def test_a_page_of_a_fabric_is_written_whole_and_one_of_a_large_repeat_refused_b
         patch.setattr(view, "MOST_REPEAT_CELLS", 3)
         patch.setattr(view, "content", None)
         assert "at most 3 cells" in refused("view", "gingham", "--out", "x.html") and not list(tmp_path.iterdir())
-    monkeypatch.setattr(view, "content", lambda fabric, truth: found)
+    monkeypatch.setattr(view, "content", lambda fabric, truth, progress: progress(1.0) or found)
     code, said, _ = twillight("view", "gingham", "--out", "a/x.html")
     assert code == 0 and "5 views" in said and [path.name for path in (tmp_path / "a").iterdir()] == ["x.html"]
 
