@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from jobs.plan.task import Places, Progress, Stage, Task
-from jobs.plan.truth_cost import TruthCost
+from jobs.plan.truth_cost import SECONDS_A_POINT, TruthCost
 from jobs.recipe.recipe import Recipe
 from pipeline import versions
 from pipeline.atomic import link
 from pipeline.fingerprint import fingerprint
+from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
 
 if TYPE_CHECKING:
