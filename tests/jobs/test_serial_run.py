@@ -1,20 +1,24 @@
 """A run of the smallest recipe, from a fabric to its page, task after task in this process: no cluster, no scene."""
 
+import numpy as np
 import pytest
 
 from jobs.cli import main
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
+from reports.images.tiles import png
 from reports.page import page
 from reports.record import read_records
 from tests.jobs.small_recipes import write_smallest
+
+PLOT = png(np.zeros((1, 1, 4), np.uint8))
 
 
 def test_a_recipe_becomes_a_page(tmp_path, here, capsys, monkeypatch):
     """Its plots are made and not drawn, which takes half of the time; `tests/reports/page` draws each of them."""
     made = []
-    monkeypatch.setattr(page, "render", lambda plot, *data: made.append(plot(*data)) or b"a plot")
+    monkeypatch.setattr(page, "render", lambda plot, *data: made.append(plot(*data)) or PLOT)
     recipe = write_smallest(tmp_path, "serial")
     command = ["run", str(recipe), "--out", str(tmp_path / "out")]
     assert main(command) == 0, capsys.readouterr().err
@@ -40,7 +44,7 @@ SMALL_CURVED = {"model": "curved", "silhouette_rows": 64}
 def test_a_page_compares_a_network_of_view_rays_with_its_variant_without_an_offset(
     tmp_path, here, capsys, monkeypatch, dataset, model
 ):
-    monkeypatch.setattr(page, "render", lambda plot, *data: b"a plot")
+    monkeypatch.setattr(page, "render", lambda plot, *data: PLOT)
     bench = dict.fromkeys(("truth", "frame_truth"), SAMPLED) | {"edge": {"rows": 4, "truth": SAMPLED}}
     changes = {"dataset": {"truth": RAYS, **dataset}, "model": model, "bench": bench}
     recipe = write_smallest(tmp_path, "rays", **changes, variant={"name": "flat", "offset": False})

@@ -83,7 +83,7 @@ def test_the_headline_admits_a_defeat_and_calls_one_training_one():
     where = "than point sampling at 2 points on the 8 seen fabrics"
     assert defeat == f"Woven reaches 2.0× higher MSE {where}, at 1.7× its time."
     assert once == f"Woven reaches 9.1× lower MSE {where}, at 0.8× its time (one training)."
-    assert "8 seen fabrics (one training); its paper" in told.headline("woven", "", *tables(9.13, seeds=1))
+    assert "8 seen fabrics (one training); the paper" in told.headline("woven", "", *tables(9.13, seeds=1))
 
 
 def test_several_trainings_have_a_range():

@@ -17,7 +17,7 @@ def test_the_site_has_every_file_that_it_names(twillight, refused, monkeypatch, 
             (path / file).parent.mkdir(parents=True, exist_ok=True)
             (path / file).write_text(f"{kind} of {fabric.name}: {options}")
 
-    def swatch(name, fabric, folder, size):
+    def swatch(fabric, folder, size):
         (path := folder / f"{fabric.name}-swatch.png").write_bytes(b"")
         return path
 
