@@ -180,7 +180,7 @@ def _swatch(mi: Any) -> dict[str, Any]:
         "cloth": _waves(mi, "swatch", np.linspace(-0.5, 0.5, 3), y, swatch.height(y)),
         "board": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(swatch.HALF_BOARD), "paint": board},
         **{f"lamp_{number}": sun(list(towards), power) for number, (towards, power) in enumerate(swatch.LIGHTS)},
-        "camera": camera(mi, list(swatch.EYE), list(swatch.TARGET), swatch.FIELD_OF_VIEW),
+        "camera": camera(mi, list(swatch.EYE), list(swatch.LOOKED_AT), swatch.FIELD_OF_VIEW),
     }
 
 

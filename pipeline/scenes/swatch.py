@@ -24,7 +24,7 @@ Floats = npt.NDArray[np.float64]
 
 EYE: Final = (0.0, -1.5, 1.6)
 """Place of the camera."""
-TARGET: Final = (0.0, -0.02, 0.03)
+LOOKED_AT: Final = (0.0, -0.02, 0.03)
 """Place in the middle of the picture."""
 FIELD_OF_VIEW: Final = 34.0
 """Angle of the picture's width, in degrees."""
@@ -58,7 +58,7 @@ class Swatch(NamedTuple):
 
     def frame(self, window: FilmWindow) -> SceneFrame:
         """Return what every pixel of a window shows."""
-        eye, forward = np.array(EYE), unit(np.array(TARGET) - EYE)
+        eye, forward = np.array(EYE), unit(np.array(LOOKED_AT) - EYE)
         pixel = 2.0 * math.tan(math.radians(0.5 * FIELD_OF_VIEW)) / self.size[0]
         right = pixel * unit(np.cross(forward, [0.0, 0.0, 1.0]))
         down = pixel * unit(np.cross(forward, right))
