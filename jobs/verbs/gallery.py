@@ -16,7 +16,7 @@ from reports.exports.gallery import INDEX, PICTURE, gallery_page, write_fabric
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric, preset_names
 
-PICTURE_SIZE: Final = "640x480"
+PICTURE_SIZE: Final = "720x540"
 
 
 def gallery(
