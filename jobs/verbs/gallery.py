@@ -16,7 +16,7 @@ from reports.exports.gallery import INDEX, PICTURE, gallery_page, write_fabric
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric, preset_names
 
-PICTURE_SIZE: Final = (640, 480)
+PICTURE_SIZE: Final = (720, 540)
 """Pixels of a picture."""
 
 
