@@ -64,11 +64,12 @@ class Shard(Task):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         shard = self.shard
-        if isinstance(shard, ExtraShardTask) and not isinstance(shard.extra, AngularSamples):
-            return _START + self.rows * SECONDS_A_POINT * shard.extra.points
-        flat, truth = True, shard.extra.truth if isinstance(shard, ExtraShardTask) else shard.truth
         if isinstance(shard, ShardTask):
-            flat = shard.queries.curvature[1] == 0.0
+            truth, flat = shard.truth, shard.queries.curvature[1] == 0.0
+        elif isinstance(shard.extra, AngularSamples):
+            truth, flat = shard.extra.truth, True
+        else:
+            return _START + self.rows * SECONDS_A_POINT * shard.extra.points
         answers = TruthCost(truth, shard.fabric)
         first = shard.start == 0 and shard.split != "validation"  # others find the table in their process
         return _START + (answers.table if first else 0.0) + self.rows * answers.row(flat)
