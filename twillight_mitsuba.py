@@ -9,9 +9,12 @@ Import it at any time: with a variant set, that one is used; without one, the fa
 docs/mitsuba.md. Properties: `pipeline.mitsuba.worn` and `pipeline.mitsuba.integrator`.
 """
 
+from jobs.terminal import tracked
+from pipeline.mitsuba import integrator
 from pipeline.mitsuba.integrator import evaluated
 from pipeline.mitsuba.register import register
 
 __all__ = ["evaluated"]
 
+integrator.tracked = tracked
 register()

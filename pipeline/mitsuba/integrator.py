@@ -22,14 +22,12 @@ of u are a tenth of a yarn spacing by default. A ray that leaves a silhouette ag
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
-from rich.console import Console
-from rich.progress import track
 
 from pipeline.mitsuba.bsdf import BSDF, wears_cloth
 from pipeline.mitsuba.worn import PIXEL
@@ -46,6 +44,9 @@ MOST_RAYS: Final = 2**18
 
 MOST_SCATTER: Final = 0.5
 """Largest square of `scatter`, in radians squared: that of a direction drawn evenly from a hemisphere."""
+
+tracked: Callable[[Sequence[int], str], Iterable[int]] | None = None
+"""Returns the parts of a picture while it shows what is done; `twillight_mitsuba` sets it to a bar."""
 
 _STEP = 1e-3  # units of u
 
@@ -127,7 +128,7 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
                     means = (
                         super(TwillightPath, self).render(scene, sensor, seed + (number << 16), part, True, evaluate)
                         * (part / samples)
-                        for number, part in enumerate(_tracked(parts))
+                        for number, part in enumerate(tracked(parts, "rendering") if tracked else parts)
                     )
                     return sum(means)
             finally:
@@ -164,12 +165,6 @@ def ray_deviation(rfilter: Any, samples: int) -> float:
     weight = np.array([float(np.asarray(rfilter.eval(float(place))).item()) for place in x])
     spread = float((x * x) @ weight / weight.sum())
     return math.sqrt(max(PIXEL**2 - spread, PIXEL**2 / max(samples, 4)))
-
-
-def _tracked(parts: list[int]) -> Iterable[int]:
-    """Return parts with a bar on a terminal."""
-    console = Console(stderr=True)
-    return track(parts, "rendering", console=console, disable=not console.is_terminal, transient=True)
 
 
 def _refuse_meshes(mi: Any, scene: Any) -> None:
