@@ -21,7 +21,7 @@ LEAST_GAIN: Final = 0.05
 
 # Seconds of work that count as much as what is assumed before: of everything, of a stage, of a kind. The first tasks of
 # a run, which load kernels and are short, say little about other stages.
-_WEIGHTS: Final = (200.0, 30.0, 0.5)
+_WEIGHTS: Final = (60.0, 10.0, 0.5)
 _SURE_SHARE: Final = 0.2  # of a task under way, from which its own speed alone counts
 _LONGER: Final = 0.5  # a task that takes longer than estimated goes on for this share of its time
 _MOST_LOAD: Final = 0.02  # of the driver's time that goes into estimates
