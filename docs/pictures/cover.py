@@ -1,6 +1,6 @@
-"""Render the picture of README.md, reports/cover.jpg: one cloth from yarns of 50 pixels to yarns of half a pixel.
+"""Render the picture of README.md, reports/cover.jpg: one cloth, whose yarns are thick in front and sub-pixel far away.
 
-    make list && .venv/bin/python docs/pictures/cover.py      # needs LLVM for Mitsuba; 10 minutes of two free cores
+    make list && .venv/bin/python docs/pictures/cover.py      # needs LLVM for Mitsuba
 
 Tartan lies in folds up to the horizon, in low sun under an evening sky. The folds grow with the distance, so that near
 and far ones are as large in the picture. Nothing is random: the picture has no noise.
@@ -30,7 +30,7 @@ TURN: Final = math.radians(26.0)
 """Angle of the folds to the picture."""
 TOWARDS_SUN: Final = (-65.0, 21.0)
 """Azimuth from the view to the right, and height above the horizon, in degrees."""
-EXPOSURE: Final = 1.5
+EXPOSURE: Final = 1.9
 
 
 def folds(mi: Any) -> Any:
@@ -104,10 +104,10 @@ def rendered(size: tuple[int, int], side: int = 1) -> Any:
 
 def displayed(rgb: Any) -> Image.Image:
     """Return the picture with a soft shoulder, in sRGB."""
-    x = EXPOSURE * np.maximum(rgb, 0.0)
-    x = x * (1.0 + x / 9.0) / (1.0 + 0.55 * x)
+    x = (EXPOSURE * np.maximum(rgb, 0.0)) ** 1.15
+    x = x * (1.0 + x / 9.0) / (1.0 + 0.5 * x)
     return Image.fromarray((255.0 * np.clip(x, 0.0, 1.0) ** (1 / 2.2)).astype(np.uint8))
 
 
 if __name__ == "__main__":
-    displayed(rendered(SIZE)).save(HERE.parents[1] / "reports" / "cover.jpg", quality=84, optimize=True)
+    displayed(rendered(SIZE)).save(HERE.parents[1] / "reports" / "cover.jpg", quality=92, optimize=True)
