@@ -24,7 +24,7 @@ LIBRARIES = {
     "pipeline.shards": ["pyarrow"],
     "pipeline.storage": ["upath", "fsspec", "s3fs"],
     "pipeline.scenes": ["mitsuba", "drjit"],
-    "pipeline.mitsuba": ["mitsuba", "drjit", "rich"],
+    "pipeline.mitsuba": ["mitsuba", "drjit"],
     "pipeline.models": ["torch", "onnx", "onnxruntime", "safetensors"],
     "pipeline.training": ["torch", "safetensors"],
     "pipeline.shader": ["PIL"],

@@ -204,7 +204,7 @@ def test_tables_are_read_where_view_rays_end(options, choices, fabric, most, rat
 
 @pytest.mark.parametrize(
     ("options", "choices"),
-    [(SummedAreaOptions, AREAS), (PrefilteredOptions, {}), (MapMaterialOptions, {"size": 128})],
+    [(SummedAreaOptions, {"clusters": [16]}), (PrefilteredOptions, {}), (MapMaterialOptions, {"size": 128})],
 )
 def test_neither_wide_footprints_nor_views_from_above_see_parallax(options, choices):
     fabric = woven("denim")
