@@ -87,7 +87,7 @@ def _width(given: dict[str, Any], yarn: Mapping[str, Any], per_cm: Any, axis: in
     count = validated(Count, given, "")
     key = next(iter(given))
     if (count.tex is None) == (count.ne is None):
-        raise BadInput("", key, given[key], "give one of tex and ne with it")
+        raise BadInput("", key, given[key], "give exactly one of tex and ne")
     if "width" in yarn:
         raise BadInput("", "width", yarn["width"], f"follows from {key} and sett; leave it or {key} out")
     if per_cm is None:
