@@ -46,13 +46,17 @@ def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) ->
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names that are no UTF-8, terminals that show less
+    stops: list[KeyboardInterrupt] = []
     try:
-        with _signals():
+        with _signals(stops):
             answer = verb()
         sys.stdout.flush()
         return answer if isinstance(answer, int) else 0
     except (Exception, KeyboardInterrupt) as error:
-        return _handle(error, tokens, out)
+        wrapped = _wrapped(error)
+        known = isinstance(wrapped, BadInput | WorkFailed | KeyboardInterrupt)
+        # Compiled libraries report a stop as an error of their own, without its cause.
+        return _handle(stops[0] if stops and not known else error, tokens, out)
 
 
 def _handle(raised: BaseException, tokens: Sequence[str], out: Path) -> int:
@@ -114,16 +118,19 @@ class _Stopped(KeyboardInterrupt):
 
 
 @contextmanager
-def _signals() -> Iterator[None]:
-    """Turn SIGTERM and SIGHUP into `_Stopped`, so that what must be closed is closed."""
+def _signals(stops: list[KeyboardInterrupt]) -> Iterator[None]:
+    """Turn SIGTERM and SIGHUP into `_Stopped`, so that what must be closed is closed; `stops` receives those raised."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def stop(number: int, frame: object) -> None:
-        raise _Stopped(number)
+        stops.append(KeyboardInterrupt() if number == signal.SIGINT else _Stopped(number))
+        raise stops[-1]
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGHUP)}
+    # Where Ctrl-C is ignored, as in the background of a shell, it stays so.
+    interrupt = {signal.SIGINT} if signal.getsignal(signal.SIGINT) is signal.default_int_handler else set()
+    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGHUP, *interrupt)}
     try:
         yield
     finally:

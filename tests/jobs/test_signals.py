@@ -2,14 +2,29 @@
 
 import signal
 import time
+from pathlib import Path
 
 import pytest
 
+from jobs.exits import run_to_exit
 from tests.faults.runs import end, family, gone, start
 
-pytestmark = pytest.mark.external  # processes with clusters of dask
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
+def test_a_signal_in_a_library_that_hides_it_is_a_stop(number, code, capsys):
+    """As pydantic's compiled schemas do: they raise an error of their own, without its cause."""
+
+    def verb():
+        try:
+            signal.raise_signal(number)
+        except KeyboardInterrupt:
+            problem = ValueError("Error building validator")
+        raise problem
+
+    assert run_to_exit(verb, ["run"], Path("out")) == code and capsys.readouterr().err.startswith("stopped")
 
 
+@pytest.mark.external  # processes with clusters of dask
 def test_a_signal_ends_a_run_with_one_sentence(tmp_path):
     process = start("smoke", tmp_path / "out", verb="generate")
     time.sleep(3.0)
