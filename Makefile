@@ -66,7 +66,7 @@ test-slow: $(READY)
 faults: $(READY)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m faults tests/faults
 
-# A site of all presets in out/gallery: pictures, live pages, maps, samples, shaders and files. Takes half an hour.
+# A site of all presets in out/gallery: pictures, live pages, maps, samples, shaders and files. A fabric takes about a minute of one core.
 gallery: $(READY)
 	@$(BIN)/twillight gallery --out out/gallery
 

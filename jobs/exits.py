@@ -53,15 +53,12 @@ def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) ->
         sys.stdout.flush()
         return answer if isinstance(answer, int) else 0
     except (Exception, KeyboardInterrupt) as error:
-        wrapped = _wrapped(error)
-        known = isinstance(wrapped, BadInput | WorkFailed | KeyboardInterrupt)
-        # Compiled libraries report a stop as an error of their own, without its cause.
-        return _handle(stops[0] if stops and not known else error, tokens, out)
+        return _handle(error, stops, tokens, out)
 
 
-def _handle(raised: BaseException, tokens: Sequence[str], out: Path) -> int:
+def _handle(raised: BaseException, stops: Sequence[BaseException], tokens: Sequence[str], out: Path) -> int:
     """Print the sentence of an exception, and return the exit code."""
-    error = _wrapped(raised)
+    error = _wrapped(raised, stops)
     if isinstance(error, CycloptsError):
         return _end(_missing(error) or f"twillight: {error}", 2)
     if isinstance(error, BadInput | WorkFailed):
@@ -96,17 +93,17 @@ def _missing(error: CycloptsError) -> str:
     return f"{verb}: {name} {lacks}: {argument.parameter.help} See `twillight {verb} --help`"
 
 
-def _wrapped(raised: BaseException) -> BaseException:
+def _wrapped(raised: BaseException, stops: Sequence[BaseException]) -> BaseException:
     """Return the sentence or the stop that a library reported as its own error; else the exception itself.
 
-    Dr.Jit raises a RuntimeError from whatever ends a BSDF in Python.
+    Dr.Jit raises a RuntimeError from whatever ends a BSDF in Python; pydantic hides the cause, one of `stops`.
     """
     cause: BaseException | None = raised
     while cause is not None:
         if isinstance(cause, BadInput | WorkFailed | KeyboardInterrupt):
             return cause
         cause = cause.__cause__
-    return raised
+    return stops[0] if stops else raised
 
 
 class _Stopped(KeyboardInterrupt):

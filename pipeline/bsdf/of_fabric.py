@@ -3,9 +3,9 @@
 Every pair has the same few points of a Sobol sequence in the four dimensions of both directions, turned by random
 numbers of its own (Cranley and Patterson). A footprint covers the cloth evenly: no place counts more than another.
 
-The point model is not reciprocal: its diffuse part weighs the macro normal's cosine to the light (blend). A BSDF file
-has to be, so each pair is the mean of both ways. Light that goes straight through is a delta lobe; in a patch it is
-T / projected solid angle, with T the transparency.
+The truth is not reciprocal: the diffuse part of a point weighs the macro normal's cosine to the light (blend), and view
+rays see rims, which light does not meet. A BSDF file has to be, so each pair is the mean of both ways. Light that goes
+straight through is a delta lobe; in a patch it is T / projected solid angle, with T the transparency.
 """
 
 from __future__ import annotations
