@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from pipeline.models.analytic.summed_area import SummedAreaOptions
-from pipeline.models.registry import load_methods, load_model, pretrained_folder
+from pipeline.models.registry import load_methods
+from pipeline.models.selvage.model import Selvage
 
 
 @pytest.fixture(autouse=True)
@@ -20,5 +21,4 @@ def clusters():
 
 @pytest.fixture(scope="session")
 def selvage():
-    (method,) = load_model(pretrained_folder("selvage"))
-    return method
+    return Selvage()

@@ -11,7 +11,6 @@ from pipeline.models.curved import CurvedOptions
 from pipeline.models.network import Batch
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.registry import build_network
-from pipeline.models.selvage import SelvageOptions
 from pipeline.models.unified_btf import UnifiedBtfOptions
 from pipeline.models.woven import WovenOptions
 
@@ -23,7 +22,6 @@ SMALL = {
     "curved": CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_points=32, silhouette_sigma=(0.5, 8.0)),
     "unified_btf": UnifiedBtfOptions(**_BTF),
     "btf_autoencoder": BtfAutoencoderOptions(**_BTF),
-    "selvage": SelvageOptions(width=16, measured_rows=64),
 }
 """A small design of every network."""
 
