@@ -120,6 +120,7 @@ def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
     from pipeline.models.card import CARD
     from pipeline.models.method import faults as faults_of
     from pipeline.models.named import loaded
+    from pipeline.storage import place
 
     method, kinds = loaded(model, WHERE, "--model")
     if not method.covers(fabric):
@@ -139,7 +140,7 @@ def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
     if domain is None:
         who = f"the method {method.name} answers"
         return Answerer(answer, about, lambda queries: faults_of(queries, who, kinds) | faults(queries))
-    about["card"] = read_text(Path(model) / CARD, 8 * MIB, "a model card")
+    about["card"] = read_text(place(model, "--model") / CARD, 8 * MIB, "a model card")
     return Answerer(answer, about, lambda queries: domain.faults(queries, method.name) | faults(queries))
 
 
