@@ -19,7 +19,7 @@ from pipeline.analytic.importance.lobes import FLAKE_ROWS, POINT_ROWS, STRAIGHT,
 from pipeline.analytic.importance.mixture import density_rows
 from pipeline.analytic.importance.surface import LobeSurface
 from pipeline.analytic.soft_nodes.answer import SMALLEST
-from pipeline.analytic.soft_nodes.features import read_behind, read_queries
+from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.scenes.shade import coloured

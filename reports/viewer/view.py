@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.groups import COLUMNS, DETAILS, USUAL
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
 from pipeline.atomic import atomic_write

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.named import named_method
 from pipeline.scenes.shade import coloured, colours
