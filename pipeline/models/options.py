@@ -98,14 +98,6 @@ class Options(Design):
         """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
         return ()
 
-    without_training: ClassVar[frozenset[str]] = frozenset()
-    """Kinds of queries that it evaluates though no training has them, of `behind`, `stretch` and `curvature`."""
-    answers_outside: ClassVar[bool] = False
-    """True if it evaluates queries outside its domain too, in another way than those within."""
-
-    estimates_errors: ClassVar[bool] = False
-    """True if its methods have a function ``within(error)`` that returns the method at a wished error."""
-
     turns: ClassVar[bool] = False
     """True if it evaluates a viewer behind the cloth as one in front of the cloth's back, which is a fabric too."""
 

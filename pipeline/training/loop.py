@@ -90,7 +90,6 @@ def train(
         sets = [set_name(rows) for rows in options.extra_rows]
         extra = ([manifest.columns(manifest_folder, name, own) for name in fabrics] for own in sets)
         network = build_network(options, members, extra)
-        network.expect(len(rows.table))
         network.start_at(torch.from_numpy(rows.table[:: max(len(rows.table) // _START_ROWS, 1), TARGET].copy()))
         network.to(device).train()
         groups = network.parameter_groups(training.learning_rate)

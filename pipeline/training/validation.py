@@ -64,8 +64,7 @@ class HeldOut:
         query = {name: stacked(getattr(queries, name) for queries, _ in rows) for name in Queries._fields}
         target = stacked(answers.mean for _, answers in rows)
         transparency = stacked(answers.transparency for _, answers in rows)
-        row = torch.full((len(fabric), each), -1, device=device)
-        return Batch(fabric, **query, target=target, transparency=transparency, row=row)
+        return Batch(fabric, **query, target=target, transparency=transparency)
 
     def error_and_noise(self, weights: dict[str, Tensor]) -> tuple[float, float]:
         """Return the mean squared error over all components, as measured, and the truth's own; not without queries."""

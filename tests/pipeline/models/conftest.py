@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from pipeline.models.analytic.summed_area import SummedAreaOptions
-from pipeline.models.registry import load_methods, load_model, pretrained_folder
+from pipeline.models.registry import load_methods
 
 
 @pytest.fixture(autouse=True)
@@ -15,10 +15,4 @@ def _fixed_weights():
 @pytest.fixture(scope="session")
 def clusters():
     (method,) = load_methods(SummedAreaOptions(clusters=[64]))
-    return method
-
-
-@pytest.fixture(scope="session")
-def selvage():
-    (method,) = load_model(pretrained_folder("selvage"))
     return method

@@ -11,7 +11,6 @@ from pipeline.models.curved import CurvedOptions
 from pipeline.models.network import Batch
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.registry import build_network
-from pipeline.models.selvage import SelvageOptions
 from pipeline.models.unified_btf import UnifiedBtfOptions
 from pipeline.models.woven import WovenOptions
 
@@ -23,7 +22,6 @@ SMALL = {
     "curved": CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_points=32, silhouette_sigma=(0.5, 8.0)),
     "unified_btf": UnifiedBtfOptions(**_BTF),
     "btf_autoencoder": BtfAutoencoderOptions(**_BTF),
-    "selvage": SelvageOptions(width=16, measured_rows=64),
 }
 """A small design of every network."""
 
@@ -43,9 +41,8 @@ def card_of(fabric, domain=None):
 def batch_of(queries, target, fabric=0):
     """Return a step of a training with queries about one fabric; no light passes it unscattered."""
     columns = {name: torch.from_numpy(np.array(column))[None] for name, column in queries._asdict().items()}
-    through, row = torch.zeros(1, len(queries.u)), torch.full((1, len(queries.u)), -1)
-    target = torch.as_tensor(target)[None]
-    return Batch(torch.tensor([fabric]), **columns, target=target, transparency=through, row=row)
+    through = torch.zeros(1, len(queries.u))
+    return Batch(torch.tensor([fabric]), **columns, target=torch.as_tensor(target)[None], transparency=through)
 
 
 def descend(optimiser, steps, loss):
