@@ -40,10 +40,6 @@ EXTREME_TRUTH: Final = TruthOptions(estimator="owen", relative_error=0.01, min_c
 to 3 % with light at 89.9 degrees, where fewer points miss the few that shine."""
 
 
-WishedError = Annotated[float, Field(gt=0, lt=1)]
-"""A relative error."""
-
-
 _Kind = TypeVar("_Kind", bound=Frozen)
 
 
@@ -188,8 +184,6 @@ class RunOptions(Frozen):
     runtimes: tuple[RuntimeName, ...] = ()
     """Measure every trained network run in these ways too: errors, aliasing and time, of the same weights. What a
     machine cannot run is named on the page with the reason."""
-    wished_errors: Annotated[tuple[WishedError, ...], Field(max_length=16)] = ()
-    """Measure every network that estimates its errors (`selvage`) at these wished relative errors too."""
 
 
 StudyName = Literal[

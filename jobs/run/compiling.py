@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Final, NamedTuple
 
 from jobs.plan.task import Task, held
-from pipeline.models.catalogue import CLASSES
 from pipeline.models.options import Options
 from pipeline.truth.options import TruthOptions
 
@@ -84,7 +83,5 @@ def _estimators(task: Task) -> Iterator[str]:
 def _models(task: Task) -> Iterator[Options]:
     """Yield the models without training that a task names, with the first value of their parameter alone."""
     for options in held(task, Options):
-        if options.model == "selvage":  # corrects soft_nodes
-            yield CLASSES["soft_nodes"]()
-        elif not options.learns and options.model != "added":  # code from outside runs in a process of its own
+        if not options.learns and options.model != "added":  # code from outside runs in a process of its own
             yield options.single()[0]

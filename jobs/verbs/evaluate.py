@@ -59,7 +59,9 @@ def evaluate(
     queries: Annotated[Place, Parameter(help="Parquet file of queries, with the columns of a shard.")],
     *,
     out: Annotated[Place, Parameter(help="Parquet file to write.")],
-    model: Annotated[str | None, Parameter(help="Trained model, by name or folder, in place of the truth.")] = None,
+    model: Annotated[
+        str | None, Parameter(help="Model by name, or folder of a trained one, in place of the truth.")
+    ] = None,
     extrapolate: Annotated[bool, Parameter(help="Evaluate it also for yarns outside its training domain.")] = False,
     truth: Annotated[TruthFlags, Parameter(name="*")] = TruthFlags(),
     seed: Annotated[int, Parameter(help="Seed of the random numbers.")] = 0,
@@ -110,14 +112,19 @@ def evaluate(
 
 
 def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
-    """Return a trained model, by name or by its folder, prepared for a fabric.
+    """Return a model, by name or by the folder of a trained one, prepared for a fabric.
 
     BadInput if there is no such model, its files are damaged, or it does not cover the fabric; `extrapolate` accepts
     yarns outside the training domain.
     """
-    from pipeline.models.registry import covering_model, model_folder
+    from pipeline.models.card import CARD
+    from pipeline.models.method import faults as faults_of
+    from pipeline.models.named import loaded
+    from pipeline.storage import place
 
-    method = covering_model(model, fabric, WHERE, "--model")
+    method, kinds = loaded(model, WHERE, "--model")
+    if not method.covers(fabric):
+        raise BadInput(WHERE, "--model", model, f"this model was not trained on {fabric.name}")
     domain = getattr(method, "domain", None)
     if domain is not None and not extrapolate:
         domain.refuse_fabric(fabric, method.name)
@@ -129,10 +136,11 @@ def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
         answers = Answers.opaque(mean, np.zeros_like(mean), np.zeros(len(mean), np.int32))
         return answers._replace(transparency=through(fabric, queries)) if through else answers
 
-    card = read_text(model_folder(model, WHERE, "--model") / "card.json", 8 * MIB, "a model card")
-    about = {"model": method.name, "card": card}
+    about = {"model": method.name, "setting": method.setting}
     if domain is None:
-        return Answerer(answer, about)
+        who = f"the method {method.name} answers"
+        return Answerer(answer, about, lambda queries: faults_of(queries, who, kinds) | faults(queries))
+    about["card"] = read_text(place(model, "--model") / CARD, 8 * MIB, "a model card")
     return Answerer(answer, about, lambda queries: domain.faults(queries, method.name) | faults(queries))
 
 

@@ -24,7 +24,6 @@ from jobs.recipe.validation import table_refusal
 from pipeline.atomic import atomic_write
 from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.domain import PHYSICS
-from pipeline.models.options import setting_of
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
@@ -86,7 +85,7 @@ def write_recipe(
     named = Added(add).model_of(model.options) if isinstance(model.options, AddedMethod) else model.options.model
     general = general.trainer_of(model)
     queries = requirement.queries(model.options.kinds)
-    chosen = [k for k in model.options.settings if setting_of(k) == setting]
+    chosen = [k for k in model.options.settings if model.options.setting_of(k) == setting]
     worn = {name: fabrics[name] for name in requirement.fabrics}
     table: dict[str, Any] = {
         "name": f"require-{requirement.scene}",
@@ -180,7 +179,7 @@ def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
 
 
 def _model(
-    model: ModelRecipe, settings: list[int], effort: float, other: Mapping[str, Any] = MappingProxyType({})
+    model: ModelRecipe, settings: list[float], effort: float, other: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
     """Return a model's table without `model`, with the one setting in `settings`, if any, and a shortened training."""
     if isinstance(model.options, AddedMethod):
@@ -202,7 +201,7 @@ def _model(
 
 def _bench(general: Recipe, scene: str) -> dict[str, Any]:
     """Return the general recipe's measurements, of this scene and of the method as it is."""
-    bench = general.bench.model_copy(update={"bounds": False, "runtimes": (), "wished_errors": ()})
+    bench = general.bench.model_copy(update={"bounds": False, "runtimes": ()})
     found = bench.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     return found | {"scenes": found.get("scenes", {}) | {"names": [scene]}}
 

@@ -33,7 +33,6 @@ from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName
 from jobs.verbs.require_recipe import alone
 from pipeline.atomic import atomic_write
 from pipeline.models.card import read_card
-from pipeline.models.options import setting_of
 from pipeline.scenes.catalogue import load_scene
 from weaves.errors import BadInput
 
@@ -205,7 +204,7 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
 
 def _setting(model: ModelRecipe) -> str:
     """Return the first of a model's settings, of which a scene's recipe has one."""
-    return setting_of(next(iter(model.options.settings), None))
+    return next(map(model.options.setting_of, model.options.settings), "")
 
 
 def _elsewhere(scene: str, out: Path, models: Sequence[tuple[ModelRecipe, Recipe]]) -> Iterator[SceneSaving]:

@@ -17,6 +17,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.models.method import CHUNK_ROWS, Around, Method
 from pipeline.models.network import one_thread
 from pipeline.truth.query import Queries
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 
@@ -35,17 +36,26 @@ class AllCores(Around):
         super().__init__(method)
         self._threads = threads or cores()
 
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
-        """Answer N queries in runs of `CHUNK_ROWS`, float32 (N, 4); each run but the first has a seed of its own."""
+    def predict(
+        self, fabric: Fabric, queries: Queries, seed: int = 0, error: float | None = None, time: float | None = None
+    ) -> npt.NDArray[np.float32]:
+        """Answer N queries in runs of `CHUNK_ROWS`, float32 (N, 4); each run but the first has a seed of its own.
+
+        `error` or `time` are the wishes of a method that is asked (`pipeline.models.selvage`); BadInput by others.
+        """
+        wishes = {key: value for key, value in (("error", error), ("time", time)) if value is not None}
+        if wishes and not getattr(self.method, "asked", False):
+            key, value = next(iter(wishes.items()))
+            raise BadInput(self.name, key, value, f"leave it out: only selvage answers within a wished {key}")
         starts = range(CHUNK_ROWS, len(queries.u), CHUNK_ROWS)
 
         def answer(start: int) -> npt.NDArray[np.float32]:
             own = int(fingerprint([seed, start]), 16)
-            return self.method.predict(fabric, queries.take(slice(start, start + CHUNK_ROWS)), own)
+            return self.method.predict(fabric, queries.take(slice(start, start + CHUNK_ROWS)), own, **wishes)
 
         with one_thread():
             # Before any thread starts, the first run loads kernels and tabulates the fabric.
-            first = self.method.predict(fabric, queries.take(slice(CHUNK_ROWS)), seed)
+            first = self.method.predict(fabric, queries.take(slice(CHUNK_ROWS)), seed, **wishes)
             if not starts:
                 return first
             with ThreadPoolExecutor(self._threads) as pool:

@@ -10,8 +10,7 @@ whatever the network has learnt. With wi behind, the transmitted lobe takes the 
 to at most 1 as well. The specular bounds, reflected and transmitted, integrate together to what a white layer scatters
 once. So in the colours of any fabric (weaves.yarn) the four together, and what goes straight through, are at most 1.
 
-The bound costs one evaluation of the soft nodes, about a microsecond a query; `selvage` evaluates them anyway, and is
-bounded from the start.
+The bound costs one evaluation of the soft nodes, about a microsecond a query.
 
 A component above its bound gives the excess to the same component of the other yarn, as far as its bound allows. On
 unseen cloth networks predict the sum of both yarns better than the share of each: their errors in warp and weft have
@@ -32,7 +31,6 @@ from pipeline.compiled.arrays import nbytes
 from pipeline.models.analytic.soft_nodes import soft_tables
 from pipeline.models.domain import Domain
 from pipeline.models.method import Around, Method, in_chunks, refuse_other, row_by_row
-from pipeline.models.selvage.model import Selvage
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -89,10 +87,3 @@ def limited(components: npt.NDArray[np.float32], bounds: npt.NDArray[np.float32]
     """
     kept = np.minimum(components, bounds)
     return np.minimum(kept + (components - kept)[:, _OTHER_YARN], bounds)
-
-
-def counterpart(method: Method) -> Method:
-    """Return the method under the bound; of `selvage`, which is bounded, the same network without it."""
-    if isinstance(method, Selvage) and method.bound:
-        return method.with_bound(False)
-    return Bounded(method)

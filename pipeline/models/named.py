@@ -1,19 +1,19 @@
 """Methods by the names that people give on a command line.
 
-`selvage` is a model that comes with the package, `out/models/NAME` the folder of a trained one, `soft_nodes` a model
-that learns nothing, and `point_sampled:16` one of its settings. Without a setting the last one is taken, which is the
-most accurate. `selvage:.02` is that model at a wished relative error.
+`soft_nodes` is a model that learns nothing, `point_sampled:16` or `selvage:.02` one with a setting, and
+`out/models/NAME` the folder of a trained one. Without a setting a model's usual one is taken, or the last, which is the
+most accurate.
 """
 
 from __future__ import annotations
 
 from pipeline.models.card import CARD
 from pipeline.models.catalogue import CLASSES
+from pipeline.models.domain import Domain
 from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
 from pipeline.models.options import Options
-from pipeline.models.registry import load_methods, load_model, model_folder, pretrained_names
-from pipeline.models.selvage.model import Selvage
+from pipeline.models.registry import load_methods, load_model, model_folder
 from pipeline.storage import place
 from weaves.errors import BadInput
 from weaves.validation import validated
@@ -29,7 +29,7 @@ def untrained_names() -> list[str]:
 
 def named_method(name: str, where: str, key: str) -> Fallback:
     """Return a method that answers any query; others than its own go to the fallback. As `own_method` otherwise."""
-    return Fallback(*_loaded(name, where, key))
+    return Fallback(*loaded(name, where, key))
 
 
 def own_method(name: str, where: str, key: str) -> Method:
@@ -38,8 +38,7 @@ def own_method(name: str, where: str, key: str) -> Method:
     Parameters
     ----------
     name : str
-        Name of a model that comes with the package or learns nothing, with ``:k`` for a setting or ``:.02`` for a
-        wished error, or a folder.
+        Name of a model that learns nothing, with ``:k`` for a setting, or the folder of a trained one.
     where, key : str
         The verb or function and its option that name the method, for messages.
 
@@ -48,46 +47,32 @@ def own_method(name: str, where: str, key: str) -> Method:
     BadInput
         If there is no such method, it must be trained first, it has no such setting, or its files are damaged.
     """
-    return _loaded(name, where, key)[0]
+    return loaded(name, where, key)[0]
 
 
-def _loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
-    """Return a method and the kinds of queries that it knows."""
+def loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
+    """Return a method and the kinds of queries that it knows; parameters and errors as of `own_method`."""
     model, _, setting = name.partition(":")
     if model in untrained_names():
         options = _with_setting(CLASSES[model](), setting, where, key, name)
         return load_methods(options)[-1], options.kinds
-    if model in pretrained_names() and setting:
-        (trained,) = load_model(model_folder(model, where, key))
-        if not isinstance(trained, Selvage):
-            raise BadInput(where, key, name, f"{model} has no settings")
-        try:
-            chosen = trained.within(float(setting))
-        except ValueError as error:
-            allowed = "a relative error above 0 and below 1 after the colon is needed, such as :.02"
-            raise BadInput(where, key, name, allowed) from error
-        return chosen, _kinds(chosen)
-    if name in CLASSES and name not in pretrained_names() and not (place(name, key) / CARD).is_file():
+    if name in CLASSES and not (place(name, key) / CARD).is_file():
         raise BadInput(where, key, name, "must be trained first: name the folder of a trained one, out/models/…")
     (method,) = load_model(model_folder(name, where, key, [TRUTH, *untrained_names()]))
-    return method, _kinds(method)
+    domain: Domain | None = getattr(method, "domain", None)
+    return method, domain.kinds if domain else frozenset()
 
 
 def _with_setting(options: Options, setting: str, where: str, key: str, name: str) -> Options:
-    """Return options with one setting k, if one is named."""
-    if not setting:
+    """Return options with the one setting that is named, or the usual one."""
+    if not setting and options.usual_setting is None:
         return options
-    if not options.parameter or not setting.isdecimal() or len(setting) > 6:
-        allowed = f"a number k after the colon is needed, such as {options.model}:4"
-        raise BadInput(where, key, name, allowed if options.parameter else f"{options.model} has no settings")
+    if not options.parameter:
+        raise BadInput(where, key, name, f"{options.model} has no settings")
     try:
-        return validated(type(options), {options.parameter: [int(setting)]}, where)
+        chosen = options.read_setting(setting) if setting else options.usual_setting
+        return validated(type(options), {options.parameter: [chosen]}, where)
     except BadInput as error:
         raise BadInput(where, key, name, error.allowed) from error
-
-
-def _kinds(method: object) -> frozenset[str]:
-    """Return the kinds of queries that a trained method knows."""
-    domain = getattr(method, "domain", None)
-    trained: frozenset[str] = frozenset() if domain is None else domain.kinds
-    return trained | frozenset(getattr(method, "without_training", ()))
+    except ValueError as error:
+        raise BadInput(where, key, name, options.settings_allowed) from error

@@ -28,11 +28,6 @@ RoundFootprint = Literal["geometric_mean", "major"]
 """Round footprint in place of an ellipse: of equal area, or with its major axis."""
 
 
-def setting_of(k: int | None) -> str:
-    """Return the text of a setting k in Records, tables and names of files; empty if there is none."""
-    return "" if k is None else f"k = {k}"
-
-
 class Design(Frozen):
     """A design: options, and choices that are no options but part of its identity."""
 
@@ -103,14 +98,32 @@ class Options(Design):
 
     parameter: ClassVar[str] = ""
     """Name of the field with the settings k, which trade speed for accuracy; empty if there is none."""
+    usual_setting: ClassVar[float | None] = None
+    """Setting of a method that is named without one; None: the last, which is the most accurate."""
+    settings_allowed: ClassVar[str] = "a number k after the colon is needed, such as :4"
+    """What a setting on a command line must be."""
 
     @property
-    def settings(self) -> tuple[int, ...]:
-        """Settings k, each a method of its own; empty for a model without them.
-
-        The seconds of a prediction are those of k = 1.
-        """
+    def settings(self) -> tuple[float, ...]:
+        """Settings k, each a method of its own; empty for a model without them."""
         return tuple(getattr(self, self.parameter)) if self.parameter else ()
+
+    @property
+    def work(self) -> float:
+        """Work of all settings, in units of what a prediction takes `seconds` for: that of k = 1."""
+        return sum(self.settings) or 1.0
+
+    @classmethod
+    def read_setting(cls, text: str) -> float:
+        """Return the setting that a text on a command line names; ValueError if it names none."""
+        if not text.isdecimal() or len(text) > 6:
+            raise ValueError(text)
+        return int(text)
+
+    @classmethod
+    def setting_of(cls, setting: float) -> str:
+        """Return the text of a setting in Records, tables and names of files."""
+        return f"k = {setting}"
 
     @property
     def variant(self) -> str:

@@ -45,38 +45,27 @@ def module_of(model: str) -> ModuleType:
     return import_module(f"pipeline.models.{model}.model")
 
 
-def pretrained_folder(model: str) -> Path:
-    """Return the folder of the weights that come with the package for a model."""
-    return Path(__file__).parent / model / "pretrained"
-
-
-def pretrained_names() -> list[str]:
-    """Return the names of the models that come with the package, trained."""
-    return sorted(path.parents[1].name for path in Path(__file__).parent.glob(f"*/pretrained/{CARD}"))
-
-
 def model_folder(model: str, where: str, key: str, others: Iterable[str] = ()) -> Path:
     """Return the folder of a trained model.
 
     Parameters
     ----------
     model : str
-        Name of one that comes with the package, or path of a folder with ``model.safetensors`` and ``card.json``.
+        Path of a folder with ``model.safetensors`` and ``card.json``.
     where, key : str
         The function or verb and its argument that name the model, for messages.
     others : iterable of str
-        Names that are allowed there beside those of the package's models.
+        Names that are allowed there too.
 
     Raises
     ------
     BadInput
         If there is no such model.
     """
-    known = pretrained_names()
-    folder = pretrained_folder(model) if model in known else place(model, key)
+    folder, names = place(model, key), list(others)
     if not (folder / CARD).is_file():
-        names = nearest(model, [*known, *others])
-        raise BadInput(where, key, model, f"the folder of a trained model or a name is needed; {names}")
+        allowed = f" or a name is needed; {nearest(model, names)}" if names else " is needed"
+        raise BadInput(where, key, model, f"the folder of a trained model{allowed}")
     return folder
 
 
@@ -161,14 +150,6 @@ def load_model(folder: Path) -> list[Method]:
         allowed = "is a network from outside the package, whose code is not here: measure it with --add"
         raise BadInput(str(folder / CARD), "name", card.get("name"), allowed)
     return load_methods(validated(_Card, card, str(folder / CARD)).options, [folder])
-
-
-def covering_model(model: str, fabric: Fabric, where: str, key: str) -> Method:
-    """Return the trained model of a name or folder, as `model_folder` and `load_model`; BadInput for other fabrics."""
-    (method,) = load_model(model_folder(model, where, key))
-    if not method.covers(fabric):
-        raise BadInput(where, key, model, f"this model was not trained on {fabric.name}")
-    return method
 
 
 def _read(folder: Path, options: Any) -> tuple[dict[str, Any], dict[str, Tensor]]:

@@ -10,7 +10,7 @@ from typing import Final
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.folders import own_files
 from pipeline.models.neumip.model import Neumip
-from pipeline.models.registry import covering_model
+from pipeline.models.registry import load_model, model_folder
 from pipeline.models.runtimes import no_onnx
 from pipeline.shader.descriptor import GOLDEN, Shader, vectors
 from pipeline.shader.languages import ALL, LANGUAGES, ONNX, SOURCE, compiler_for, refuse_unknown, translate
@@ -127,8 +127,10 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
         levels = ", ".join(map(str, DETAILS))
         allowed = f"chooses a level for each query and has no shader: export {SOFT_NODES} at one --level of {levels}"
         raise BadInput("export", "model", model, allowed)
-    method = covering_model(model, fabric, "export", "model")
-    if isinstance(method, Neumip):
-        return neumip_shader(method, fabric, level, kinds)
-    allowed = f"has no shader; {SOFT_NODES} and the folder of a trained {NEUMIP} have one"
-    raise BadInput("export", "model", model, allowed)
+    (method,) = load_model(model_folder(model, "export", "model", [SOFT_NODES]))
+    if not isinstance(method, Neumip):
+        allowed = f"has no shader; {SOFT_NODES} and the folder of a trained {NEUMIP} have one"
+        raise BadInput("export", "model", model, allowed)
+    if not method.covers(fabric):
+        raise BadInput("export", "model", model, f"this model was not trained on {fabric.name}")
+    return neumip_shader(method, fabric, level, kinds)

@@ -117,8 +117,9 @@ class Measurement(Task):
         """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
         code, ways = {*self.code}, list(held(self, RunOptions))
         code |= {"bound"} if any(one.bounds for one in ways) else set()
-        code |= {"fallback"} if any(one.wished_errors for one in ways) else set()
-        models = {model.options.name: model.options.version for model in held(self, Trained)}
+        options = [model.options for model in held(self, Trained)]
+        code |= {"fallback"} if any(one.model == "selvage" for one in options) else set()
+        models = {one.name: one.version for one in options}
         numbers = {**vars(versions), "BENCH": catalogue.BENCH}
         return {name: numbers[name.upper()] for name in code} | models
 

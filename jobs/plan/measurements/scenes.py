@@ -11,7 +11,7 @@ from jobs.plan.measurements.subjects import Subjects, Trained
 from jobs.plan.task import Made, Place, Progress, TaskPart
 from jobs.plan.truth_cost import TruthCost
 from pipeline.fingerprint import file_sha256
-from pipeline.models.options import RoundFootprint, setting_of
+from pipeline.models.options import RoundFootprint
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.scene import Cloth
 from pipeline.scenes.sources import files, worn
@@ -179,7 +179,7 @@ class _OnShot(Measurement):
     @property
     def subjects(self) -> tuple[str, ...]:
         """Model, scene and setting."""
-        return (*super().subjects, *(setting_of(k) for k in self.model.options.settings))
+        return (*super().subjects, *map(self.model.options.setting_of, self.model.options.settings))
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:

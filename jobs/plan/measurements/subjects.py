@@ -13,7 +13,7 @@ from jobs.plan.task import PLACE, Made, Place, TaskPart
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline.models.catalogue import ModelOptions
-from pipeline.models.options import RoundFootprint, setting_of
+from pipeline.models.options import RoundFootprint
 from reports.options import BenchOptions, Role, RunOptions, select
 from weaves.fabric import Fabric
 
@@ -69,14 +69,15 @@ class Trained(TaskPart):
         return f"{self.options.name}, seed {self.seed}" if self.seed else self.options.name
 
     def shown(self, counts: Sequence[int]) -> tuple[str, ...]:
-        """Return the settings that pictures are made of: those with a number of points in `counts`, or the only one."""
-        settings = self.options.settings
-        return tuple(setting_of(k) for k in settings if k in counts) if settings else (self.options.variant,)
+        """Return the settings that pictures are made of: numbers of points in `counts`, the usual or the only one."""
+        settings, usual = self.options.settings, self.options.usual_setting
+        shown = (self.options.setting_of(k) for k in settings if k in counts or k == usual)
+        return tuple(shown) if settings else (self.options.variant,)
 
     def seconds(self, queries: float, fabrics: float = 1.0) -> float:
         """Return the estimated seconds in which one core answers queries with every setting, of so many fabrics."""
-        settings = sum(self.options.settings) or 1  # tables of all of them share what takes longest
-        return fabrics * self.options.prepare_seconds + queries * self.options.seconds[1] * settings
+        # Tables of all settings share what takes longest.
+        return fabrics * self.options.prepare_seconds + queries * self.options.seconds[1] * self.options.work
 
     def methods(self, out: Path) -> list[Method]:
         """Load its methods, one a setting."""
@@ -88,21 +89,17 @@ class Trained(TaskPart):
         """Load its methods so that they answer any query."""
         from pipeline.models.fallback import Fallback
 
-        kinds = self.options.kinds | self.options.without_training
-        return [Fallback(one, kinds, footprint) for one in self.methods(out)]
+        return [Fallback(one, self.options.kinds, footprint) for one in self.methods(out)]
 
     def variants(self, methods: Sequence[Method], ways: RunOptions) -> list[Method]:
-        """Return trained methods with or without an energy bound, in other runtimes, and at wished errors."""
+        """Return trained methods with or without an energy bound, and in other runtimes."""
         if not self.networks:
             return []
-        from pipeline.models.bounded import counterpart
+        from pipeline.models.bounded import Bounded
         from pipeline.models.runtimes import runs
-        from pipeline.models.selvage.model import Selvage
 
-        others = [counterpart(one) for one in methods if ways.bounds]
-        others += [run for one in methods for run in runs(one, ways.runtimes)]
-        estimating = [one for one in methods if isinstance(one, Selvage)]
-        return others + [one.within(error) for one in estimating for error in ways.wished_errors]
+        others: list[Method] = [Bounded(one) for one in methods if ways.bounds]
+        return others + [run for one in methods for run in runs(one, ways.runtimes)]
 
 
 @dataclass(frozen=True)
@@ -138,7 +135,6 @@ class ModelSubject:
         """Return the ways to use the networks that are measured too; other runtimes only of the first seed."""
         ways = select(RunOptions, self.recipe.measured(bench))
         unused = {} if self.is_first else {"runtimes": ()}
-        unused |= {} if self.recipe.options.estimates_errors else {"wished_errors": ()}
         return ways.model_copy(update=unused)
 
 

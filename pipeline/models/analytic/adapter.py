@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.method import Method, refuse_other
-from pipeline.models.options import Gaussian, Options, setting_of
+from pipeline.models.options import Gaussian, Options
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -55,7 +55,7 @@ class Analytic(Generic[Table]):
         read: Callable[[Table, Queries, int], Float32],
         stored: Callable[[Any], int] = nbytes,
     ) -> None:
-        self.name, self.setting = options.name, setting_of(k)
+        self.name, self.setting = options.name, "" if k is None else options.setting_of(k)
         self._kinds, self._tables, self._read, self._stored = options.kinds, tables, read, stored
 
     def covers(self, fabric: Fabric) -> bool:

@@ -1,75 +1,64 @@
-"""`selvage`: soft nodes corrected by one small network for all fabrics; its options."""
+"""`selvage`: a wished error or time, and the cheapest answer that keeps it; its options."""
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
 
 from pydantic import Field
 
-from pipeline.models.analytic.soft_nodes import Level
-from pipeline.models.options import Gaussian, Options
+from pipeline.models.analytic.adapter import AnalyticOptions
 from pipeline.truth.options import Walls
 
+if TYPE_CHECKING:
+    from pipeline.models.selvage.model import Selvage
 
-class SelvageOptions(Options):
-    """Soft nodes corrected by a residual perceptron: one network for many fabrics and scales; own design."""
+USUAL_ERROR: Final = 0.02
+"""Wished error of a method that is named without one."""
 
-    fixed: ClassVar[tuple[str, ...]] = (
-        "layers",
-        "finest",
-        "dark",
-        "error_weight",
-        "specular_colour",
-        "diffuse_colour",
-        "colour_weight",
-    )
-    seconds: ClassVar[tuple[float, float]] = (2e-5, 2.5e-6)
-    prepare_seconds: ClassVar[float] = 1.2
-    without_training: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
-    answers_outside: ClassVar[bool] = True
-    estimates_errors: ClassVar[bool] = True
+WishedError = Annotated[float, Field(gt=0, lt=1)]
+"""A relative error of the colour."""
+
+
+class SelvageOptions(AnalyticOptions):
+    """Soft nodes of the level that each query needs for a wished error, or the fallback; nothing is trained."""
+
+    parameter: ClassVar[str] = "errors"
+    usual_setting: ClassVar[float] = USUAL_ERROR
+    settings_allowed: ClassVar[str] = "a relative error above 0 and below 1 after the colon is needed, such as :.02"
     turns: ClassVar[bool] = True
+    seconds: ClassVar[tuple[float, float]] = (0.0, 1e-6)
+    prepare_seconds: ClassVar[float] = 4.0
 
     model: Literal["selvage"] = "selvage"
-    width: Literal[16, 32, 64] = 64
-    """Width of the hidden layers."""
-    level: Level = 2
-    """Level of detail of its soft nodes."""
-    error_width: Literal[16, 32, 64] = 32
-    """Width of the hidden layer of the network that estimates errors."""
-    exchange: bool = True
-    """Exchange warp and weft in a random half of the training steps."""
-    measured_rows: int = Field(default=1024, ge=16, le=2**20)
-    """Queries of each training fabric over which features are normalised to mean 0 and deviation 1."""
-    bound: bool = True
-    """Bound each component by the answer of the soft nodes without shadows: no diffuse light is then gained."""
-    footprint: Gaussian = "gaussian"
+    errors: list[WishedError] = Field(default=[0.1, 0.05, 0.02, 0.01], min_length=1, max_length=16)
+    """Wished relative errors of a grey cloth's colour; each is a row of the tables."""
     parallax: Literal[True] = True
-    """The footprints of its soft nodes are patches of view rays."""
+    """Footprints are patches of view rays."""
     walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
 
-    layers: ClassVar[int] = 2
-    """Hidden layers."""
-    finest: ClassVar[Level] = 8
-    """Level of detail of the soft nodes whose error is estimated beside its own."""
-    dark: ClassVar[float] = 0.1
-    """Colour well above which squared errors are divided by the colour, and well below which they are not."""
-    error_weight: ClassVar[float] = 1e-5
-    """Weight of the loss of the estimated errors, which share no weights with the correction."""
-    specular_colour: ClassVar[float] = 0.3
-    """Colour of the specular components in the loss."""
-    diffuse_colour: ClassVar[float] = 0.5
-    """Colour of the diffuse components in the loss."""
-    colour_weight: ClassVar[float] = 1.0
-    """Weight of the squared error of the whole colour beside those of the components."""
-
-    @property
-    def rims(self) -> bool:
-        """True if view rays that meet a wall see a rim."""
-        return self.walls == "rim"
-
     @property
     def kinds(self) -> frozenset[str]:
-        """Footprints of any shape: the soft nodes weigh an ellipse, not the network."""
-        return frozenset({"stretch"})
+        """Footprints of any shape, light from behind, and curved cloth."""
+        return frozenset({"stretch", "behind", "curvature"})
+
+    @property
+    def work(self) -> float:
+        """Work of all settings: an error of .1 takes that of one soft node level, smaller ones more."""
+        return sum(0.1 / error for error in self.errors)
+
+    @classmethod
+    def read_setting(cls, text: str) -> float:
+        """Return the wished error that a text names."""
+        return float(text)
+
+    @classmethod
+    def setting_of(cls, setting: float) -> str:
+        """Return the text of a wished error."""
+        return f"error {100 * setting:g} %"
+
+    def methods(self) -> list[Selvage]:
+        """Return one method for each wished error."""
+        from pipeline.models.selvage.model import Selvage
+
+        return [Selvage(error, self.name, self.walls) for error in self.errors]

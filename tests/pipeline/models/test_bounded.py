@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.models.bounded import Bounded, counterpart, limited
+from pipeline.models.bounded import Bounded, limited
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from tests.directions import sphere, unit
@@ -59,7 +59,7 @@ def test_all_four_sums_of_the_brightest_method_stay_within_those_of_the_point_mo
 
 
 def test_it_is_named_apart_and_refuses_curved_cloth():
-    bounded, fabric = counterpart(FakeMethod()), load_fabric("voile")
+    bounded, fabric = Bounded(FakeMethod()), load_fabric("voile")
     assert (bounded.name, bounded.setting) == ("fake", "bounded")
     assert bounded.bytes_stored(fabric) > 48
     with pytest.raises(BadInput, match="flat cloth"):

@@ -13,7 +13,7 @@ LIGHTS = np.array([[0.6, 0.0, 0.8], [0.6, 0.0, -0.8]])
 @pytest.mark.parametrize(
     ("name", "found"),
     [
-        ("selvage", ("selvage", "")),
+        ("selvage", ("selvage", "error 2 %")),
         ("selvage:.02", ("selvage", "error 2 %")),
         ("soft_nodes", ("soft_nodes", "k = 8")),
         ("soft_nodes:1", ("soft_nodes", "k = 1")),

@@ -54,8 +54,10 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(refusal, monke
     refusal(CLOTH, *shader, str(tmp_path / "woven"))
     monkeypatch.setattr(verb, "no_onnx", lambda: "not installed: onnxscript")
     assert "not installed: onnxscript" in refusal(CLOTH, *shader, neumip, "--language", "onnx")
-    monkeypatch.setattr(verb, "covering_model", lambda *_: object())
-    assert "has no shader; soft_nodes and the folder of a trained neumip" in refusal(CLOTH, *shader, "woven")
+    monkeypatch.setattr(verb, "load_model", lambda _: [object()])
+    assert "has no shader; soft_nodes and the folder of a trained neumip" in refusal(
+        CLOTH, *shader, str(tmp_path / "woven")
+    )
     assert not (tmp_path / "x").exists()
 
 
