@@ -120,8 +120,8 @@ def test_the_names_of_runtimes_are_those_of_the_models():
 def test_no_method_answers_what_cannot_be_in_any_precision(cloth):
     """Finite, never negative, a million yarns away exactly the same, and beyond a hundred repeats the average."""
     torch.manual_seed(0)
-    texture = NeumipNetwork(SMALL["neumip"], cloth.weave.repeat)
-    methods = [Woven(WovenNetwork(WovenOptions(map_texels=16))), Neumip({fingerprint(cloth.optics()): texture})]
+    methods = [Woven(WovenNetwork(WovenOptions(map_texels=16)))]
+    methods += [Neumip({fingerprint(cloth.optics()): NeumipNetwork(SMALL["neumip"], cloth.weave.repeat)})]
     methods += [*load_methods(SoftNodesOptions()), *load_methods(PrefilteredOptions())]
     families = [[one, *runs(one, EXTREME_PRECISIONS)] for one in methods]
     values, curves = {}, {}

@@ -153,7 +153,7 @@ def test_facts_name_trainings_unseen_fabrics_and_the_energy_bound():
     errors = pd.DataFrame({"method": ["woven", "neumip", "soft_nodes"], "setting": "", "zero_answers": 0.0})
     errors = errors.assign(role="unseen", fabrics=[9, 1, 1])
     values = told.facts([], errors.assign(seeds=[1, 3, 0]))
-    assert (values["once"], values["several"], values["training_counts"]) == ("woven", "neumip", "3")
+    assert (values["once"], values["several"], values["training_counts"]) == ("woven", "NeuMIP", "3")
     assert values["unseen_fabrics"] == 9 and "one_unseen" not in values and "bounded" not in values
     values = told.facts([], errors.assign(seeds=0, fabrics=1, setting=told.BOUNDED))
     assert values["one_unseen"] == "One" and values["bounded"] and "once" not in values and "several" not in values
