@@ -50,6 +50,8 @@ class SelvageOptions(AnalyticOptions):
     @classmethod
     def read_setting(cls, text: str) -> float:
         """Return the wished error that a text names."""
+        if not 0.0 < float(text) < 1.0:
+            raise ValueError(text)
         return float(text)
 
     @classmethod

@@ -1,15 +1,18 @@
-"""Which answer each query gets: the cheapest within a wished error, or the best within a wished mean time.
+"""Which answer each query gets: one price of time for all queries, by the wished error or the wished time.
 
-Within a time the sum of the expected squared errors is least where every query takes the answer of least
+Of all choices with a given sum of expected squared errors, that one takes least time in which every query takes the
+answer of least
 
     E[e^2] + price * seconds
 
-at one price for all queries, that at which the mean time is the wished one: a bisection finds it.
+For a wished error the price is the highest at which the root mean square over a cloth's probes, footprints of all sizes
+(`cloth_numbers.probes`), is at most the wished error: a curve over prices, once for each cloth and case. A query's
+answer then depends on the query, the cloth and the wish alone. For a wished time it is the least at which the mean time
+of the queries asked about is at most the wished one.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
@@ -17,32 +20,39 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import kernel
-from pipeline.models.selvage.errors import TERMS, case_of, contiguous, log_error, write_terms
-from pipeline.truth.query import Queries
 
 Chosen = npt.NDArray[np.uint8]
 """Answers of N queries, (N,): numbers of levels from the cheapest on, then of the fallback."""
 
-_SAMPLE: Final = 512  # queries that the price is found on
-_STEPS: Final = 30  # halvings of the range of prices
+PRICES: Final = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 400)])
+"""Prices of a second, in squared errors."""
+
+_SAMPLE: Final = 512  # queries that the price of a wished time is found on
 _RAISE: Final = 1.02  # of the price, if all queries take longer at it than the sample did
 
 
-def within_error(queries: Queries, coefficients: Float32, error: float) -> Chosen:
-    """Return the first answer of each of N queries whose expected error is at most `error`, or the best one."""
-    chosen = np.empty(len(queries.u), np.uint8)
-    limit = np.float32(2.0 * math.log(error))
-    _choose_within(contiguous(queries), coefficients, np.empty(TERMS, np.float32), limit, chosen)
-    return chosen
+def error_curve(squares: Float32, kinds: Index, seconds: Float64) -> Float64:
+    """Return the mean expected squared error of some queries at all PRICES; columns as for `within_time`."""
+    chosen, rows = np.empty(len(squares), np.uint8), np.arange(len(squares))
+    curve = []
+    for price in PRICES:
+        choose_at(squares, kinds, price * seconds, chosen)
+        curve.append(squares[rows, chosen].mean(dtype=np.float64))
+    return np.maximum.accumulate(curve)
 
 
-def within_time(logarithms: Float32, kinds: Index, seconds: Float64, time: float) -> Chosen:
+def price_of(curve: Float64, error: float) -> float:
+    """Return the highest price at which the root mean square is at most `error`; 0, the best answers, if none is."""
+    return float(PRICES[max(0, np.searchsorted(curve, error**2, side="right") - 1)])
+
+
+def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -> Chosen:
     """Return the answers of least summed squared error whose mean time is at most `time`, which is possible.
 
     Parameters
     ----------
-    logarithms : float32 (N, answers)
-        Of the expected squared errors.
+    squares : float32 (N, answers)
+        Expected squared errors.
     kinds : int64 (N,)
         Rows of `seconds`.
     seconds : float64 (kinds, answers)
@@ -50,45 +60,34 @@ def within_time(logarithms: Float32, kinds: Index, seconds: Float64, time: float
     time : float
         Mean seconds of a query, at least those of the cheapest answers.
     """
-    squares, chosen = np.exp(logarithms), np.empty(len(logarithms), np.uint8)
-    if _choose_at(squares, kinds, seconds, 0.0, chosen) <= time:
-        return chosen
-    every = max(1, len(squares) // _SAMPLE)
-    some, some_kinds = squares[::every], kinds[::every]
-    low, high = math.log(1e-6), math.log(1e12)  # of the price of a second, in squared errors
-    for _ in range(_STEPS):
-        middle = 0.5 * (low + high)
-        over = _choose_at(some, some_kinds, seconds, math.exp(middle), chosen) > time
+    chosen, every = np.empty(len(squares), np.uint8), max(1, len(squares) // _SAMPLE)
+    some = np.ascontiguousarray(squares[::every]), np.ascontiguousarray(kinds[::every])
+    low, high = 0, len(PRICES) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        over = _mean_seconds(*some, seconds, PRICES[middle], chosen[: len(some[0])]) > time
         low, high = (middle, high) if over else (low, middle)
-    price = math.exp(high)
-    while _choose_at(squares, kinds, seconds, price, chosen) > time and price < 1e13:
-        price *= _RAISE
+    price = PRICES[low]
+    while _mean_seconds(squares, kinds, seconds, price, chosen) > time and price < np.inf:
+        price = max(_RAISE * price, PRICES[1])
     return chosen
 
 
-@kernel
-def _choose_within(queries: Queries, coefficients: Float32, terms: Float32, limit: np.float32, chosen: Chosen) -> None:
-    """Write the first answer whose logarithm is at most the limit, or that of the least."""
-    for n in range(len(chosen)):
-        write_terms(queries, n, terms)
-        least, case = np.float32(np.inf), case_of(queries, n)
-        for answer in range(coefficients.shape[1]):
-            value = log_error(coefficients, case, answer, terms)
-            if value < least:
-                least, chosen[n] = value, answer
-            if value <= limit:
-                break
+def _mean_seconds(squares: Float32, kinds: Index, seconds: Float64, price: float, chosen: Chosen) -> float:
+    """Write the answers at a price; return their mean seconds."""
+    if price == np.inf:
+        chosen[:] = seconds[kinds].argmin(axis=1)
+    else:
+        choose_at(squares, kinds, price * seconds, chosen)
+    return float(seconds[kinds, chosen].mean())
 
 
 @kernel
-def _choose_at(squares: Float32, kinds: Index, seconds: Float64, price: float, chosen: Chosen) -> float:
-    """Write the answers of least squared error and price; return their mean seconds."""
-    total = 0.0
+def choose_at(squares: Float32, kinds: Index, priced: Float64, chosen: Chosen) -> None:
+    """Write the answer of each query with the least squared error plus price of its kind, (kinds, answers)."""
     for n in range(len(squares)):
         least, kind = np.inf, kinds[n]
         for answer in range(squares.shape[1]):
-            value = squares[n, answer] + price * seconds[kind, answer]
+            value = squares[n, answer] + priced[kind, answer]
             if value < least:
                 least, chosen[n] = value, answer
-        total += seconds[kind, chosen[n]]
-    return total / len(squares)

@@ -1,6 +1,7 @@
-"""Seconds of each answer on this machine by kind of query, measured once in a process, when a time is first wished.
+"""Seconds of each answer by kind of query: a case of `errors` and a range of sizes, in which times hardly differ.
 
-A kind is a case of `errors` and a range of sizes: within one of these the time of a query hardly changes.
+For a wished error they are `USUAL` ones, so that the choice depends on no machine: ratios count, and errors hardly
+depend on them. For a wished time they are measured, once in a process.
 """
 
 from __future__ import annotations
@@ -24,6 +25,18 @@ Answer = Callable[[Fabric, Queries, int], object]
 
 _ENDS: Final = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # of standard deviations, in yarn spacings
 _SIZES: Final = len(_ENDS) - 1
+USUAL: Final = np.array(
+    [
+        [7.0e-6, 7.6e-6, 9.2e-6, 1.0e-5, 2.4e-4],
+        [6.7e-6, 1.0e-5, 1.2e-5, 1.9e-5, 2.7e-4],
+        [2.0e-6, 7.1e-6, 2.4e-5, 3.5e-5, 9.2e-5],
+        [1.8e-6, 4.1e-6, 8.0e-6, 1.5e-5, 6.1e-5],
+        [7.3e-7, 8.5e-7, 1.2e-6, 2.0e-6, 1.6e-5],
+    ]
+    * CASES
+)
+"""Seconds of a query on one core of 2026, by kind and answer, for light in front of flat cloth."""
+
 _ROWS: Final = (1024, 1024, 1024, 1024, 64)  # queries a timed call, by answer
 _CALLS: Final = 3  # after one that loads kernels and tables; the fastest counts
 _SEED: Final = 0x5EC5

@@ -1,20 +1,23 @@
-"""Expected errors of each answer to a query, from the query and the cloth alone: a table learnt once for all cloths.
+"""Expected errors of each answer to a query, before any of them is evaluated: a table learnt once for all cloths.
 
 The mean squared error of a level of soft nodes, or of the fallback, is the exponential of a polynomial in logarithms of
-the query: size and length of its footprint, inclinations of viewer and light, bend across the footprint. Its
-coefficients are linear in numbers of the cloth, so that a cloth turns the table into its own coefficients once:
+the query: size and length of its footprint, inclinations of viewer and light, bend of the cloth. Its coefficients are
+linear in numbers y of the cloth, so that a cloth turns the table C into coefficients of its own, once:
 
     log E[e^2] = sum_t x_t(query) sum_z C_tz y_z(cloth)
 
-An error e is that of a grey cloth's colour, relative to the true colour plus `FLOOR`. Light in front and behind, flat
-and curved cloth have a table each (`pipeline.models.selvage.fit_errors` makes them).
+An error e is that of a grey cloth's colour, relative to the true colour plus a floor. The numbers of a cloth say how
+far its answers differ from one another, on some queries of flat cloth: logarithms of root mean squares, for each side
+of the light. No truth is needed for them. tests/fits/fit_selvage_errors.py makes the table from random cloths.
+
+Of curved cloth the fallback has larger errors than the finest nodes, and is never taken.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Final
 
@@ -22,32 +25,31 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import kernel
+from pipeline.models.selvage.cloth_numbers import NUMBERS, cloth_numbers
+from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-FLOOR: Final = 0.05
-"""Colour added to the colour that errors are relative to: a third of that of a usual cloth."""
-
-GREY: Final = (0.3, 0.3, 0.5, 0.5)
-"""Weights of the four components in a grey cloth's colour."""
-
 TABLE: Final = Path(__file__).with_name("errors.json")
-"""The table of all cloths."""
+"""The table of all cloths, C: cases, answers, TERMS for the number 1 and OF_CLOTH for each of the others."""
 
-ANSWERS: Final = 5
-"""Answers: soft nodes of four levels, from the cheapest on, and the fallback."""
+OF_CLOTH: Final = (0, 1, 4)
+"""Terms whose coefficients depend on the cloth: the constant one, size, inclination of the viewer."""
 
 TERMS: Final = 15
 """Terms of the polynomial."""
 
+CASES: Final = 4
+"""Cases, each with coefficients of its own: light in front, behind; curved cloth with light in front, behind."""
+
+CURVED: Final = 2
+"""First case of curved cloth."""
+
 _LEAST_COSINE = np.float32(0.03)  # lower directions are as this one
 _SMALLEST, _LARGEST = np.float32(math.log(0.03)), np.float32(math.log(16.0))  # sizes beyond are as these
 _BENDS = np.float32(30.0)  # of flat cloth on: curvature well above which errors are of another kind
+_NEVER = 50.0  # logarithm of an error that no wish allows
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-
-
-CASES: Final = 4
-"""Cases, each with coefficients of its own: light in front, behind; curved cloth with light in front, behind."""
 
 
 def cases_of(queries: Queries) -> Index:
@@ -74,35 +76,24 @@ def write_terms(queries: Queries, n: int, terms: Float32) -> None:
 
 
 @kernel
-def case_of(queries: Queries, n: int) -> int:
-    """Return the case of query n."""
-    return int(queries.wi[n, 2] < _0) + 2 * int(queries.curvature[n] > _0)
-
-
-@kernel
-def log_error(coefficients: Float32, case: int, answer: int, terms: Float32) -> np.float32:
-    """Return the logarithm of an answer's mean squared error; coefficients (cases, answers, TERMS)."""
-    total = _0
-    for t in range(TERMS):
-        total += coefficients[case, answer, t] * terms[t]
-    return total
-
-
-@kernel
-def _write_logarithms(queries: Queries, coefficients: Float32, terms: Float32, result: Float32) -> None:
+def _write_logarithms(queries: Queries, cases: Index, coefficients: Float32, terms: Float32, result: Float32) -> None:
     """Write the logarithms of the mean squared errors of N queries, (N, answers)."""
     for n in range(len(result)):
         write_terms(queries, n, terms)
-        case = case_of(queries, n)
-        for answer in range(coefficients.shape[1]):
-            result[n, answer] = log_error(coefficients, case, answer, terms)
+        own = coefficients[cases[n]]
+        for answer in range(len(own)):
+            total = _0
+            for t in range(TERMS):
+                total += own[answer, t] * terms[t]
+            result[n, answer] = total
 
 
-def logarithms(queries: Queries, coefficients: Float32) -> Float32:
-    """Return the logarithms of the mean squared errors of N queries, (N, answers), by `coefficients_of` a cloth."""
+def squared_errors(queries: Queries, coefficients: Float32) -> Float32:
+    """Return the expected squared errors of all answers to N queries, (N, answers), by `coefficients_of` a cloth."""
     result = np.empty((len(queries.u), coefficients.shape[1]), np.float32)
-    _write_logarithms(contiguous(queries), coefficients, np.empty(TERMS, np.float32), result)
-    return result
+    terms = np.empty(TERMS, np.float32)
+    _write_logarithms(contiguous(queries), cases_of(queries), np.ascontiguousarray(coefficients), terms, result)
+    return np.exp(result, out=result)
 
 
 def contiguous(queries: Queries) -> Queries:
@@ -110,17 +101,47 @@ def contiguous(queries: Queries) -> Queries:
     return Queries(*(np.ascontiguousarray(column, np.float32) for column in queries))
 
 
+def terms_of(queries: Queries) -> Float32:
+    """Return the terms of N queries, (N, TERMS)."""
+    result = np.empty((len(queries.u), TERMS), np.float32)
+    _write_all_terms(contiguous(queries), result)
+    return result
+
+
+@kernel
+def _write_all_terms(queries: Queries, result: Float32) -> None:
+    for n in range(len(result)):
+        write_terms(queries, n, result[n])
+
+
+def coefficients_of(fabric: Fabric, behind: bool) -> Float32:
+    """Return the coefficients of a cloth, (cases, answers, TERMS); those of light from behind are 0 unless wanted."""
+    return (_BOTH if behind else _FRONT).of(fabric)
+
+
+def expand(row: Float64, numbers: Float64) -> Float64:
+    """Return the coefficients (TERMS,) of a cloth with these numbers, from a row of the table."""
+    result = row[:TERMS].copy()
+    result[list(OF_CLOTH)] += numbers[1:] @ row[TERMS:].reshape(NUMBERS - 1, len(OF_CLOTH))
+    return result
+
+
 @cache
-def _table() -> Float64:
-    """Return the table of all cloths, (cases, answers, TERMS, CLOTH)."""
-    return np.array(json.loads(TABLE.read_text(encoding="utf-8"))["coefficients"])
+def _table() -> list[list[Float64]]:
+    """Return the rows of the table by case and answer."""
+    return [[np.array(row) for row in rows] for rows in json.loads(TABLE.read_text(encoding="utf-8"))]
 
 
-def coefficients_of(fabric: Fabric) -> Float32:
-    """Return the coefficients of a cloth, (cases, answers, TERMS)."""
-    return np.ascontiguousarray(_table() @ cloth_numbers(fabric), np.float32)
+def _side(fabric: Fabric, behind: bool) -> Float32:
+    """Return coefficients with those of one side of the light, the others 0."""
+    numbers, rows = cloth_numbers(fabric, behind), _table()
+    result = np.zeros((CASES, len(rows[0]), TERMS), np.float32)
+    for case in range(int(behind), CASES, 2):
+        result[case, :, 0] = _NEVER
+        for answer, row in enumerate(rows[case]):
+            result[case, answer] = expand(row, numbers)
+    return result
 
 
-def cloth_numbers(fabric: Fabric) -> Float64:
-    """Return the numbers of a cloth that its errors depend on, (CLOTH,)."""
-    return np.ones(1)
+_FRONT = PerFabric(partial(_side, behind=False))
+_BOTH = PerFabric(lambda fabric: _FRONT.of(fabric) + _side(fabric, behind=True))

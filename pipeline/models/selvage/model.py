@@ -1,36 +1,36 @@
 """Soft nodes of the level that each query needs, or the fallback, by their expected errors (`errors`).
 
-    error   the cheapest answer whose expected error is at most the wished one; the best one if there is none
-    time    the answers of least summed squared error whose mean time on this machine is at most the wished one
+    error   the answers of least time whose root mean square error over footprints of all sizes is the wished one
+    time    the answers of least error whose mean time on this machine is at most the wished one
 
-Errors are root mean squares over many queries, relative to a grey cloth's colour: single errors may be larger. The
-fallback sees rims: another meaning of walls is answered by soft nodes alone.
+Errors are relative to a grey cloth's colour. Those of narrow footprints and low views are larger than those of others
+(`expected_errors`); a wish below the errors of all answers gets the best ones. The fallback sees rims: another meaning
+of walls is answered by soft nodes alone.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import ClassVar, Final
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float32
-from pipeline.models.analytic.soft_nodes import Level, SoftNodes
+from pipeline.compiled.arrays import Float32, Float64
+from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import refuse_other
 from pipeline.models.selvage import USUAL_ERROR, SelvageOptions
-from pipeline.models.selvage.choice import Chosen, within_error, within_time
-from pipeline.models.selvage.costs import kinds_of, seconds_of
-from pipeline.models.selvage.errors import coefficients_of, logarithms
+from pipeline.models.selvage.choice import Chosen, choose_at, error_curve, price_of, within_time
+from pipeline.models.selvage.cloth_numbers import LEVELS, probes
+from pipeline.models.selvage.costs import USUAL, kinds_of, seconds_of
+from pipeline.models.selvage.errors import CASES, CURVED, coefficients_of, squared_errors
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import Walls
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-
-LEVELS: Final[tuple[Level, ...]] = (1, 2, 4, 8)
-"""Levels of detail of its soft nodes, from the cheapest on."""
 
 _ANY = Queries.round(u=[0.5], v=[0.5], sigma=[1.0], wi=[[0.6, 0.0, 0.8]], wo=[[0.0, 0.0, 1.0]])
 
@@ -53,11 +53,11 @@ class Selvage:
 
     def __init__(self, error: float = USUAL_ERROR, name: str = "selvage", walls: Walls = "rim") -> None:
         self.name, self.setting, self.error = name, SelvageOptions.setting_of(error), error
+        self._curves = {behind: PerFabric(partial(self._error_curves, behind=behind)) for behind in (False, True)}
         self._nodes = [SoftNodes(level, name, walls) for level in LEVELS]
         self._answers: list[Callable[[Fabric, Queries, int], Float32]] = [node.predict for node in self._nodes]
         if walls == "rim":
             self._answers.append(fallback_answers)
-        self._coefficients = PerFabric(coefficients_of)
 
     def covers(self, fabric: Fabric) -> bool:
         """Return True: any fabric can be tabulated."""
@@ -65,7 +65,7 @@ class Selvage:
 
     def prepare(self, fabric: Fabric) -> None:
         """Tabulate the fabric for all that answers it, flat and lit from the front, once."""
-        self._coefficients.of(fabric)
+        self._curves[False].of(fabric)
         for answer in self._answers:
             answer(fabric, _ANY, 0)
 
@@ -103,19 +103,23 @@ class Selvage:
         """Return which answer each of N queries gets, (N,): a level of soft nodes by its place, 4 the fallback."""
         refuse_other(queries, f"the method {self.name} answers", SelvageOptions().kinds)
         self._refuse(error, time)
-        if time is None:
-            return within_error(queries, self._of(fabric), self.error if error is None else error)
         kinds = kinds_of(queries)
+        squares = squared_errors(queries, self._coefficients(fabric, queries))
+        if time is None:
+            prices = self._prices(fabric, queries, self.error if error is None else error)
+            chosen = np.empty(len(kinds), np.uint8)
+            choose_at(squares, kinds, prices[:, None] * USUAL[:, : len(self._answers)], chosen)
+            return chosen
         seconds = seconds_of(kinds, self._answers, fabric)
         least = float(seconds[kinds].min(axis=1).mean()) if len(kinds) else 0.0
         if time < least:
             allowed = f"these queries take at least {least:.2g} seconds each on this machine"
             raise BadInput(self.name, "time", time, allowed)
-        return within_time(logarithms(queries, self._of(fabric)), kinds, seconds, time)
+        return within_time(squares, kinds, seconds, time)
 
     def expected_errors(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the expected relative errors of all answers to N queries, root mean squares, (N, answers)."""
-        return np.asarray(np.exp(0.5 * logarithms(queries, self._of(fabric))), np.float32)
+        return np.sqrt(squared_errors(queries, self._coefficients(fabric, queries)))
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, float32 (N,), by soft nodes."""
@@ -127,11 +131,26 @@ class Selvage:
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the tables of all levels and of the errors; all methods share those of the fallback."""
-        return sum(node.bytes_stored(fabric) for node in self._nodes) + self._coefficients.of(fabric).nbytes
+        return sum(node.bytes_stored(fabric) for node in self._nodes) + coefficients_of(fabric, False).nbytes
 
-    def _of(self, fabric: Fabric) -> Float32:
+    def _coefficients(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the coefficients of the answers at hand, (cases, answers, TERMS)."""
-        return self._coefficients.of(fabric)[:, : len(self._answers)]
+        return coefficients_of(fabric, _behind(queries))[:, : len(self._answers)]
+
+    def _prices(self, fabric: Fabric, queries: Queries, error: float) -> Float64:
+        """Return the prices of all kinds of queries for a wished error, (kinds,)."""
+        curves = self._curves[_behind(queries)].of(fabric)
+        return np.repeat([price_of(curve, error) for curve in curves], len(USUAL) // CASES)
+
+    def _error_curves(self, fabric: Fabric, behind: bool) -> list[Float64]:
+        """Return the curve of errors over prices of each case; those of light from behind only if it is wanted."""
+        coefficients = coefficients_of(fabric, behind)[:, : len(self._answers)]
+        curves = []
+        for case in range(CASES):
+            queries = probes(fabric, bool(case % 2) and behind, case >= CURVED)
+            squares = squared_errors(queries, coefficients)
+            curves.append(error_curve(squares, kinds_of(queries), USUAL[:, : len(self._answers)]))
+        return curves
 
     def _refuse(self, error: float | None, time: float | None) -> None:
         """Refuse both wishes at once, and one that is out of its range."""
@@ -141,3 +160,8 @@ class Selvage:
             raise BadInput(self.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
         if time is not None and not 0.0 < time < math.inf:
             raise BadInput(self.name, "time", time, "seconds a query above 0 are needed, such as 5e-6")
+
+
+def _behind(queries: Queries) -> bool:
+    """Return whether any light is behind the cloth."""
+    return bool((queries.wi[:, 2] < 0.0).any())

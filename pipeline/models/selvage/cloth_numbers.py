@@ -1,0 +1,66 @@
+"""Numbers of a cloth that its errors depend on: how far its answers differ from one another on some flat queries."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from pipeline.compiled.arrays import Float64
+from pipeline.models.analytic.soft_nodes import Level, SoftNodes
+from pipeline.models.fallback import fallback_answers
+from pipeline.shards.queries import QueryOptions, draw_queries
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+LEVELS: Final[tuple[Level, ...]] = (1, 2, 4, 8)
+"""Levels of detail of the soft nodes, from the cheapest on. The answers are theirs, then that of the fallback."""
+
+FLOOR: Final = 0.05
+"""Colour added to the colour that errors are relative to: a third of that of a usual cloth."""
+
+GREY: Final = np.array([0.3, 0.3, 0.5, 0.5])
+"""Weights of the four components in a grey cloth's colour."""
+
+NUMBERS: Final = 5
+"""Numbers of a cloth, the first of them 1."""
+
+_PAIRS: Final = ((0, 3), (1, 3), (2, 3), (3, 4))  # of answers
+_ROWS: Final = 512
+_SEED: Final = 0xC107
+_LEAST, _MOST = 1e-3, 1.0  # differences
+_MIDDLE = 4.0  # minus the logarithm of a usual difference
+
+
+def cloth_numbers(fabric: Fabric, behind: bool) -> Float64:
+    """Return the numbers of a cloth for light from one side, (NUMBERS,)."""
+    return numbers_of(colours(fabric, probes(fabric, behind, False)))
+
+
+def probes(fabric: Fabric, behind: bool, curved: bool, rows: int = _ROWS, seed: int = _SEED) -> Queries:
+    """Return queries of one case; half of the directions are even in solid angle."""
+    shape = QueryOptions(behind=float(behind), stretch=8.0)
+    if curved:
+        shape = QueryOptions(behind=float(behind), stretch=4.0, curvature=(0.01, 0.5))
+    hemisphere = shape.model_copy(update={"directions": "hemisphere"})
+    parts = [
+        draw_queries(options, fabric.weave.repeat, seed + index, 0, rows // 2)
+        for index, options in enumerate((shape, hemisphere))
+    ]
+    return Queries(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def colours(fabric: Fabric, queries: Queries) -> Float64:
+    """Return a grey cloth's colour by all answers, (N, answers)."""
+    answers = [SoftNodes(level).predict(fabric, queries) for level in LEVELS]
+    return np.stack([answer @ GREY for answer in (*answers, fallback_answers(fabric, queries, 0))], axis=1)
+
+
+def numbers_of(colours: Float64) -> Float64:
+    """Return the numbers of a cloth with these colours of its answers, (NUMBERS,)."""
+    scale = colours[:, 3] + FLOOR
+    result = np.ones(NUMBERS)
+    for place, (one, other) in enumerate(_PAIRS, 1):
+        squares = np.minimum(((colours[:, one] - colours[:, other]) / scale) ** 2, _MOST)
+        result[place] = np.log(max(np.sqrt(squares.mean()), _LEAST)) + _MIDDLE
+    return result

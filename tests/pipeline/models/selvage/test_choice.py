@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+
+from pipeline.models.selvage.choice import PRICES, choose_at, error_curve, price_of, within_time
+
+SECONDS = np.array([[1e-6, 2e-6, 8e-6], [3e-6, 4e-6, 5e-6]])
+"""Of two kinds of queries, by answer."""
+
+
+def drawn(rows):
+    """Return squared errors that mostly fall from answer to answer, and kinds."""
+    random = np.random.default_rng(7)
+    squares = np.exp(random.normal([-6.0, -7.5, -9.0], 1.5, (rows, 3))).astype(np.float32)
+    return squares, random.integers(0, 2, rows)
+
+
+def totals(squares, kinds, chosen):
+    """Return the mean squared error and the mean seconds of a choice."""
+    return squares[np.arange(len(kinds)), chosen].mean(dtype=np.float64), SECONDS[kinds, chosen].mean()
+
+
+@pytest.mark.parametrize("time", [2.1e-6, 3e-6, 4e-6, 1e-5])
+def test_no_other_choice_in_the_same_time_has_less_error(time):
+    """Of six queries all 3^6 choices are compared; what the price leaves of the time is at most one query's step."""
+    squares, kinds = drawn(6)
+    chosen = within_time(squares, kinds, SECONDS, time)
+    error, seconds = totals(squares, kinds, chosen)
+    assert seconds <= time
+    for other in np.ndindex(*[3] * 6):
+        of_other = totals(squares, kinds, np.array(other))
+        assert of_other[1] > seconds * (1 + 1e-12) or of_other[0] >= error * (1 - 1e-6)
+
+
+def test_the_wished_time_is_used_up_over_many_queries():
+    squares, kinds = drawn(20_000)
+    least, most = SECONDS[kinds].min(axis=1).mean(), totals(squares, kinds, squares.argmin(axis=1))[1]
+    for share in (0.1, 0.5, 0.9):
+        time = least + share * (most - least)
+        _, seconds = totals(squares, kinds, within_time(squares, kinds, SECONDS, time))
+        assert 0.93 * time < seconds <= time
+
+
+def test_times_at_the_ends_give_the_cheapest_and_the_best_answers():
+    squares, kinds = drawn(100)
+    cheapest = within_time(squares, kinds, SECONDS, SECONDS[kinds, 0].mean())
+    np.testing.assert_array_equal(cheapest, np.zeros(100))
+    np.testing.assert_array_equal(within_time(squares, kinds, SECONDS, 1.0), squares.argmin(axis=1))
+
+
+def test_the_price_of_an_error_is_the_highest_that_keeps_it():
+    squares, kinds = drawn(1000)
+    curve = error_curve(squares, kinds, SECONDS)
+    assert (np.diff(curve) >= 0).all()
+    chosen = np.empty(1000, np.uint8)
+    for error in np.sqrt(curve[[50, 200, 300]] * 1.0001):
+        price = price_of(curve, error)
+        choose_at(squares, kinds, price * SECONDS, chosen)
+        assert totals(squares, kinds, chosen)[0] <= error**2
+        choose_at(squares, kinds, PRICES[np.searchsorted(PRICES, price) + 20] * SECONDS, chosen)
+        assert totals(squares, kinds, chosen)[0] > error**2 or price > 1e4
+    assert price_of(curve, 1e-9) == 0.0
