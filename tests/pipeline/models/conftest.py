@@ -5,6 +5,7 @@ import torch
 
 from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.models.registry import load_methods
+from pipeline.models.selvage.model import Selvage
 
 
 @pytest.fixture(autouse=True)
@@ -16,3 +17,8 @@ def _fixed_weights():
 def clusters():
     (method,) = load_methods(SummedAreaOptions(clusters=[64]))
     return method
+
+
+@pytest.fixture(scope="session")
+def selvage():
+    return Selvage()
