@@ -47,7 +47,7 @@ MOST_ELEMENTS: Final = TEXTURE_WIDTH * MOST_HEIGHT
 """Most elements of the buffer: of a texture that every WebGL 2 allows."""
 
 
-def quads(count: int) -> int:
+def _quads(count: int) -> int:
     """Return how many elements of four hold so many numbers."""
     return -(-count // 4)
 
@@ -62,7 +62,7 @@ class Weights:
 
     def add(self, name: str, values: Float32, meaning: str) -> Place:
         """Append an array whose last axis is filled up to whole elements, and return its place."""
-        width = 4 * quads(values.shape[-1])
+        width = 4 * _quads(values.shape[-1])
         filled = np.zeros((*values.shape[:-1], width), np.float32)
         filled[..., : values.shape[-1]] = values
         place = Place(offset=self.count, shape=filled.shape, meaning=meaning)
@@ -75,7 +75,7 @@ class Weights:
         """Append the layers of a network; inputs of the first one are filled up to whole elements."""
         described = []
         for index, layer in enumerate(layers):
-            rows = np.zeros((4 * quads(len(layer.weights)), layer.weights.shape[1]), np.float32)
+            rows = np.zeros((4 * _quads(len(layer.weights)), layer.weights.shape[1]), np.float32)
             rows[: len(layer.weights)] = layer.weights
             name = f"{network} {index}"
             described.append(
@@ -203,8 +203,8 @@ def _pack(network: NeumipNetwork, weights: Weights) -> tuple[dict[str, bool | in
         "COLOURS": weights.places["colours"].offset,
         "ENDS": ends,
         "PICKS": picks,
-        "CHANNEL_QUADS": quads(options.channels),
-        "HIDDEN_QUADS": quads(options.hidden),
+        "CHANNEL_QUADS": _quads(options.channels),
+        "HIDDEN_QUADS": _quads(options.hidden),
         "HIDDEN_LAYERS": LAYERS,
         "TEXELS_PER_YARN": options.texels_per_yarn,
         "LEVEL_COUNT": len(network.levels),

@@ -83,8 +83,8 @@ class HeldOut:
             for number, label in enumerate(footprint_labels()):
                 inside = place == number
                 if inside.any():
-                    bins[label] = component_figures(prediction[inside], answers.take(inside))
-            found[name] = component_figures(prediction, answers) | {"footprints": bins}
+                    bins[label] = _component_figures(prediction[inside], answers.take(inside))
+            found[name] = _component_figures(prediction, answers) | {"footprints": bins}
         return found
 
     def _answered(
@@ -102,7 +102,7 @@ def footprint_labels() -> list[str]:
     return [f"below {FOOTPRINTS[0]:g}", *inner, f"above {FOOTPRINTS[-1]:g}"]
 
 
-def component_figures(prediction: npt.NDArray[np.float32], answers: Answers) -> dict[str, dict[str, float]]:
+def _component_figures(prediction: npt.NDArray[np.float32], answers: Answers) -> dict[str, dict[str, float]]:
     """Compare components (N, 4) with the truth.
 
     Returns
