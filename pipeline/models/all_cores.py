@@ -41,10 +41,10 @@ class AllCores(Around):
     ) -> npt.NDArray[np.float32]:
         """Answer N queries in runs of `CHUNK_ROWS`, float32 (N, 4); each run but the first has a seed of its own.
 
-        `error` or `time` are the wishes of a method that is asked (`pipeline.models.selvage`); BadInput by others.
+        `error` or `time` are the wishes of a method that takes them (`pipeline.models.selvage`); BadInput by others.
         """
         wishes = {key: value for key, value in (("error", error), ("time", time)) if value is not None}
-        if wishes and not getattr(self.method, "asked", False):
+        if wishes and not getattr(self.method, "takes_wishes", False):
             key, value = next(iter(wishes.items()))
             raise BadInput(self.name, key, value, f"leave it out: only selvage answers within a wished {key}")
         starts = range(CHUNK_ROWS, len(queries.u), CHUNK_ROWS)

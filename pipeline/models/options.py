@@ -101,7 +101,7 @@ class Options(Design):
     usual_setting: ClassVar[float | None] = None
     """Setting of a method that is named without one; None: the last, which is the most accurate."""
     settings_allowed: ClassVar[str] = "a number k after the colon is needed, such as :4"
-    """What a setting on a command line must be."""
+    """Form of a setting on a command line, for messages."""
 
     @property
     def settings(self) -> tuple[float, ...]:

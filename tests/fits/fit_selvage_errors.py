@@ -22,7 +22,7 @@ import cyclopts
 import numpy as np
 
 from jobs.recipe.load import load_recipe
-from pipeline.models.selvage.cloth_numbers import FLOOR, GREY, LEVELS, cloth_numbers, colours, probes
+from pipeline.models.selvage.cloth_numbers import FLOOR, GREY, NODE_LEVELS, cloth_numbers, colours, probes
 from pipeline.models.selvage.errors import CASES, CURVED, OF_CLOTH, terms_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -89,7 +89,9 @@ def main(presets: str = PRESETS, random: int = 12, rows: int = 768, seed: int = 
         parts = [samples(cloth, case, rows, seed + index) for index, cloth in enumerate(cloths)]
         columns, squares, variance = (np.concatenate(part) for part in zip(*parts, strict=True))
         weights = np.concatenate([np.full(len(part[0]), 1.0 / len(part[0])) for part in parts])
-        answers = len(LEVELS) if case >= CURVED else len(LEVELS) + 1  # of curved cloth the fallback is never taken
+        answers = (
+            len(NODE_LEVELS) if case >= CURVED else len(NODE_LEVELS) + 1
+        )  # of curved cloth the fallback is never taken
         table.append([fitted(columns, squares[:, one], variance, weights).tolist() for one in range(answers)])
         errors = np.sqrt(np.maximum(weights @ (squares - variance[:, None]) / weights.sum(), 0.0))
         print(f"case {case}: errors", " ".join(f"{error:.2%}" for error in errors))

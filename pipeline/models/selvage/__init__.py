@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from pipeline.models.analytic.adapter import AnalyticOptions
+from pipeline.models.selvage.wish import USUAL_ERROR, text_of
 from pipeline.truth.options import Walls
 
 if TYPE_CHECKING:
     from pipeline.models.selvage.model import Selvage
-
-USUAL_ERROR: Final = 0.02
-"""Wished error of a method that is named without one."""
 
 WishedError = Annotated[float, Field(gt=0, lt=1)]
 """A relative error of the colour."""
@@ -57,7 +55,7 @@ class SelvageOptions(AnalyticOptions):
     @classmethod
     def setting_of(cls, setting: float) -> str:
         """Return the text of a wished error."""
-        return f"error {100 * setting:g} %"
+        return text_of(setting)
 
     def methods(self) -> list[Selvage]:
         """Return one method for each wished error."""

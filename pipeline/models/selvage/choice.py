@@ -5,10 +5,10 @@ answer of least
 
     E[e^2] + price * seconds
 
-For a wished error the price is the highest at which the root mean square over a cloth's probes, footprints of all sizes
+For a wished error the price is the highest at which the root mean square over random queries, footprints of all sizes
 (`cloth_numbers.probes`), is at most the wished error: a curve over prices, once for each cloth and case. A query's
 answer then depends on the query, the cloth and the wish alone. For a wished time it is the least at which the mean time
-of the queries asked about is at most the wished one.
+of these queries is at most the wished one.
 """
 
 from __future__ import annotations

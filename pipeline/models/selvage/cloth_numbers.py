@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-LEVELS: Final[tuple[Level, ...]] = (1, 2, 4, 8)
+NODE_LEVELS: Final[tuple[Level, ...]] = (1, 2, 4, 8)
 """Levels of detail of the soft nodes, from the cheapest on. The answers are theirs, then that of the fallback."""
 
 FLOOR: Final = 0.05
@@ -21,6 +21,9 @@ FLOOR: Final = 0.05
 
 GREY: Final = np.array([0.3, 0.3, 0.5, 0.5])
 """Weights of the four components in a grey cloth's colour."""
+
+Directions = Literal["projected_disc", "hemisphere"]
+"""A distribution of directions, as in `QueryOptions`."""
 
 NUMBERS: Final = 5
 """Numbers of a cloth, the first of them 1."""
@@ -37,22 +40,30 @@ def cloth_numbers(fabric: Fabric, behind: bool) -> Float64:
     return numbers_of(colours(fabric, probes(fabric, behind, False)))
 
 
-def probes(fabric: Fabric, behind: bool, curved: bool, rows: int = _ROWS, seed: int = _SEED) -> Queries:
-    """Return queries of one case; half of the directions are even in solid angle."""
+def probes(
+    fabric: Fabric,
+    behind: bool,
+    curved: bool,
+    rows: int = _ROWS,
+    seed: int = _SEED,
+    directions: tuple[Directions, ...] = ("projected_disc", "hemisphere"),
+) -> Queries:
+    """Return random queries of one case, footprints of all sizes and shapes, in equal parts with each distribution."""
     shape = QueryOptions(behind=float(behind), stretch=8.0)
     if curved:
         shape = QueryOptions(behind=float(behind), stretch=4.0, curvature=(0.01, 0.5))
-    hemisphere = shape.model_copy(update={"directions": "hemisphere"})
     parts = [
-        draw_queries(options, fabric.weave.repeat, seed + index, 0, rows // 2)
-        for index, options in enumerate((shape, hemisphere))
+        draw_queries(
+            shape.model_copy(update={"directions": name}), fabric.weave.repeat, seed + index, 0, rows // len(directions)
+        )
+        for index, name in enumerate(directions)
     ]
     return Queries(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def colours(fabric: Fabric, queries: Queries) -> Float64:
     """Return a grey cloth's colour by all answers, (N, answers)."""
-    answers = [SoftNodes(level).predict(fabric, queries) for level in LEVELS]
+    answers = [SoftNodes(level).predict(fabric, queries) for level in NODE_LEVELS]
     return np.stack([answer @ GREY for answer in (*answers, fallback_answers(fabric, queries, 0))], axis=1)
 
 

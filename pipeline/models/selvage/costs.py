@@ -1,6 +1,6 @@
 """Seconds of each answer by kind of query: a case of `errors` and a range of sizes, in which times hardly differ.
 
-For a wished error they are `USUAL` ones, so that the choice depends on no machine: ratios count, and errors hardly
+For a wished error they are `USUAL_SECONDS` ones, so that the choice depends on no machine: ratios count, and errors hardly
 depend on them. For a wished time they are measured, once in a process.
 """
 
@@ -25,7 +25,7 @@ Answer = Callable[[Fabric, Queries, int], object]
 
 _ENDS: Final = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # of standard deviations, in yarn spacings
 _SIZES: Final = len(_ENDS) - 1
-USUAL: Final = np.array(
+USUAL_SECONDS: Final = np.array(
     [
         [7.0e-6, 7.6e-6, 9.2e-6, 1.0e-5, 2.4e-4],
         [6.7e-6, 1.0e-5, 1.2e-5, 1.9e-5, 2.7e-4],
@@ -51,7 +51,7 @@ def kinds_of(queries: Queries) -> Index:
 
 
 def seconds_of(kinds: Index, answers: Sequence[Answer], fabric: Fabric) -> Float64:
-    """Return the seconds of a query of some kinds by answer, (all kinds, answers), those of the first fabric asked of.
+    """Return the seconds of a query of some kinds by answer, (all kinds, answers), those of the first fabric.
 
     The answers are those of soft nodes, and the fallback if it is at hand.
     """

@@ -30,7 +30,7 @@ from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-TABLE: Final = Path(__file__).with_name("errors.json")
+ERROR_TABLE: Final = Path(__file__).with_name("errors.json")
 """The table of all cloths, C: cases, answers, TERMS for the number 1 and OF_CLOTH for each of the others."""
 
 OF_CLOTH: Final = (0, 1, 4)
@@ -129,7 +129,7 @@ def expand(row: Float64, numbers: Float64) -> Float64:
 @cache
 def _table() -> list[list[Float64]]:
     """Return the rows of the table by case and answer."""
-    return [[np.array(row) for row in rows] for rows in json.loads(TABLE.read_text(encoding="utf-8"))]
+    return [[np.array(row) for row in rows] for rows in json.loads(ERROR_TABLE.read_text(encoding="utf-8"))]
 
 
 def _side(fabric: Fabric, behind: bool) -> Float32:

@@ -10,10 +10,9 @@ of walls is answered by soft nodes alone.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -21,17 +20,18 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import refuse_other
-from pipeline.models.selvage import USUAL_ERROR, SelvageOptions
 from pipeline.models.selvage.choice import Chosen, choose_at, error_curve, price_of, within_time
-from pipeline.models.selvage.cloth_numbers import LEVELS, probes
-from pipeline.models.selvage.costs import USUAL, kinds_of, seconds_of
+from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
+from pipeline.models.selvage.costs import USUAL_SECONDS, kinds_of, seconds_of
 from pipeline.models.selvage.errors import CASES, CURVED, coefficients_of, squared_errors
+from pipeline.models.selvage.wish import USUAL_ERROR, refuse_wishes, text_of
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import Walls
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
+_KINDS: Final = ("stretch", "behind", "curvature")
 _ANY = Queries.round(u=[0.5], v=[0.5], sigma=[1.0], wi=[[0.6, 0.0, 0.8]], wo=[[0.0, 0.0, 1.0]])
 
 
@@ -48,13 +48,13 @@ class Selvage:
         What view rays see that meet a wall.
     """
 
-    turns: ClassVar[bool] = SelvageOptions.turns
-    asked: ClassVar[bool] = True
+    turns: ClassVar[bool] = True
+    takes_wishes: ClassVar[bool] = True
 
     def __init__(self, error: float = USUAL_ERROR, name: str = "selvage", walls: Walls = "rim") -> None:
-        self.name, self.setting, self.error = name, SelvageOptions.setting_of(error), error
+        self.name, self.setting, self.error = name, text_of(error), error
         self._curves = {behind: PerFabric(partial(self._error_curves, behind=behind)) for behind in (False, True)}
-        self._nodes = [SoftNodes(level, name, walls) for level in LEVELS]
+        self._nodes = [SoftNodes(level, name, walls) for level in NODE_LEVELS]
         self._answers: list[Callable[[Fabric, Queries, int], Float32]] = [node.predict for node in self._nodes]
         if walls == "rim":
             self._answers.append(fallback_answers)
@@ -101,14 +101,14 @@ class Selvage:
 
     def choose(self, fabric: Fabric, queries: Queries, error: float | None = None, time: float | None = None) -> Chosen:
         """Return which answer each of N queries gets, (N,): a level of soft nodes by its place, 4 the fallback."""
-        refuse_other(queries, f"the method {self.name} answers", SelvageOptions().kinds)
-        self._refuse(error, time)
+        refuse_other(queries, f"the method {self.name} answers", _KINDS)
+        refuse_wishes(self.name, error, time)
         kinds = kinds_of(queries)
         squares = squared_errors(queries, self._coefficients(fabric, queries))
         if time is None:
             prices = self._prices(fabric, queries, self.error if error is None else error)
             chosen = np.empty(len(kinds), np.uint8)
-            choose_at(squares, kinds, prices[:, None] * USUAL[:, : len(self._answers)], chosen)
+            choose_at(squares, kinds, prices[:, None] * USUAL_SECONDS[:, : len(self._answers)], chosen)
             return chosen
         seconds = seconds_of(kinds, self._answers, fabric)
         least = float(seconds[kinds].min(axis=1).mean()) if len(kinds) else 0.0
@@ -140,26 +140,17 @@ class Selvage:
     def _prices(self, fabric: Fabric, queries: Queries, error: float) -> Float64:
         """Return the prices of all kinds of queries for a wished error, (kinds,)."""
         curves = self._curves[_behind(queries)].of(fabric)
-        return np.repeat([price_of(curve, error) for curve in curves], len(USUAL) // CASES)
+        return np.repeat([price_of(curve, error) for curve in curves], len(USUAL_SECONDS) // CASES)
 
     def _error_curves(self, fabric: Fabric, behind: bool) -> list[Float64]:
         """Return the curve of errors over prices of each case; those of light from behind only if it is wanted."""
         coefficients = coefficients_of(fabric, behind)[:, : len(self._answers)]
         curves = []
         for case in range(CASES):
-            queries = probes(fabric, bool(case % 2) and behind, case >= CURVED)
+            queries = probes(fabric, bool(case % 2) and behind, case >= CURVED, directions=("projected_disc",))
             squares = squared_errors(queries, coefficients)
-            curves.append(error_curve(squares, kinds_of(queries), USUAL[:, : len(self._answers)]))
+            curves.append(error_curve(squares, kinds_of(queries), USUAL_SECONDS[:, : len(self._answers)]))
         return curves
-
-    def _refuse(self, error: float | None, time: float | None) -> None:
-        """Refuse both wishes at once, and one that is out of its range."""
-        if error is not None and time is not None:
-            raise BadInput(self.name, "time", time, "leave out time or error: only one of them can be wished")
-        if error is not None and not 0.0 < error < 1.0:
-            raise BadInput(self.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
-        if time is not None and not 0.0 < time < math.inf:
-            raise BadInput(self.name, "time", time, "seconds a query above 0 are needed, such as 5e-6")
 
 
 def _behind(queries: Queries) -> bool:

@@ -5,7 +5,15 @@ import pytest
 
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.selvage.cloth_numbers import FLOOR, GREY, NUMBERS, colours, numbers_of, probes
-from pipeline.models.selvage.errors import CASES, OF_CLOTH, TABLE, TERMS, cases_of, coefficients_of, squared_errors
+from pipeline.models.selvage.errors import (
+    CASES,
+    ERROR_TABLE,
+    OF_CLOTH,
+    TERMS,
+    cases_of,
+    coefficients_of,
+    squared_errors,
+)
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -16,7 +24,7 @@ DENIM = load_fabric("denim")
 
 
 def test_the_table_has_a_row_for_every_case_and_answer():
-    table = json.loads(TABLE.read_text())
+    table = json.loads(ERROR_TABLE.read_text())
     assert [len(rows) for rows in table] == [5, 5, 4, 4] and len(table) == CASES
     assert {len(row) for rows in table for row in rows} == {TERMS + (NUMBERS - 1) * len(OF_CLOTH)}
 

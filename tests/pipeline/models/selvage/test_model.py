@@ -5,7 +5,7 @@ from pipeline.models.all_cores import AllCores
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.selvage import SelvageOptions
-from pipeline.models.selvage.cloth_numbers import LEVELS, probes
+from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
 from pipeline.models.selvage.model import Selvage
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -28,7 +28,7 @@ def test_every_query_gets_the_answer_that_is_chosen(selvage, queries):
     chosen = selvage.choose(DENIM, queries, error=0.012)
     answers = selvage.predict(DENIM, queries, 5, error=0.012)
     assert len(np.unique(chosen)) >= 4
-    for place, level in enumerate(LEVELS):
+    for place, level in enumerate(NODE_LEVELS):
         rows = chosen == place
         np.testing.assert_array_equal(answers[rows], SoftNodes(level).predict(DENIM, queries.take(rows)))
     best = selvage.choose(DENIM, queries, error=1e-6) == 4
@@ -38,11 +38,13 @@ def test_every_query_gets_the_answer_that_is_chosen(selvage, queries):
 
 
 def test_the_expected_error_is_the_wished_one(selvage, queries):
-    """Over queries like a cloth's probes, to their chance; a smaller wish never has a cheaper answer."""
+    """Over other queries of the distribution that prices are found on, to chance; a smaller wish hardly ever has a
+    cheaper answer."""
+    queries = probes(DENIM, False, False, 2000, 8, ("projected_disc",))
     last = None
     for wished in (0.02, 0.015, 0.012, 0.01):
         chosen = selvage.choose(DENIM, queries, error=wished)
-        assert expected(selvage, queries, chosen) < 1.1 * wished
+        assert expected(selvage, queries, chosen) < 1.15 * wished
         assert last is None or (chosen >= last).mean() > 0.95
         last = chosen
 
