@@ -70,7 +70,7 @@ faults: $(READY)
 gallery: $(READY)
 	@$(BIN)/twillight gallery --out out/gallery
 
-# The shaders of `twillight view`, after a change of their source in Slang or of the pretrained network; needs slangc.
+# The shaders of `twillight view`, after a change of their source in Slang; needs slangc.
 viewer-shader: $(READY)
 	$(BIN)/python -m reports.viewer.generate
 

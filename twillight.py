@@ -134,8 +134,8 @@ def load_model(name_or_folder: str | Path) -> Method:
     Parameters
     ----------
     name_or_folder : str or Path
-        Name of a model that comes with the package, such as ``"selvage"``, or that learns nothing, such as
-        ``"soft_nodes:2"`` with k = 2, or the folder of a trained model.
+        Name of a model that learns nothing, such as ``"soft_nodes:2"`` with k = 2 or ``"selvage:.02"`` for an error
+        of 2 %, or the folder of a trained model.
 
     Returns
     -------

@@ -32,7 +32,7 @@ class Joined(NamedTuple):
     unlike: list[tuple[Record, Record]]
 
 
-def name_of(machine: Machine) -> str:
+def _name_of(machine: Machine) -> str:
     """Return a machine in a few words."""
     threads = f"{machine.threads} thread{'' if machine.threads == 1 else 's'}"
     return f"{machine.cpu}, {machine.cores} cores, {threads}, {machine.system}"
@@ -40,7 +40,7 @@ def name_of(machine: Machine) -> str:
 
 def names_of(machines: Sequence[Machine]) -> list[str]:
     """Return a name for each machine; those of equal machines end in their number."""
-    names = [name_of(machine) for machine in machines]
+    names = [_name_of(machine) for machine in machines]
     return [f"{name} ({names[:i].count(name) + 1})" if names.count(name) > 1 else name for i, name in enumerate(names)]
 
 

@@ -72,7 +72,7 @@ def test_a_fabric_from_draft_to_picture(folder):
 
 
 def test_a_data_set_and_a_model(folder):
-    """The pretrained model, which knows two of three fabrics, is within a tenth of the truth from .3 yarn on."""
+    """The model, which learns nothing, is within a tenth of the truth from .3 yarn on."""
     seen, unseen = ["polyester_lining", "denim"], ["twill_4_4"]
     parts = itertools.chain(true_rows(seen, ("train", "test")), true_rows(unseen, ("test",)))
     roles = {"seen": seen, "population": [], "unseen": unseen}

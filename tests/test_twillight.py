@@ -66,7 +66,7 @@ def test_every_docstring_has_an_example_that_runs(name, thing, dataset):
 
 
 def test_the_example_of_the_readme(tmp_path, monkeypatch):
-    """Ten lines as they are printed: the pretrained model is within a tenth of the truth, and there is a picture."""
+    """Ten lines as they are printed: the model is within a tenth of the truth, and there is a picture."""
     (example,) = re.findall(r"(?:^    .*\n)*^    from twillight import .*\n(?:^    .*\n)*", README, re.M)
     lines = [line.removeprefix("    ") for line in example.rstrip().splitlines()]
     assert len([line for line in lines if line]) <= 10

@@ -76,10 +76,10 @@ def validated(model: type[Model], data: Mapping[str, Any], where: str) -> Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise bad_input(error, model, data, where) from error
+        raise _bad_input(error, model, data, where) from error
 
 
-def bad_input(error: ValidationError, model: type[BaseModel], data: object, where: str) -> BadInput:
+def _bad_input(error: ValidationError, model: type[BaseModel], data: object, where: str) -> BadInput:
     """Turn a pydantic error into one sentence."""
     # Unknown keys first: a misspelt key also makes the right one missing, and the former message is more useful.
     errors = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")

@@ -47,11 +47,11 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
         known = [fabric for fabric in fabrics if fabric.optics() in optics]
     options = model.options
     domain = None
-    if model.learns and not options.answers_outside:
+    if model.learns:
         learnt_from = recipe.seen + (recipe.unseen if model.of_one_material else recipe.population)
         domain = Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from)
     method: Any = _DomainOnly(domain, options.turns)
-    fallback = Fallback(method, options.kinds | options.without_training, recipe.bench.scenes.footprint)
+    fallback = Fallback(method, options.kinds, recipe.bench.scenes.footprint)
     fallback_rows = [
         fallback.out_of_domain(fabric, queries) if fabric in known else np.ones(len(queries.u), np.bool_)
         for fabric, queries in queries_by_fabric

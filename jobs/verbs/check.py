@@ -47,9 +47,9 @@ def check(
     if repair:
         raise BadInput(WHERE, "--repair", subject, "only the files of a recipe can be made again; name a recipe")
     if isinstance(found, Fabric):
-        check_fabric(found)
+        _check_fabric(found)
         return 0
-    faults = check_dataset(found)
+    faults = _check_dataset(found)
     for fault in faults:
         print_error(fault)
     return BadInput.exit_code if faults else 0
@@ -88,7 +88,7 @@ def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:
     return load_fabric(subject) if "draft" in tables else load_recipe(subject, add)
 
 
-def check_dataset(folder: Path) -> list[str]:
+def _check_dataset(folder: Path) -> list[str]:
     """Check every shard of a data set and return the faults as sentences; without any, print a summary.
 
     BadInput if the folder has no manifest.
@@ -103,7 +103,7 @@ def check_dataset(folder: Path) -> list[str]:
     return faults
 
 
-def check_fabric(fabric: Fabric) -> None:
+def _check_fabric(fabric: Fabric) -> None:
     """Test a fabric's ground truth against physical invariants and print a table; WorkFailed if one does not hold."""
     from pipeline.truth.invariants import INVARIANTS
 

@@ -36,7 +36,7 @@ class ShaderFlags:
     """Choices of a shader on the command line."""
 
     model: Annotated[
-        str | None, Parameter(help="Of a shader: soft_nodes (default), selvage, or the folder of a trained model.")
+        str | None, Parameter(help="Of a shader: soft_nodes (default), or the folder of a trained neumip.")
     ] = None
     level: Annotated[int | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None
     language: Annotated[

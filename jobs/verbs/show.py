@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -121,30 +120,28 @@ def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
     path, codes = folder / f"{fabric.name}-swatch.png", np.zeros((size[1], size[0], 3), np.uint8)
     parts = windows(size, QUERIES_OF_PIXEL)
     with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
-        method, alone = method_of(fabric)
-        with alone:
-            method.prepare(fabric)
-            between = partial(light_between, tables=tables_of(WALKS_OF_SWATCH))
-            done = answered(swatch.frame, parts, {"swatch": fabric}, method, pool, ("swatch",), between)
-            for number, part in enumerate(done, 1):
-                codes[shown_at(part)] = tiles.displayed(part.planes["rgb"])
-                advance(number / len(parts))
+        method = method_of(fabric)
+        method.prepare(fabric)
+        between = partial(light_between, tables=tables_of(WALKS_OF_SWATCH))
+        done = answered(swatch.frame, parts, {"swatch": fabric}, method, pool, ("swatch",), between)
+        for number, part in enumerate(done, 1):
+            codes[shown_at(part)] = tiles.displayed(part.planes["rgb"])
+            advance(number / len(parts))
     atomic_write(path, tiles.png(tiles.opaque(codes), 1))
     return path
 
 
-def method_of(fabric: Fabric) -> tuple[Fallback, AbstractContextManager[None]]:
-    """Return the method that answers for a swatch, and how it runs beside others on threads of one process."""
+def method_of(fabric: Fabric) -> Fallback:
+    """Return the method that answers for a swatch."""
     from pipeline.models.analytic.point_sampled import PointSampledOptions
+    from pipeline.models.analytic.soft_nodes import SoftNodesOptions
     from pipeline.models.fallback import Fallback
 
     if fabric.weave.different_cells() > TABLE_CELLS:
         points = PointSampledOptions(counts=[POINTS_OF_MANY_CELLS])
-        return Fallback(points.methods()[0], points.kinds), nullcontext()
-    from pipeline.models.named import named_method  # torch
-    from pipeline.models.network import one_thread
-
-    return named_method("selvage", "show", "--method"), one_thread()
+        return Fallback(points.methods()[0], points.kinds)
+    nodes = SoftNodesOptions(levels=[2])
+    return Fallback(nodes.methods()[0], nodes.kinds)
 
 
 def _print_fabric(fabric: Fabric) -> None:

@@ -97,7 +97,7 @@ def _by_sums(fabric: Fabric, queries: Queries) -> Float64:
         sums, _ = query_sums(table, part)
         wo = np.ascontiguousarray(part.raised().wo, np.float32)
         weights = np.ascontiguousarray(sums[:, :, (SPECULAR, DIFFUSE)], np.float64)
-        found = weighed_colours(table, warp, weft, footprints(part, SMALLEST), wo, weights)
+        found = _weighed_colours(table, warp, weft, footprints(part, SMALLEST), wo, weights)
         result[start : start + _CHUNK] = found.transpose(0, 2, 1, 3).reshape(-1, 4, 3)
     return result
 
@@ -105,7 +105,7 @@ def _by_sums(fabric: Fabric, queries: Queries) -> Float64:
 def _from_above(fabric: Fabric, queries: Queries) -> Float64:
     """Return the colours of N queries by what is seen from straight above, (N, 4, 3)."""
     wide = [np.ascontiguousarray(queries[k], np.float64) for k in (0, 1, 2, 5, 6)]
-    means = mean_colours(*_threads(fabric), *wide).reshape(-1, 2, 3, 3)
+    means = _mean_colours(*_threads(fabric), *wide).reshape(-1, 2, 3, 3)
     through = (queries.wi[:, 2] * queries.wo[:, 2] < 0.0)[:, None, None]
     diffuse = np.where(through, means[:, :, 2], means[:, :, 1])
     return np.concatenate([means[:, :, 0], diffuse], axis=1)
@@ -136,7 +136,7 @@ def _threads(fabric: Fabric) -> tuple[Threads, Threads]:
 
 
 @allocating_kernel
-def mean_colours(
+def _mean_colours(
     warp: Threads, weft: Threads, u: Float64, v: Float64, major: Float64, minor: Float64, angle: Float64
 ) -> Float64:
     """Return k_s, k_d and k_dt of the ends and of the picks in N footprints, (N, 2, 9)."""
@@ -165,7 +165,7 @@ def mean_colours(
 
 
 @allocating_kernel
-def weighed_colours(
+def _weighed_colours(
     table: SoftNodeTable, warp: Threads, weft: Threads, patches: Footprints, wo: Float32, weights: Float64
 ) -> Float64:
     """Return k_s and k_d of the ends and of the picks in N footprints, (N, 2, 2, 3).

@@ -1,4 +1,4 @@
-"""BSDF files of LBNL WINDOW in a Klems basis, read and written.
+"""BSDF files of LBNL WINDOW in a Klems basis.
 
 Rows of a block are patches scattered to, columns patches of the light. In files the front is the face that the sun
 meets. As seen from the room, the layer's back, x runs to the right and y upwards: labels have -x of the fabric.
@@ -11,19 +11,16 @@ from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy import typing as npt
 
 from pipeline.atomic import atomic_write
-from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Basis, Scattering
+from pipeline.bsdf.klems import FACES, SCATTERED, Basis, Scattering
 from pipeline.compiled.arrays import Float64
-from weaves.errors import BadInput
 
 NAMESPACE: Final = "http://windows.lbl.gov"
 _BANDS: Final = {  # name in files, source and detector
     "visible": ("Visible", "CIE Illuminant D65 1nm.ssp", "ASTM E308 1931 Y.dsp"),
     "solar": ("Solar", "CIE Illuminant D65 1nm.ssp", "None"),
 }
-_LARGEST_FILE = 2**28
 
 
 class LayerFacts(NamedTuple):
@@ -91,71 +88,12 @@ def write_klems(path: Path, scattering: Scattering, facts: LayerFacts) -> None:
     atomic_write(path, b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root))
 
 
-def read_klems(path: Path) -> Scattering:
-    """Read a file, and check its energy.
-
-    BadInput names what cannot be used: not XML, another basis, a block of another size, energy above 1.
-    """
-    try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise BadInput(str(path), "", f"{path.stat().st_size:,} bytes", f"at most {_LARGEST_FILE:,} are read")
-        text = path.read_bytes()
-        if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-            raise BadInput(str(path), "", "a document type", "leave it out: BSDF files need none")
-        root = ElementTree.fromstring(text)
-    except OSError as error:
-        raise BadInput(str(path), "", error.strerror or "cannot be read", "a readable file is needed") from error
-    except ElementTree.ParseError as error:
-        raise BadInput(str(path), "", f"not XML: {error}", "a BSDF file of LBNL WINDOW is needed") from error
-    bases, bands = set[str](), dict[str, Float64]()
-    for data in root.iter(f"{{{NAMESPACE}}}WavelengthData"):
-        band = _text(path, data, "Wavelength").lower()
-        for block in data.iter(f"{{{NAMESPACE}}}WavelengthDataBlock"):
-            name = _text(path, block, "ColumnAngleBasis")
-            if name not in BASES or _text(path, block, "RowAngleBasis") != name:
-                allowed = f"must be that of the rows, one of {', '.join(BASES)}"
-                raise BadInput(str(path), "ColumnAngleBasis", name, allowed)
-            bases.add(name)
-            if len(bases) > 1:
-                raise BadInput(str(path), "ColumnAngleBasis", name, "all blocks must have one basis")
-            count = BASES[name].patches
-            blocks = bands.setdefault(band, np.full((2, 2, count, count), np.nan))
-            what = _text(path, block, "WavelengthDataDirection").lower().split()
-            if len(what) != 2 or what[0] not in SCATTERED or what[1] not in FACES:
-                continue  # such as absorptance
-            place = SCATTERED.index(what[0]), FACES.index(what[1])
-            blocks[place] = _matrix(path, _text(path, block, "ScatteringData"), count)
-    if not bands:
-        raise BadInput(str(path), "", "no data of a wavelength", "a BSDF file of LBNL WINDOW is needed")
-    basis = BASES[bases.pop()]
-    known = {band: mirrored(basis, blocks) for band, blocks in bands.items() if np.isfinite(blocks).any()}
-    return Scattering(basis, known).checked(str(path))
-
-
 def mirrored(basis: Basis, blocks: Float64) -> Float64:
     """Return blocks (..., P, P) with labels (-x, y) in place of (x, y)."""
     counts = np.array(basis.counts)[basis.ring]
     # Azimuth a becomes 180 degrees - a.
     mirror = np.arange(basis.patches) - basis.number + (counts // 2 - basis.number) % counts
     return np.asarray(blocks[..., mirror[:, None], mirror])
-
-
-def _matrix(path: Path, text: str, count: int) -> Float64:
-    try:
-        numbers: npt.NDArray[np.float64] = np.array(text.replace(",", " ").split(), np.float64)
-    except ValueError as error:
-        raise BadInput(str(path), "ScatteringData", str(error), "numbers are needed") from error
-    if numbers.size != count * count or not np.isfinite(numbers).all():
-        allowed = f"{count} x {count} finite numbers are needed for this basis"
-        raise BadInput(str(path), "ScatteringData", f"{numbers.size} numbers", allowed)
-    return numbers.reshape(count, count)
-
-
-def _text(path: Path, element: ElementTree.Element, name: str) -> str:
-    text = element.findtext(f"{{{NAMESPACE}}}{name}")
-    if text is None:
-        raise BadInput(str(path), name, "missing", "a BSDF file of LBNL WINDOW is needed")
-    return text.strip()
 
 
 def _add_basis(parent: ElementTree.Element, basis: Basis) -> None:

@@ -1,7 +1,7 @@
 """Energy bound: the answers of any method, limited to those of the soft nodes without shadows.
 
-The soft nodes (pipeline.analytic.soft_nodes.features) also give each component without shadows of the light: a mean of
-the point model over nodes whose weights do not depend on wi. For every node the diffuse lobe (w_d <i.n_p> + (1 - w_d)
+The soft nodes (analytic.soft_nodes.components) also give each component without shadows of the light: a mean of the
+point model over nodes whose weights do not depend on wi. For every node the diffuse lobe (w_d <i.n_p> + (1 - w_d)
 i_z) / pi integrates to at most 1 over the viewer's side, and so does any mean of them. Hence
 
     answer <= bound  for every wi   implies   integral of C_warp + C_weft over wi <= 1
@@ -24,7 +24,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_nodes.features import read_behind, read_queries
+from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.analytic.soft_nodes.groups import USUAL
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import nbytes

@@ -4,8 +4,8 @@ A query is first brought into the nearest form that the method knows: an ellipse
 area (or of its major axis, which blurs and never aliases), and curvature is left out. Light from behind, yarns unlike
 those of the training (open cloth after solid cloth alone), and footprints and directions beyond its ranges have no such
 form: they are out of the method's domain (`pipeline.models.domain`), and the fallback answers them. The share of such
-queries is part of every result. A method with a function `outside_domain` answers them itself. A method that `turns`
-answers a viewer behind the cloth as one in front of the cloth's back.
+queries is part of every result. A method that `turns` answers a viewer behind the
+cloth as one in front of the cloth's back.
 
 The fallback is a node table of the ground truth with other nodes (`_NODES` is odd, the truth's numbers are even) and
 other azimuths: its error has nothing in common with that of the truth, and is measured like any method's error. It has
@@ -96,14 +96,12 @@ class Fallback(Around):
         super().__init__(method)
         self._footprint = footprint
         self._domain: Domain | None = getattr(method, "domain", None)
-        # Some methods answer outside their domain themselves, in another way than within it.
-        self._outside: Callable[[Fabric, Queries], Float32] | None = getattr(method, "outside_domain", None)
         # A method may know a kind and not be trained on it: a scene's own recipe leaves out kinds that never occur
         # there.
         self._kinds = frozenset(kinds)
         self._turns = bool(getattr(method, "turns", False))
         if self._domain:
-            self._kinds &= self._domain.kinds | getattr(method, "without_training", frozenset())
+            self._kinds &= self._domain.kinds
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries of any kind, float32 (N, 4)."""
@@ -154,7 +152,7 @@ class Fallback(Around):
             behind = np.zeros(len(queries.u), np.bool_)
         else:
             behind = queries.wo[:, 2] < 0.0 if "behind" in self._kinds else queries.behind
-        if self._domain is None or self._outside is not None:
+        if self._domain is None:
             return behind
         return behind | self._domain.out_of_domain(fabric, self._nearest(queries))
 
@@ -177,18 +175,11 @@ class Fallback(Around):
 
     def _in_front(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
         """Answer queries of viewers in front of the cloth."""
-        domain, outside, nearest = self._domain, self._outside, self._nearest(queries)
-        if domain is None:
-            return self.method.predict(fabric, nearest, seed)
-
-        def within(part: Queries) -> Float32:
-            """Answer by the method; footprints that see the average are no larger than trained on."""
-            return self.method.predict(fabric, domain.within(fabric, part), seed)
-
-        if outside is None:
-            return within(nearest)
-        alone = domain.out_of_domain(fabric, nearest)
-        return row_by_row(nearest, alone, lambda part: outside(fabric, part), within)
+        nearest = self._nearest(queries)
+        if self._domain is not None:
+            # Footprints that see the average are no larger than trained on.
+            nearest = self._domain.within(fabric, nearest)
+        return self.method.predict(fabric, nearest, seed)
 
     def _nearest(self, queries: Queries) -> Queries:
         """Return queries in the nearest form that the method knows."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from pipeline.models.card import CARD
 from pipeline.models.catalogue import CLASSES
+from pipeline.models.domain import Domain
 from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
 from pipeline.models.options import Options
@@ -58,7 +59,8 @@ def loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
     if name in CLASSES and not (place(name, key) / CARD).is_file():
         raise BadInput(where, key, name, "must be trained first: name the folder of a trained one, out/models/…")
     (method,) = load_model(model_folder(name, where, key, [TRUTH, *untrained_names()]))
-    return method, _kinds(method)
+    domain: Domain | None = getattr(method, "domain", None)
+    return method, domain.kinds if domain else frozenset()
 
 
 def _with_setting(options: Options, setting: str, where: str, key: str, name: str) -> Options:
@@ -74,10 +76,3 @@ def _with_setting(options: Options, setting: str, where: str, key: str, name: st
         raise BadInput(where, key, name, error.allowed) from error
     except ValueError as error:
         raise BadInput(where, key, name, options.settings_allowed) from error
-
-
-def _kinds(method: object) -> frozenset[str]:
-    """Return the kinds of queries that a trained method knows."""
-    domain = getattr(method, "domain", None)
-    trained: frozenset[str] = frozenset() if domain is None else domain.kinds
-    return trained | frozenset(getattr(method, "without_training", ()))

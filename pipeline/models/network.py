@@ -50,8 +50,6 @@ class Batch(NamedTuple):
         Components.
     transparency : float32 (F, n)
         Share of light from straight behind that passes unscattered.
-    row : int64 (F, n)
-        Number of each query among all that the training has, the same in every epoch; -1 for held-out queries.
     """
 
     fabric: Tensor
@@ -65,7 +63,6 @@ class Batch(NamedTuple):
     curvature: Tensor
     target: Tensor
     transparency: Tensor
-    row: Tensor
 
 
 class Trainable(nn.Module):
@@ -74,9 +71,6 @@ class Trainable(nn.Module):
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the loss of a batch; `random` is a pure function of seed and step."""
         raise NotImplementedError
-
-    def expect(self, rows: int) -> None:
-        """Expect batches out of so many rows: what is computed of a row alone may be kept from epoch to epoch."""
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean of targets (M, 4): a leaky ReLU can stall far from it."""

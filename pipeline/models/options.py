@@ -93,11 +93,6 @@ class Options(Design):
         """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
         return ()
 
-    without_training: ClassVar[frozenset[str]] = frozenset()
-    """Kinds of queries that it evaluates though no training has them, of `behind`, `stretch` and `curvature`."""
-    answers_outside: ClassVar[bool] = False
-    """True if it evaluates queries outside its domain too, in another way than those within."""
-
     turns: ClassVar[bool] = False
     """True if it evaluates a viewer behind the cloth as one in front of the cloth's back, which is a fabric too."""
 

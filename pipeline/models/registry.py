@@ -152,14 +152,6 @@ def load_model(folder: Path) -> list[Method]:
     return load_methods(validated(_Card, card, str(folder / CARD)).options, [folder])
 
 
-def covering_model(model: str, fabric: Fabric, where: str, key: str) -> Method:
-    """Return the trained model of a folder, as `model_folder` and `load_model`; BadInput for other fabrics."""
-    (method,) = load_model(model_folder(model, where, key))
-    if not method.covers(fabric):
-        raise BadInput(where, key, model, f"this model was not trained on {fabric.name}")
-    return method
-
-
 def _read(folder: Path, options: Any) -> tuple[dict[str, Any], dict[str, Tensor]]:
     card = read_card(folder)
     if card.get("options") != options.model_dump(mode="json", context=IDENTITY):

@@ -7,18 +7,21 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Final
 
+from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.folders import own_files
 from pipeline.models.neumip.model import Neumip
-from pipeline.models.registry import covering_model
+from pipeline.models.registry import load_model, model_folder
 from pipeline.models.runtimes import no_onnx
-from pipeline.models.selvage.model import Selvage
 from pipeline.shader.descriptor import GOLDEN, Shader, vectors
 from pipeline.shader.languages import ALL, LANGUAGES, ONNX, SOURCE, compiler_for, refuse_unknown, translate
-from pipeline.shader.networks import NEUMIP, SELVAGE, neumip_shader, selvage_shader
+from pipeline.shader.neumip import NEUMIP, neumip_shader
 from pipeline.shader.soft_nodes import SOFT_NODES, soft_nodes_shader
 from pipeline.shader.tables import wanted_kinds
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
+
+CHOOSER: Final = "selvage"
+"""Name of the method that chooses among levels of soft nodes."""
 
 ENTRIES: Final = ("evaluate.slang", "draw.slang")
 """Files of the source with entry points, the same for all models."""
@@ -109,8 +112,8 @@ def _source(shader: Shader) -> dict[str, bytes]:
 def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
     """Return a model of a fabric, ready to be written.
 
-    `model` is `soft_nodes`, which is meant if it is left out, a model that comes with the package, or the folder of a
-    trained `selvage` or `neumip`; `level` the level of detail of the soft nodes; `kinds` are of QUERY_KINDS.
+    `model` is `soft_nodes`, which is meant if it is left out, or the folder of a trained `neumip`; `level` the level of
+    detail of the soft nodes; `kinds` are of QUERY_KINDS.
 
     Raises
     ------
@@ -120,10 +123,14 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
     """
     if model is None or model == SOFT_NODES:
         return soft_nodes_shader(fabric, level, kinds)
-    method = covering_model(model, fabric, "export", "model")
-    if isinstance(method, Selvage):
-        return selvage_shader(method, fabric, level, kinds)
-    if isinstance(method, Neumip):
-        return neumip_shader(method, fabric, level, kinds)
-    allowed = f"has no shader; {SOFT_NODES}, {SELVAGE} and the folder of a trained {NEUMIP} have one"
-    raise BadInput("export", "model", model, allowed)
+    if model.partition(":")[0] == CHOOSER:
+        levels = ", ".join(map(str, DETAILS))
+        allowed = f"chooses a level for each query and has no shader: export {SOFT_NODES} at one --level of {levels}"
+        raise BadInput("export", "model", model, allowed)
+    (method,) = load_model(model_folder(model, "export", "model", [SOFT_NODES]))
+    if not isinstance(method, Neumip):
+        allowed = f"has no shader; {SOFT_NODES} and the folder of a trained {NEUMIP} have one"
+        raise BadInput("export", "model", model, allowed)
+    if not method.covers(fabric):
+        raise BadInput("export", "model", model, f"this model was not trained on {fabric.name}")
+    return neumip_shader(method, fabric, level, kinds)

@@ -19,7 +19,7 @@ from pipeline.analytic.importance.lobes import FLAKE_ROWS, POINT_ROWS, STRAIGHT,
 from pipeline.analytic.importance.mixture import density_rows
 from pipeline.analytic.importance.surface import LobeSurface
 from pipeline.analytic.soft_nodes.answer import SMALLEST
-from pipeline.analytic.soft_nodes.features import read_behind, read_queries
+from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.scenes.shade import coloured
@@ -114,8 +114,8 @@ Colouring = Callable[[Queries], Float64]
 """Colours of the components of N queries, all viewers on one side, (N, 4, 3); NaN for what cannot be golden."""
 
 
-def golden(sides: Sides, read: Answering | None = None) -> Golden:
-    """Return golden queries of a cloth, of all kinds that it knows; `read` answers them, or the soft nodes do."""
+def golden(sides: Sides) -> Golden:
+    """Return golden queries of a cloth, of all kinds that it knows."""
     known = {CURVATURE: len(sides.front.falls) > 0, BEHIND: sides.back is not None}
     groups = {
         name: group
@@ -123,8 +123,8 @@ def golden(sides: Sides, read: Answering | None = None) -> Golden:
         if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
     }
     ends, picks = (math.lcm(int(n), len(rows)) for n, rows in zip(sides.front.repeat, sides.tints, strict=True))
-    own, depth = read or partial(read_sides, sides), sides.front.plane - sides.front.lowest
-    return golden_of(groups, (ends, picks), own, side_colours(sides), digits=_DIGITS_OF_LINES, depth=depth)
+    read, depth = partial(read_sides, sides), sides.front.plane - sides.front.lowest
+    return golden_of(groups, (ends, picks), read, side_colours(sides), digits=_DIGITS_OF_LINES, depth=depth)
 
 
 def side_colours(sides: Sides) -> Colouring:

@@ -8,7 +8,7 @@ from typing import Final
 from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL
 from pipeline.shader.descriptor import Shader, descriptor
 from pipeline.shader.golden import golden
-from pipeline.shader.tables import Sides, layout_slang, refuse_large_repeat, table_files, tables, tabulate_sides
+from pipeline.shader.tables import layout_slang, refuse_large_repeat, table_files, tables, tabulate_sides
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -38,12 +38,7 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
         table_files(cloth),
         descriptor(fabric, level, cloth, kinds),
         golden(sides),
-        nodes_of(level, sides),
+        f"level {level}, {sides.front.evenly.size} nodes",
         True,
         threads=max(map(len, sides.tints)) > 1,
     )
-
-
-def nodes_of(level: int, sides: Sides) -> str:
-    """Return words on the size of the tables."""
-    return f"level {level}, {sides.front.evenly.size} nodes"

@@ -163,16 +163,15 @@ class Batches:
         """Return the batch of a step."""
         fabrics, rows = self.order.step(step)
         index = rows + self.rows.starts[fabrics][:, None]
-        row = torch.from_numpy(index).to(self.device)
         if self._resident is not None:
-            table = self._resident[row]
+            table = self._resident[torch.from_numpy(index).to(self.device)]
         else:
             table = torch.from_numpy(self.rows.table[index]).to(self.device)
         u, v, sigma = table[..., :3].unbind(dim=-1)
         minor, angle, curvature = table[..., 9:12].unbind(dim=-1)
         wi, wo, target = table[..., 3:6], table[..., 6:9], table[..., TARGET]
         fabric = torch.from_numpy(fabrics).to(self.device)
-        return Batch(fabric, u, v, sigma, wi, wo, minor, angle, curvature, target, table[..., -1], row)
+        return Batch(fabric, u, v, sigma, wi, wo, minor, angle, curvature, target, table[..., -1])
 
 
 class RowStream(IterableDataset[dict[str, Tensor]]):

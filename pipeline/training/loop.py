@@ -73,7 +73,7 @@ def train(
     WorkFailed
         If the loss diverges, or the code of a network from outside fails; the last good checkpoint stays.
     """
-    device = chosen_device(training.device)
+    device = _chosen_device(training.device)
     manifest = Manifest.load(manifest_folder)
     if missing := [name for name in fabrics if name not in manifest.fabrics]:
         raise BadInput(str(manifest_folder), "fabric", missing[0], nearest(missing[0], manifest.fabrics))
@@ -90,7 +90,6 @@ def train(
         sets = [set_name(rows) for rows in options.extra_rows]
         extra = ([manifest.columns(manifest_folder, name, own) for name in fabrics] for own in sets)
         network = build_network(options, members, extra)
-        network.expect(len(rows.table))
         network.start_at(torch.from_numpy(rows.table[:: max(len(rows.table) // _START_ROWS, 1), TARGET].copy()))
         network.to(device).train()
         groups = network.parameter_groups(training.learning_rate)
@@ -183,7 +182,7 @@ def rate_factor(step: int, training: TrainingOptions) -> float:
     return 0.5 * (1.0 + math.cos(math.pi * (step - warm) / max(training.steps - warm, 1)))
 
 
-def chosen_device(name: str) -> torch.device:
+def _chosen_device(name: str) -> torch.device:
     """Return the requested device; BadInput if it is a GPU and there is none."""
     present = torch.cuda.is_available()
     if name == "cuda" and not present:

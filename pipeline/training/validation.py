@@ -64,8 +64,7 @@ class HeldOut:
         query = {name: stacked(getattr(queries, name) for queries, _ in rows) for name in Queries._fields}
         target = stacked(answers.mean for _, answers in rows)
         transparency = stacked(answers.transparency for _, answers in rows)
-        row = torch.full((len(fabric), each), -1, device=device)
-        return Batch(fabric, **query, target=target, transparency=transparency, row=row)
+        return Batch(fabric, **query, target=target, transparency=transparency)
 
     def error_and_noise(self, weights: dict[str, Tensor]) -> tuple[float, float]:
         """Return the mean squared error over all components, as measured, and the truth's own; not without queries."""
@@ -84,8 +83,8 @@ class HeldOut:
             for number, label in enumerate(footprint_labels()):
                 inside = place == number
                 if inside.any():
-                    bins[label] = component_figures(prediction[inside], answers.take(inside))
-            found[name] = component_figures(prediction, answers) | {"footprints": bins}
+                    bins[label] = _component_figures(prediction[inside], answers.take(inside))
+            found[name] = _component_figures(prediction, answers) | {"footprints": bins}
         return found
 
     def _answered(
@@ -103,7 +102,7 @@ def footprint_labels() -> list[str]:
     return [f"below {FOOTPRINTS[0]:g}", *inner, f"above {FOOTPRINTS[-1]:g}"]
 
 
-def component_figures(prediction: npt.NDArray[np.float32], answers: Answers) -> dict[str, dict[str, float]]:
+def _component_figures(prediction: npt.NDArray[np.float32], answers: Answers) -> dict[str, dict[str, float]]:
     """Compare components (N, 4) with the truth.
 
     Returns

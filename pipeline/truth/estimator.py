@@ -39,7 +39,7 @@ _STUDENT: Final = 1.2
 samples, so that three of them cover as much as three of a normal distribution."""
 
 
-def auto_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
+def _auto_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer each query by the first whose standard error is small enough: a coarse table, a fine one, sampling."""
     answers = Raw.empty(len(index))
     known = FINE.knows(cloth, columns)
@@ -64,7 +64,7 @@ def auto_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: Tru
     return answers
 
 
-def node_table_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
+def _node_table_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
     """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever their error.
 
     BadInput if the table does not know a query.
@@ -99,8 +99,8 @@ ESTIMATORS: Final[dict[EstimatorName, Estimator]] = {
     "r2": partial(_sampled, R2),
     "owen": partial(_sampled, OWEN),
     "quadrature": quadrature_rows,
-    "node_table": node_table_rows,
-    "auto": auto_rows,
+    "node_table": _node_table_rows,
+    "auto": _auto_rows,
 }
 """Every estimator by its name in `TruthOptions.estimator`."""
 

@@ -142,7 +142,7 @@ def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
 
 
 @kernel
-def visible_share(sums: Float64, whole: float) -> tuple[float, float]:
+def _visible_share(sums: Float64, whole: float) -> tuple[float, float]:
     """Return the visible share of a patch, and its standard error.
 
     `sums` is (RANDOMISATIONS, POINT_SUMS), `whole` the sum of areas of one randomisation of a patch wholly visible.
@@ -200,6 +200,6 @@ def sample_rows(
                 break
             target = 2 * done
         counts[row] = done * RANDOMISATIONS
-        share, doubt = visible_share(sums, directions.viewer.z * done)
+        share, doubt = _visible_share(sums, directions.viewer.z * done)
         conceal(share, doubt, mean, error)
     return Raw(means, errors, counts, np.full(rows, SAMPLED))

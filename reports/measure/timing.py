@@ -91,10 +91,10 @@ def time_side_by_side(
             progress((turn + 1) / (warm_up + repeats))
         for turn in range(repeats):
             for index, contender in enumerate(contenders):
-                synchronise()
+                _synchronise()
                 start, ran_before = clock(), time.thread_time_ns()
                 _call(contender, pool)
-                synchronise()
+                _synchronise()
                 elapsed[index].append(clock() - start)
                 ran[index] += time.thread_time_ns() - ran_before
             progress((warm_up + turn + 1) / (warm_up + repeats))
@@ -148,10 +148,10 @@ def timed(subject: Record, metric: Metric, samples: Sequence[float]) -> Record:
 
 def milliseconds(action: Callable[[], object], clock: Callable[[], int] = time.perf_counter_ns) -> float:
     """Return how long a single action takes, in milliseconds."""
-    synchronise()
+    _synchronise()
     start = clock()
     action()
-    synchronise()
+    _synchronise()
     return 1e-6 * (clock() - start)
 
 
@@ -161,7 +161,7 @@ def set_threads(threads: int) -> None:
         torch.set_num_threads(threads)
 
 
-def synchronise() -> None:
+def _synchronise() -> None:
     """Wait for the GPU, if a method has loaded torch and there is one."""
     if (torch := sys.modules.get("torch")) is not None and torch.cuda.is_available():
         torch.cuda.synchronize()

@@ -116,7 +116,7 @@ def sections(
     per_material : collection of str
         Methods that are trained on every fabric by itself.
     """
-    values = {**facts(records, frames["errors"], per_material), **truth_facts(records), **(options or {})}
+    values = {**facts(records, frames["errors"], per_material), **_truth_facts(records), **(options or {})}
     ranged = ranged_frames(frames)
     tables, sentences = result_tables(records, ranged, values, per_material), section_sentences(ranged)
     return {
@@ -376,7 +376,7 @@ def _columns_of(kept: RowRecords[Any]) -> list[Column]:
     ]
 
 
-def truth_facts(records: Sequence[Record]) -> dict[str, object]:
+def _truth_facts(records: Sequence[Record]) -> dict[str, object]:
     """Return the values of words (`tables.toml`) about the truth: limits, and how much was measured."""
     accuracies, calibrations = (part.RECORDS.from_records(records) for part in (accuracy, calibration))
     values: dict[str, object] = {"exceeded": percent(calibration.EXCEEDED), "limit": percent(bias.LIMIT)}

@@ -186,7 +186,7 @@ def _cost(value: float, cost: str) -> str:
     return f"{value:,.0f}{NO_BREAK}ns" if cost == "ns" else f"{significant(value)}{NO_BREAK}ms"
 
 
-def equal_time_sentences(table: pd.DataFrame) -> list[str]:
+def _equal_time_sentences(table: pd.DataFrame) -> list[str]:
     """Return for each method the rivals with a lower error of the colour in the same time, and where.
 
     The table is from `equal_time_table`.
@@ -219,7 +219,7 @@ def section_sentences(frames: Mapping[str, pd.DataFrame]) -> dict[str, list[str]
     scenes = scene_sentences(frames["scenes"])
     return {
         "trade": cheapest_sentences(frames["tradeoff"]),
-        "equal-time": equal_time_sentences(frames["equal_time"]),
+        "equal-time": _equal_time_sentences(frames["equal_time"]),
         "aliasing": cheapest_sentences(frames["tradeoff"], "flicker"),
         "scenes": [f"{plain(scene).capitalize()}: {text}" for scene, texts in scenes.items() for text in texts],
     }

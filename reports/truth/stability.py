@@ -139,7 +139,7 @@ def expressions() -> Iterator[Expression]:
         "G_t", _nearly_equal, _through, lambda i, o: textbook_through(exact(i), exact(o)), textbook_through
     )
     yield Expression("σ", _near_axis, sigma, sigma_of, textbook_sigma, sigma_of, textbook_sigma)
-    yield Expression("D", _half_vectors, density, density_of, matrix_density, density_of, textbook_density)
+    yield Expression("D", _half_vectors, density, _density_of, matrix_density, _density_of, textbook_density)
     for name, corners in (("f_r", partial(_slabs, False)), ("f_t", partial(_slabs, True))):
         yield Expression(
             name, corners, _slab_of_node, _lit(slab_of), _lit(textbook_slab), slab_of, textbook_slab, _DARK
@@ -147,7 +147,7 @@ def expressions() -> Iterator[Expression]:
     yield Expression("exp(−TΛ)", _crossings, _crossing_of_node, _unscattered_of, dark=_DARK)
     # What rounding the directions does, which no form helps.
     yield Expression("cos", _grazing, dot, dot)
-    yield Expression("D", _forward, _halved(density), _halved(density_of), _halved(matrix_density))
+    yield Expression("D", _forward, _halved(density), _halved(_density_of), _halved(matrix_density))
     for bend in BENDS:
         yield from _torus(bend)
     random = np.random.default_rng(8)
@@ -278,7 +278,7 @@ def sigma_of(w: Array, t: Array, alpha: Array) -> Array:
     return _each(slab.sigma, *w, *t, alpha)
 
 
-def density_of(v: Array, t: Array, alpha: Array) -> Array:
+def _density_of(v: Array, t: Array, alpha: Array) -> Array:
     """Return D as `microflake` computes it."""
     return _each(slab.density, *v, *t, alpha)
 
@@ -287,7 +287,7 @@ def slab_of(wi: Array, wo: Array, t: Array, alpha: Array, thickness: Array) -> A
     """Return f_r, or f_t of light from behind, as `slab` computes it."""
     function = slab.transmission if wi[2, 0] < 0 else slab.reflection
     sigmas, cosines = (sigma_of(wi, t, alpha), sigma_of(wo, t, alpha)), (np.abs(wi[2]), np.abs(wo[2]))
-    return _each(function, density_of(wi + wo, t, alpha), *sigmas, *cosines, thickness)
+    return _each(function, _density_of(wi + wo, t, alpha), *sigmas, *cosines, thickness)
 
 
 def _unscattered_of(wo: Array, t: Array, alpha: Array, thickness: Array) -> Array:

@@ -90,9 +90,6 @@ class Viewer {
     if (this.tiled(name)) {
       return { kind: TILE, view: state.view, tile: name, level: this.usual, label: TILES[name] };
     }
-    if (name === "selvage" && this.own && this.picture.knows(SELVAGE)) {
-      return { kind: SELVAGE, level: this.content.selvage.level, label: "Selvage" };
-    }
     if (name === "point" || !this.picture.knows(NODES)) {
       return { kind: POINT, level: this.usual, label: "One point a pixel" };
     }
@@ -208,10 +205,6 @@ class Viewer {
       const known = content.views.filter((view) => name in (view.tiles ?? {})).map((view) => view.name);
       return `${TILES[name]}: known at ${known.join(", ")} alone, of the yarns as they are.`;
     });
-    if (names.includes("selvage")) {
-      if (!this.own) said.push("Selvage: known of the yarns as they are.");
-      else if (!this.picture.knows(SELVAGE)) said.push("Selvage: its shader does not compile here.");
-    }
     if (names.some((name) => name !== "point" && !this.tiled(name)) && !this.picture.knows(NODES)) {
       said.push("Soft nodes: their shader does not compile here. One point is shown instead.");
     } else if (said.length) said.push("Soft nodes are shown instead.");
@@ -339,7 +332,6 @@ function makeChoices(viewer, bind) {
     bind.updates.push((state) => button.setAttribute("aria-pressed", state.view === index));
   });
   const names = [["point", "One point a pixel"], ...viewer.levels.map((level) => [String(level), `Soft nodes, detail ${level}`])];
-  if (viewer.content.selvage) names.push(["selvage", "Selvage"]);
   names.push(...viewer.content.tiles.map((name) => [name, TILES[name]]));
   for (const side of ["left", "right"]) {
     names.forEach(([name, text]) => byId(side).add(new Option(text, name)));
@@ -439,7 +431,7 @@ function listen(viewer) {
 async function start() {
   try {
     for (let n = 0; n < 2; n += 1) await nextFrame(); // the still picture is seen first
-    const sources = Object.fromEntries(["points", "nodes", "selvage"].map((name) => [name, byId(name).textContent]));
+    const sources = Object.fromEntries(["points", "nodes"].map((name) => [name, byId(name).textContent]));
     const viewer = new Viewer(JSON.parse(byId("content").textContent), sources);
     const updates = [];
     const input = (element, changes) => element.addEventListener("input", () => viewer.set(changes()));

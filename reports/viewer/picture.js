@@ -6,7 +6,6 @@ const SHAPES = ["plane", "sphere", "drape"];
 const NODES = 0;
 const POINT = 1;
 const TILE = 2;
-const SELVAGE = 3;
 
 function direction(turn, tilt) {
   const [a, b] = [radians(turn), radians(tilt)];
@@ -14,7 +13,7 @@ function direction(turn, tilt) {
 }
 
 class Picture {
-  // `sources`: shaders that draw points and tiles, soft nodes, and `selvage`.
+  // `sources`: shaders that draw points and tiles, and soft nodes.
   constructor(canvas, sources, content) {
     this.content = content;
     this.sources = sources;
@@ -35,7 +34,7 @@ class Picture {
 
   // Draw by the program of a kind of method; it is compiled when it is first needed.
   use(kind) {
-    const name = { [NODES]: "nodes", [SELVAGE]: "selvage" }[kind] ?? "points";
+    const name = kind === NODES ? "nodes" : "points";
     if (!this.programs.has(name)) this.programs.set(name, this.compiled(this.sources[name]));
     this.gl.useProgram(this.programs.get(name));
   }
@@ -67,7 +66,7 @@ class Picture {
       throw new Error(`The shader does not compile here. ${gl.getProgramInfoLog(program) || ""}`);
     }
     gl.useProgram(program);
-    ["integers", "numbers", "nodes", "grid", "tile", "weights"].forEach((name, unit) => {
+    ["integers", "numbers", "nodes", "grid", "tile"].forEach((name, unit) => {
       gl.uniform1i(gl.getUniformLocation(program, `${name}_0`), unit);
     });
     gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, "block_View_0"), 0);
@@ -81,7 +80,6 @@ class Picture {
       integers: [gl.R32I, gl.RED_INTEGER, gl.INT, 1],
       numbers: [gl.R32F, gl.RED, gl.FLOAT, 1],
       nodes: [gl.RGBA32F, gl.RGBA, gl.FLOAT, 4],
-      weights: [gl.RGBA32F, gl.RGBA, gl.FLOAT, 4],
       grid: [gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE, 1],
       tile: [gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT, 4],
     }[name];
@@ -141,11 +139,7 @@ class Picture {
         cloth.nodes = this.texture("nodes", turnedNodes(cloth.table, columns, yarns));
         cloth.edit = edit;
       }
-      if (method.kind === SELVAGE) {
-        this.weights ??= unpacked(this.content.selvage.weights, Float32Array).then((f) => this.texture("weights", f));
-      }
-      const weights = method.kind === SELVAGE ? await this.weights : this.empty;
-      ready.push({ ...method, cloth, texture: tile, weights });
+      ready.push({ ...method, cloth, texture: tile });
     }
     return ready;
   }
@@ -185,12 +179,12 @@ class Picture {
     const [width, height] = size;
     gl.viewport(0, 0, width, height);
     gl.enable(gl.SCISSOR_TEST);
-    ready.forEach(({ kind, cloth, texture: tile, weights }, side) => {
+    ready.forEach(({ kind, cloth, texture: tile }, side) => {
       const [low, high] = ready.length === 1 ? [0, width] : side === 0 ? [0, wipe] : [wipe, width];
       if (high <= low) return;
       gl.scissor(low, rows[0], high - low, rows[1] - rows[0]);
       this.use(kind);
-      [cloth.integers, cloth.numbers, cloth.nodes, cloth.grid, tile, weights].forEach((texture, unit) => {
+      [cloth.integers, cloth.numbers, cloth.nodes, cloth.grid, tile].forEach((texture, unit) => {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(gl.TEXTURE_2D, texture);
       });

@@ -12,14 +12,14 @@ import base64
 import gzip
 import html
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.groups import COLUMNS, DETAILS, USUAL
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
 from pipeline.atomic import atomic_write
@@ -29,7 +29,6 @@ from pipeline.models.named import TRUTH, named_method
 from pipeline.scenes.shade import coloured, colours, colours_of
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
-from pipeline.shader.networks import correction
 from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
 from pipeline.shader.threads import thread_tints
 from pipeline.truth.estimator import estimate
@@ -37,7 +36,7 @@ from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, G
 from pipeline.truth.options import TruthOptions
 from reports.images.texture import png_bytes
 from reports.options import LEAST_TILE, MOST_TILE
-from reports.viewer.generate import KINDS, THREADS, network, shipped
+from reports.viewer.generate import KINDS, THREADS, shipped
 from reports.viewer.shapes import HALF_ARC, HALF_HEIGHT, VIEW_SPREAD, Seen, Viewpoint, arcs, seen, sphere_radius
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -174,7 +173,6 @@ def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lamb
         "columns": {"sin": SIN_TWIST, "cos": COS_TWIST, "roughness": ALPHA, "relief": BETA, "blend": BLEND},
         "gap": GAP,
         "tables": of_shapes,
-        "selvage": _selvage(fabric, of_shapes),
         "grids": grids,
         "tiles": [*methods, _FLAT, TRUTH] if truth else [],
         "views": pictures,
@@ -266,15 +264,6 @@ def _families(table: SoftNodeTable, cloth: ClothTables) -> npt.NDArray[np.uint8]
 
 def _yarn(yarn: Yarn) -> dict[str, float]:
     return {"roughness": yarn.roughness, "twist": yarn.twist, "blend": yarn.blend}
-
-
-def _selvage(fabric: Fabric, shown: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """Return the weights of the network for the fabric; None if the page lacks the table that it corrects."""
-    method = network()
-    level = method.options.level
-    if not any((table["level"], table["bend"], table["width"]) == (level, 1.0, 1.0) for table in shown):
-        return None
-    return {"level": level, "weights": packed(correction(method, fabric)[0].values)}
 
 
 def _methods(fabric: Fabric) -> dict[str, Method]:

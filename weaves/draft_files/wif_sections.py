@@ -117,7 +117,7 @@ class _Wif(BaseModel):
     weft_thickness: Lengths = {}
 
 
-def section_name(field: str) -> str:
+def _section_name(field: str) -> str:
     """Return the name of a section as a WIF text has it."""
     return f"[{field.upper().replace('_', ' ')}]"
 
@@ -133,7 +133,7 @@ def wif_pattern(text: str, where: str) -> PatternData:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         section, *keys = first["loc"]
-        key = " ".join([section_name(str(section)), *(str(key) for key in keys[:1])])
+        key = " ".join([_section_name(str(section)), *(str(key) for key in keys[:1])])
         raise BadInput(where, key, first["input"], first["msg"]) from error
     _refuse_missing(wif, where)
     _count_from_one(wif)
@@ -166,7 +166,7 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
             kept += [f"[{name.replace(' ', '_')}]"] * inside
         elif inside and line:
             if len(line) > MOST_LINE_LETTERS:
-                long = f"{section_name(name)} has a line of {len(line):,} letters"
+                long = f"{_section_name(name)} has a line of {len(line):,} letters"
                 raise BadInput(where, "", long, f"at most {MOST_LINE_LETTERS:,}")
             kept.append(line)
     if not begun:
@@ -179,7 +179,7 @@ def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
     except ParsingError as error:
         number, line = error.errors[0][0], kept[error.errors[0][0] - 1]
         section = next(entry for entry in reversed(kept[:number]) if entry.startswith("["))
-        wrong = f"{section_name(section[1:-1])} has the line {line}"
+        wrong = f"{_section_name(section[1:-1])} has the line {line}"
         raise BadInput(where, "", wrong, "a line is KEY=VALUE") from error
     return {name: dict(parser[name]) for name in parser.sections()}
 
@@ -237,10 +237,10 @@ def _yarns_of(wif: _Wif, axis: str, where: str) -> WarpWeftData:
     known = f"[COLOR TABLE] has {len(wif.color_table)} colours, {min(wif.color_table)} to {max(wif.color_table)}"
     for thread, colour in colours.items():
         if colour not in wif.color_table:
-            raise BadInput(where, f"{section_name(f'{axis}_colors')} {thread}", colour, known)
+            raise BadInput(where, f"{_section_name(f'{axis}_colors')} {thread}", colour, known)
     sets = wif.threading if axis == "warp" else wif.liftplan or wif.treadling
     threads = max([yarns.threads or 0, *sets])
-    section, default = section_name(axis), yarns.color[0] if yarns.color else -1
+    section, default = _section_name(axis), yarns.color[0] if yarns.color else -1
     if yarns.threads and max(sets) > yarns.threads:
         warnings.warn(
             f"{section} states {yarns.threads} threads, the draft has {max(sets)}: all are read.", stacklevel=1
@@ -261,7 +261,7 @@ def _yarns_of(wif: _Wif, axis: str, where: str) -> WarpWeftData:
             if len(lengths) >= threads:
                 setattr(yarns, key, next(iter(lengths.values())))
             else:
-                single = section_name(f"{axis}_{key}")
+                single = _section_name(f"{axis}_{key}")
                 warnings.warn(f"{section} states no {key.title()}: {single} is not used.", stacklevel=1)
                 lengths.clear()
     return WarpWeftData(threads, default, None, yarns.spacing, yarns.thickness, yarns.units)

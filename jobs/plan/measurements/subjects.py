@@ -89,8 +89,7 @@ class Trained(TaskPart):
         """Load its methods so that they answer any query."""
         from pipeline.models.fallback import Fallback
 
-        kinds = self.options.kinds | self.options.without_training
-        return [Fallback(one, kinds, footprint) for one in self.methods(out)]
+        return [Fallback(one, self.options.kinds, footprint) for one in self.methods(out)]
 
     def variants(self, methods: Sequence[Method], ways: RunOptions) -> list[Method]:
         """Return trained methods with or without an energy bound, and in other runtimes."""

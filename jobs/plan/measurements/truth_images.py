@@ -170,7 +170,7 @@ class LivePage(Measurement):
 
     def versions(self) -> dict[str, int]:
         """Return the versions of the truth, of the models that it shows, and of the page."""
-        shown = ("soft_nodes", "selvage", "map_material")
+        shown = ("soft_nodes", "map_material")
         models = {name: versions.MODELS.get(name, 1) for name in shown}
         return {"truth": versions.TRUTH, "viewer": versions.VIEWER} | models
 

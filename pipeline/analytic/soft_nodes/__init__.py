@@ -2,6 +2,5 @@
 
 nodes: the table of a cloth, at a level of detail; groups and seen_areas make it. answer: the sums of queries; wide for
 fixed nodes; view_lines for nodes placed on lines in the viewer's azimuth, where view_rays and cuts say what is seen of
-each piece, and line_nodes sums them; shade for both. features: input of the network `selvage`, and components of light
-from both sides.
+each piece, and line_nodes sums them; shade for both. components: what is read of the sums, light in front or behind.
 """

@@ -20,7 +20,7 @@ from pipeline.analytic.soft_nodes.shade import (
     Five,
     GridHorizons,
     NodeFrame,
-    Ten,
+    Six,
     YarnDirections,
     add_node,
     node_behind,
@@ -168,7 +168,7 @@ def shade_lines(
     yarn: Float32,
     family: int,
     thickness: np.float32,
-) -> Ten:
+) -> Six:
     """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids of `size` cells.
 
     `falls` and `fall` are those of the horizons over curved cloth (soft_horizons); None on flat cloth, which has a loop
@@ -178,7 +178,7 @@ def shade_lines(
     layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
     step_a, step_b = (1, size) if family == WARP else (size, 1)
     level, sharp = d.iz * _LEVELS, sharpness / _LEVELS
-    total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
+    total = (_0, _0, _0, _0, _0, _0)
     for k in range(len(firsts)):
         at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
         cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)

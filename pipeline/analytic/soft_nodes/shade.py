@@ -7,11 +7,10 @@ in a node's box.
 Light from behind is transmitted, and what the back of the cloth hides is soft too; light and viewer are on different
 sides, so that what hides one has nothing to do with what hides the other.
 
-Each family has ten sums, as shares of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and lit;
-BARE_AREA, BARE_DIFFUSE and BARE_SPECULAR with nothing hidden; DIFFUSE_DOUBT and SPECULAR_DOUBT, the part of the bare
-ones within ramps; OPEN_DIFFUSE and OPEN_SPECULAR, seen, and lit without shadows: an upper bound of energy (features).
-With the light behind there are five: the first four, and THROUGH, the area times the share of light that crosses the
-yarn unscattered.
+Each family has six sums, as shares of the footprint: AREA seen; DIFFUSE (before 1/pi) and SPECULAR, seen and lit;
+BARE_AREA with nothing hidden; OPEN_DIFFUSE and OPEN_SPECULAR, seen, and lit without shadows: an upper bound of energy
+(components). With the light behind there are five: the first four, and THROUGH, the area times the share of light that
+crosses the yarn unscattered.
 """
 
 from __future__ import annotations
@@ -30,11 +29,10 @@ from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlin
 from pipeline.truth.geometry.heightfield import WEFT
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
-NODE_SUMS: Final = 10
+NODE_SUMS: Final = 6
 """Sums of a family."""
 
-AREA, DIFFUSE, SPECULAR, BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR, DIFFUSE_DOUBT, SPECULAR_DOUBT = range(8)
-OPEN_DIFFUSE, OPEN_SPECULAR = 8, 9
+AREA, DIFFUSE, SPECULAR, BARE_AREA, OPEN_DIFFUSE, OPEN_SPECULAR = range(NODE_SUMS)
 THROUGH: Final = 4
 """Place of the fifth sum with the light behind."""
 
@@ -47,12 +45,7 @@ FADED: Final = np.float32(1e-4)
 TINY: Final = np.float32(1e-18)
 """Keeps a quotient of sums finite."""
 
-Eight = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
-Ten = tuple[
-    np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32,
-    np.float32,
-]  # fmt: skip
-
+Six = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
 Five = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
 
 _0, _1 = np.float32(0.0), np.float32(1.0)
@@ -166,8 +159,8 @@ def shade_node(
     weight: np.float32,
     layer: YarnLayer,
     least: np.float32 = _0,
-) -> Eight:
-    """Return a node's shares of the first six sums and of the last two; `along`, `across` as for `_flakes`.
+) -> Six:
+    """Return a node's shares of the six sums; `along`, `across` as for `_flakes`.
 
     A node that faces away from the viewer has the cosine `least` to it. Of `seen`, what exceeds 1 are walls, which are
     lit as the whole box.
@@ -184,12 +177,12 @@ def shade_node(
     flakes = _flakes(d, along_i + along_o, along, across, layer.square, layer.scale)
     sigma_i, sigma_o = sigma(along_i, layer.square), sigma(along_o, layer.square)
     specular = wide * reflection(flakes, _1, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
-    return area * seen, diffuse * both, specular * both, area, diffuse, specular, diffuse * seen, specular * seen
+    return area * seen, diffuse * both, specular * both, area, diffuse * seen, specular * seen
 
 
 @inlined_fast_kernel
 def add_node(
-    total: Ten,
+    total: Six,
     d: YarnDirections,
     at: NodeFrame,
     along: np.float32,
@@ -199,14 +192,10 @@ def add_node(
     weight: np.float32,
     layer: YarnLayer,
     least: np.float32 = _0,
-) -> Ten:
-    """Return the ten sums with a node's shares added; arguments as for `shade_node`."""
-    a, c, s, a0, c0, s0, open_c, open_s = shade_node(d, at, along, across, seen, lit, weight, layer, least)
-    doubt = lit * (_1 - lit) + seen * (_1 - seen)
-    return (
-        total[0] + a, total[1] + c, total[2] + s, total[3] + a0, total[4] + c0, total[5] + s0,
-        total[6] + c0 * doubt, total[7] + s0 * doubt, total[8] + open_c, total[9] + open_s,
-    )  # fmt: skip
+) -> Six:
+    """Return the six sums with a node's shares added; arguments as for `shade_node`."""
+    a, c, s, a0, open_c, open_s = shade_node(d, at, along, across, seen, lit, weight, layer, least)
+    return total[0] + a, total[1] + c, total[2] + s, total[3] + a0, total[4] + open_c, total[5] + open_s
 
 
 @inlined_fast_kernel
@@ -274,11 +263,11 @@ def shade_fixed(
     alpha: np.float32,
     thickness: np.float32,
     blend: np.float32,
-) -> Ten:
+) -> Six:
     """Return the sums over fixed nodes of one family; `areas` and `freed` as in `Scratch`."""
     layer = yarn_layer(alpha, thickness, blend)
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
-    total = (_0, _0, _0, _0, _0, _0, _0, _0, _0, _0)
+    total = (_0, _0, _0, _0, _0, _0)
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
             lit = ramp(above(d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
@@ -319,7 +308,7 @@ def shade_fixed_behind(
 
 
 @inlined_kernel
-def write_sums(sums: Ten | Five, result: Float32) -> None:
+def write_sums(sums: Six | Five, result: Float32) -> None:
     """Write the sums of a family to its row."""
     for q in range(len(sums)):
         result[q] = sums[q]

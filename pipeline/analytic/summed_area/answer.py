@@ -100,7 +100,7 @@ def azimuth(x: np.float32, y: np.float32) -> Azimuth:
 
 
 @inlined_kernel
-def level_of(tables: ClusterTables, sigma: np.float32) -> int:
+def _level_of(tables: ClusterTables, sigma: np.float32) -> int:
     """Return the level nearest to a deviation, by ratio."""
     octaves = math.log2(max(np.float64(sigma), tables.finest) / tables.finest)
     return min(int(octaves * OCTAVE_STEPS + 0.5), len(tables.levels) - 1)
@@ -151,7 +151,7 @@ def touched(tables: ClusterTables, texels: Index, first: int, last: int, slots: 
 
 
 @inlined_kernel
-def gap_area(
+def _gap_area(
     tables: ClusterTables, texels: Index, weights: Float32, o: Azimuth, oz: np.float32
 ) -> tuple[np.float32, np.float32]:
     """Return area and seen area of gaps, over that of the cloth."""
@@ -192,7 +192,7 @@ def _answer_rows(
         ix, iy, iz = queries.wi[n, 0], queries.wi[n, 1], queries.wi[n, 2]
         ox, oy, oz = queries.wo[n, 0], queries.wo[n, 1], queries.wo[n, 2]
         i, o = azimuth(ix, iy), azimuth(ox, oy)
-        level = level_of(tables, queries.sigma[n])
+        level = _level_of(tables, queries.sigma[n])
         count = queries.readings[n] if level < len(tables.levels) - 1 else 1
         area, bare = _0, _0
         for tap in range(count):
@@ -212,7 +212,7 @@ def _answer_rows(
                 bare += whole
                 result[n, family] += specular
                 result[n, 2 + family] += diffuse
-            open_area, open_seen = gap_area(tables, texels, weights, o, oz)
+            open_area, open_seen = _gap_area(tables, texels, weights, o, oz)
             area += open_seen
             bare += open_area
         divide(result[n], area, bare)
@@ -236,7 +236,7 @@ def _answer_rays_rows(
     """Write the components of all queries; `window` and `slots` are scratch memory."""
     for n in range(len(queries.u)):
         i, o = azimuth(queries.wi[n, 0], queries.wi[n, 1]), azimuth(queries.wo[n, 0], queries.wo[n, 1])
-        level = level_of(tables, queries.sigma[n])
+        level = _level_of(tables, queries.sigma[n])
         area, bare = _0, _0
         for tap in range(queries.readings[n]):
             along = queries.spread[n] * places[queries.readings[n], tap]
@@ -295,7 +295,7 @@ def _add_layers(
             sums[family] += specular
             sums[2 + family] += diffuse
     find(tables, level, x - tables.plane * run_x, y - tables.plane * run_y, texels, weights)
-    open_area, open_seen = gap_area(tables, texels, weights, o, oz)
+    open_area, open_seen = _gap_area(tables, texels, weights, o, oz)
     return area + open_seen, bare + open_area
 
 

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.soft_nodes.shade import Eight, YarnDirections
+from pipeline.analytic.soft_nodes.shade import Six, YarnDirections
 from pipeline.analytic.summed_area.clusters import LANES
 from pipeline.analytic.summed_area.shade import Azimuth, Four, Nine, Optics, Slots, corner, evaluate, optics
 from pipeline.analytic.summed_area.tables import MEAN, OCTAVE_STEPS, SPREAD, ClusterTables
@@ -68,7 +68,7 @@ def _part(
 def _cluster(
     tables: ClusterTables, slots: tuple[int, int, int, int], k: int, weights: Four, layer: HeightLayer, i: Azimuth,
     o: Azimuth, d: YarnDirections, own: Optics,
-) -> Eight:  # fmt: skip
+) -> Six:  # fmt: skip
     """Return the sums of what a layer has of cluster k of a block."""
     p = _part(tables, slots[0], k, weights[0], layer, i, o)
     q = _part(tables, slots[1], k, weights[1], layer, i, o)

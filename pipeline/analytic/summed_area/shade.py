@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import ramp
-from pipeline.analytic.soft_nodes.shade import Eight, NodeFrame, YarnDirections, YarnLayer, shade_node
+from pipeline.analytic.soft_nodes.shade import NodeFrame, Six, YarnDirections, YarnLayer, shade_node
 from pipeline.analytic.summed_area.clusters import LANES
 from pipeline.analytic.summed_area.tables import AREA, MEAN, MEAN_SCALE, SPREAD, SPREAD_SCALE, SPREAD_U, SPREAD_V, U, V
 from pipeline.analytic.torus_frame import Angles, Fibre, normal, tangent, turning
@@ -93,7 +93,7 @@ def over_horizon(z: np.float32, low: np.float32, width: np.float32, inverse: np.
 
 
 @inlined_fast_kernel
-def evaluate(sums: Nine, d: YarnDirections, own: Optics) -> Eight:
+def evaluate(sums: Nine, d: YarnDirections, own: Optics) -> Six:
     """Return a cluster's sums as `shade_node` does, from its sums over the texels."""
     area, v, u, spread_v, spread_u, low_i, width_i, low_o, width_o = sums
     inverse = _1 / max(area, _TINY)
@@ -127,7 +127,7 @@ def _cluster(
     o: Azimuth,
     d: YarnDirections,
     own: Optics,
-) -> Eight:
+) -> Six:
     """Return the sums of cluster k of a block."""
     p = corner(surface, horizon, slots[0], k, weights[0], i, o)
     q = corner(surface, horizon, slots[1], k, weights[1], i, o)

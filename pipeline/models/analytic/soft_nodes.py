@@ -1,4 +1,4 @@
-"""Sums over few nodes with soft shadows: `selvage` without its network.
+"""Sums over few nodes with soft shadows; nothing is trained.
 
 A cloth's table holds some tens to hundreds of nodes with normals, tangents and softened horizons
 (pipeline.analytic.soft_nodes); a query becomes one sum over them and costs from half a microsecond to two, by the level
@@ -40,7 +40,7 @@ def soft_tables(level: int, behind: bool = False, curved: bool = False, rims: bo
 
 
 class SoftNodesOptions(AnalyticOptions):
-    """Soft nodes, as in `selvage`, without a network; nothing is trained."""
+    """Sums over soft nodes; nothing is trained."""
 
     turns: ClassVar[bool] = True
     parameter: ClassVar[str] = "levels"
@@ -66,7 +66,7 @@ class SoftNodesOptions(AnalyticOptions):
 
 
 class SoftNodes(Analytic["SoftNodeTable"]):
-    """Soft nodes without a network.
+    """Soft nodes of one level.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class SoftNodes(Analytic["SoftNodeTable"]):
     turns: ClassVar[bool] = SoftNodesOptions.turns
 
     def __init__(self, level: int = 2, name: str = "soft_nodes", walls: Walls = "rim") -> None:
-        from pipeline.analytic.soft_nodes.features import read_queries
+        from pipeline.analytic.soft_nodes.components import read_queries
 
         def read(table: SoftNodeTable, queries: Queries, seed: int) -> Float32:
             return in_chunks(queries, lambda part: read_queries(table, part).components)
@@ -93,7 +93,7 @@ class SoftNodes(Analytic["SoftNodeTable"]):
 
     def behind(self, fabric: Fabric, queries: Queries) -> Float32:
         """Answer N queries with the light behind: components and transparency, float32 (N, 5)."""
-        from pipeline.analytic.soft_nodes.features import read_behind
+        from pipeline.analytic.soft_nodes.components import read_behind
 
         table = self.table_for(fabric, queries)
         return in_chunks(queries, lambda part: read_behind(table, part), 5)

@@ -170,7 +170,7 @@ def _answer_row(
         mean[:], error[:] = 0.0, 0.0
         return
     _divide(cloth.projected, cosine, area, area_error, moved_area, room.moved, mean, error)
-    add_undecided(undecided / (area + undecided), mean, error)
+    _add_undecided(undecided / (area + undecided), mean, error)
     share, share_error = area / cosine, (math.hypot(moved_area, math.sqrt(area_error)) + undecided) / cosine
     if conceal(share, share_error, mean, error):
         return
@@ -204,7 +204,7 @@ def _squared_error(mean: Float64, error: Float64, factors: Factors) -> float:
 
 
 @kernel
-def add_undecided(share: float, mean: Float64, error: Float64) -> None:
+def _add_undecided(share: float, mean: Float64, error: Float64) -> None:
     """Raise the errors of the components by what nodes with such a share of the area may change.
 
     They lie side by side and change together: they are all visible and lit, or none is.

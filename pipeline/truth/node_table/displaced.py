@@ -103,13 +103,13 @@ def fill_displaced(
     `plane` is the height of the reference plane. Returns the points of the grid on a yarn spacing.
     """
     wo = columns.wo[row]
-    points = fill_density(table, columns, row, line, room)
+    points = _fill_density(table, columns, row, line, room)
     read_density(table.lattice, points, plane, wo[0] / wo[2], wo[1] / wo[2], room, table.places, table.evenly, weight)
     return points
 
 
 @kernel
-def fill_density(table: ExactNodes, columns: WideQueries, row: int, line: Line, room: DensityRoom) -> int:
+def _fill_density(table: ExactNodes, columns: WideQueries, row: int, line: Line, room: DensityRoom) -> int:
     """Write the folded density of a footprint, of mean 1, to the grid; return the points on a yarn spacing."""
     period, rows, slip = table.lattice
     picks = int(table.repeat[1])

@@ -123,7 +123,7 @@ def image_errors(
     """
     m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
     mse, relative = _light_errors(m[lit], t[lit], s[lit], lit, options)
-    maps = perceived_maps(m, t, lit)
+    maps = _perceived_maps(m, t, lit)
     floors = floor or noise_floor(t, s, lit, options)
     perceived = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in PERCEIVED}
     return ImageErrors(mse, relative, perceived, maps, lit)
@@ -135,7 +135,7 @@ def noise_floor(
     """Return the scores of a noised copy of the truth, by the keys of `PERCEIVED`; arguments as in `image_errors`."""
     _, t, s, lit = _checked(truth, truth, standard_error, mask, options)
     noised = t + s * np.random.default_rng(options.seed).standard_normal((*t.shape[:2], 1))
-    maps = perceived_maps(noised, t, lit)
+    maps = _perceived_maps(noised, t, lit)
     return {metric: _unit(metric, float(_rows(metric, maps, lit).mean())) for metric in PERCEIVED}
 
 
@@ -187,7 +187,7 @@ def _checked(
     return m, t, s, lit
 
 
-def perceived_maps(picture: Float64, truth: Float64, lit: Mask) -> dict[str, Float64]:
+def _perceived_maps(picture: Float64, truth: Float64, lit: Mask) -> dict[str, Float64]:
     """Return the maps above by name, (H, W); pictures (H, W, 3), `lit` (H, W) the pixels that count."""
     grey = float(np.median(truth[lit] @ LUMINANCE))
     picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))

@@ -92,12 +92,6 @@ def test_an_edit_changes_the_identities_of_what_it_shapes_alone(files, tasks, ed
     assert len(new) == {"test rows": 3, "more rows": 9}.get(edit, 0)
 
 
-def test_wished_errors_touch_methods_that_estimate_errors_alone(files):
-    plain = files.exchange("[bench]", '[[models]]\nmodel = "selvage"\n\n[bench]').plan()
-    wished = files.exchange("frames = 4", "frames = 4\nwished_errors = [0.05]").plan()
-    assert_changed(plain, wished, "errors of selvage|timing|^report")
-
-
 def test_the_silhouette_is_measured_where_the_cloth_is_curved(files, tasks):
     assert not titled(tasks, "truth edge")
     # Models that know curved cloth.

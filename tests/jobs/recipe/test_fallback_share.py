@@ -26,7 +26,7 @@ def asked(*names, options=OPTIONS):
         ("neumip", ["denim"], 0.30 + 0.70 * 0.12),
         ("neumip", ["twill_4_4"], 0.30 + 0.70 * 0.12),  # unseen by general models, and trained on by this one
         ("neumip", ["voile"], 1.0),
-        ("selvage", ["denim", "voile"], 0.0),  # its soft nodes answer where it was not trained
+        ("selvage", ["denim", "voile"], 0.0),
         ("soft_nodes", ["voile"], 0.0),
         ("prefiltered", ["voile"], 0.30),  # nothing is trained: only light from behind
         ("point_sampled", ["voile"], 0.0),

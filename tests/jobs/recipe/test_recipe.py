@@ -81,7 +81,7 @@ def test_bad_input_is_one_sentence(files, old, new, words):
     "network",
     [
         'model = "neumip"\noffset = false',
-        *(f'model = "{name}"' for name in ("selvage", "unified_btf", "btf_autoencoder")),
+        *(f'model = "{name}"' for name in ("unified_btf", "btf_autoencoder")),
     ],
 )
 def test_every_network_may_learn_view_rays(files, network):

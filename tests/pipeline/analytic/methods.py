@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.analytic import exact_points, prefiltered
-from pipeline.analytic.soft_nodes import features, nodes
+from pipeline.analytic.soft_nodes import components, nodes
 from pipeline.analytic.summed_area import answer, tables
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
@@ -32,12 +32,17 @@ _maps = lru_cache(maxsize=32)(prefiltered.tabulate)
 
 
 def soft_nodes(fabric, queries, level=2, rims=True):
-    return features.read_queries(soft_table(fabric, level, rims=rims), queries).components
+    return components.read_queries(soft_table(fabric, level, rims=rims), queries).components
+
+
+def unshadowed(fabric, queries):
+    """Return the bounds of the soft nodes' components, (N, 4): the same without shadows of the light."""
+    return components.read_queries(soft_table(fabric), queries).bounds
 
 
 def soft_nodes_behind(fabric, queries, rims=True):
     """Return components and transparency with the light mirrored to the other side, (N, 5)."""
-    return features.read_behind(
+    return components.read_behind(
         soft_table(fabric, behind=True, rims=rims), queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
     )
 
@@ -55,7 +60,7 @@ def averaged_normals(fabric, queries):
     return prefiltered.answer(_maps(fabric, 16), queries, prefiltered.LEAN)
 
 
-PLACED = [soft_nodes, soft_nodes_behind, summed_area, averaged_normals]
+PLACED = [soft_nodes, unshadowed, soft_nodes_behind, summed_area, averaged_normals]
 """Methods without random numbers."""
 
 ALL = [soft_nodes, summed_area, points, averaged_normals]

@@ -41,9 +41,8 @@ def card_of(fabric, domain=None):
 def batch_of(queries, target, fabric=0):
     """Return a step of a training with queries about one fabric; no light passes it unscattered."""
     columns = {name: torch.from_numpy(np.array(column))[None] for name, column in queries._asdict().items()}
-    through, row = torch.zeros(1, len(queries.u)), torch.full((1, len(queries.u)), -1)
-    target = torch.as_tensor(target)[None]
-    return Batch(torch.tensor([fabric]), **columns, target=target, transparency=through, row=row)
+    through = torch.zeros(1, len(queries.u))
+    return Batch(torch.tensor([fabric]), **columns, target=torch.as_tensor(target)[None], transparency=through)
 
 
 def descend(optimiser, steps, loss):

@@ -6,15 +6,20 @@ import pytest
 from pipeline.models.all_cores import AllCores
 from pipeline.models.method import CHUNK_ROWS
 from pipeline.models.named import own_method
+from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
+from tests.pipeline.models.stand_ins import SMALL
 from weaves.fabric import load_fabric
 
 DENIM = load_fabric("denim")
 ROWS = 3 * CHUNK_ROWS + 17
 
 
-def queries(rows=ROWS):
-    return draw_queries(QueryOptions(behind=0.2, stretch=3.0), DENIM.weave.repeat, 11, 0, rows)
+ANY = QueryOptions(behind=0.2, stretch=3.0)
+
+
+def queries(rows=ROWS, options=ANY):
+    return draw_queries(options, DENIM.weave.repeat, 11, 0, rows)
 
 
 class Fake:
@@ -31,17 +36,21 @@ class Fake:
         return np.full((len(queries.u), 4), seed % 9973, np.float32)
 
 
-@pytest.mark.parametrize("name", ["soft_nodes:1", "selvage"])
+@pytest.mark.parametrize("name", ["soft_nodes:1", "selvage:.02", "woven"])
 def test_no_bit_depends_on_the_number_of_threads(name):
-    method = own_method(name, "test", "name")
-    one, *others = (AllCores(method, threads).predict(DENIM, queries()) for threads in (1, 2, 5))
+    network = name == "woven"
+    method = Woven(WovenNetwork(SMALL[name])) if network else own_method(name, "test", "name")
+    drawn = queries(options=QueryOptions() if network else ANY)
+    one, *others = (AllCores(method, threads).predict(DENIM, drawn) for threads in (1, 2, 5))
     assert one.shape == (ROWS, 4) and one.dtype == np.float32
     for other in others:
         np.testing.assert_array_equal(one, other)
     assert AllCores(method).predict(DENIM, queries(0)).shape == (0, 4)
-    if name == "soft_nodes:1":  # products of matrices of other sizes may differ in the last bits
-        np.testing.assert_array_equal(one, method.predict(DENIM, queries()))
-    np.testing.assert_allclose(one, method.predict(DENIM, queries()), rtol=1e-4, atol=1e-6)
+    whole = method.predict(DENIM, drawn)
+    if name == "soft_nodes:1":
+        np.testing.assert_array_equal(one, whole)
+    elif network:  # products of matrices of other sizes may differ in the last bits
+        np.testing.assert_allclose(one, whole, rtol=1e-4, atol=1e-6)
 
 
 def test_two_runs_are_answered_at_a_time():

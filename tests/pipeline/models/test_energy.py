@@ -14,7 +14,7 @@ from scipy import stats
 
 from pipeline.analytic.exact_points import sample_points, sample_transparency
 from pipeline.analytic.soft_nodes import nodes
-from pipeline.analytic.soft_nodes.features import read_behind, read_queries
+from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.models.bounded import Bounded
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.scenes.shade import coloured, colours_of

@@ -104,41 +104,26 @@ def test_viewers_too_low_for_the_truth_are_tilted_up():
 
 
 @pytest.mark.parametrize("name", ["denim", slow("voile")])
-def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name, selvage):
-    """Soft nodes and `selvage` turn the cloth; the truth of the back is the reference."""
+def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
+    """Soft nodes turn the cloth; the truth of the back is the reference."""
     fabric = load_fabric(name)
     queries = draw_queries(QueryOptions(behind=0.4, sigma=(0.3, 2.0), max_angle=60.0), (4, 4), 5, 0, 200)
     turned = queries.turned()
     assert (turned.wo[:, 2] < 0).all()
     truth = estimate(fabric, turned, TruthOptions(relative_error=0.02), 1)
-    for method in (SoftNodes(), selvage):
-        fallback = Fallback(method, {"stretch", "behind"})
-        assert not fallback.out_of_domain(fabric, turned).any()
-        found = fallback.predict(fabric, turned)
-        np.testing.assert_array_equal(found, fallback.predict(fabric.back(), queries))
-        assert colour_error(found, truth.mean) < 0.06
-        clear = fallback.transparency(fabric, turned)
-        assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
+    fallback = Fallback(SoftNodes(), {"stretch", "behind"})
+    assert not fallback.out_of_domain(fabric, turned).any()
+    found = fallback.predict(fabric, turned)
+    np.testing.assert_array_equal(found, fallback.predict(fabric.back(), queries))
+    assert colour_error(found, truth.mean) < 0.06
+    clear = fallback.transparency(fabric, turned)
+    assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
 
 
 def test_yarns_unlike_those_trained_on_are_left_to_the_fallback():
     fallback, queries = fallback_of(DENIM, {}), draw_queries(QueryOptions(sigma=(0.5, 1.0)), (4, 4), 3, 0, 20)
     assert not fallback.out_of_domain(DENIM, queries).any() and fallback.out_of_domain(ROUGH, queries).all()
     np.testing.assert_array_equal(fallback.predict(ROUGH, queries), fallback_answers(ROUGH, queries, 0))
-
-
-@pytest.mark.slow
-def test_a_method_may_answer_outside_its_domain_itself(selvage):
-    """`selvage` does, by its soft nodes; the network answers within the domain, and nothing is left to the fallback."""
-    fallback = Fallback(selvage, selvage.without_training)
-    queries = draw_queries(QueryOptions(sigma=(1e-3, 1.0), behind=0.3), DENIM.weave.repeat, 3, 0, 200)
-    assert not fallback.out_of_domain(ROUGH, queries).any()
-    np.testing.assert_array_equal(fallback.predict(ROUGH, queries), SoftNodes().predict(ROUGH, queries))
-    alone = selvage.domain.out_of_domain(DENIM, queries) | (queries.wi[:, 2] < 0)
-    assert 0.3 < alone.mean() < 0.9
-    found = fallback.predict(DENIM, queries)
-    np.testing.assert_array_equal(found[alone], SoftNodes().predict(DENIM, queries.take(alone)))
-    np.testing.assert_array_equal(found[~alone], selvage.predict(DENIM, queries.take(~alone)))
 
 
 @pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT_TURN, 0.03), (3.0 * FLAT_TURN, 0.1)])

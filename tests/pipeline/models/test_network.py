@@ -3,12 +3,10 @@ import pytest
 import torch
 
 from pipeline.fingerprint import fingerprint
-from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.domain import Domain
-from pipeline.models.network import NetworkMethod, Portable, evaluated, restored
+from pipeline.models.network import NetworkMethod, evaluated, restored
 from pipeline.models.neumip.model import NeumipNetwork
 from pipeline.models.registry import restore_methods
-from pipeline.models.selvage.model import Selvage, SelvageNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
 from tests.pipeline.models.stand_ins import SMALL, card_of, untrained
@@ -23,8 +21,6 @@ def test_restored_weights_answer_alike_also_at_extremes(model):
     material knows its fabric whatever its name is; any other answers for a fabric never seen."""
     options = SMALL[model]
     network = untrained(options, DENIM)
-    if model == "selvage":  # its last layer begins at zero: it would be soft nodes
-        torch.nn.init.normal_(network.last.weight, generator=torch.Generator().manual_seed(3))
     (method,) = restore_methods(options, [(card_of(DENIM), network.state_dict())])
     fabric = DENIM if options.of_one_material else BASKET
     assert method.covers(fabric) and method.covers(fabric.model_copy(update={"name": "other"}))
@@ -42,8 +38,7 @@ def test_restored_weights_answer_alike_also_at_extremes(model):
     np.testing.assert_allclose(by_centre[:, :, 0::2], by_centre[:, :, 1::2], rtol=1e-5, atol=1e-7)
     assert np.ptp(by_centre[0], axis=1).max() > 0
     np.testing.assert_allclose(by_centre[2], by_centre[2][:, :1].repeat(4, 1), rtol=1e-4, atol=1e-6)
-    alone = (Selvage if model == "selvage" else NetworkMethod)(network)
-    np.testing.assert_array_equal(found, alone.predict(fabric, queries))
+    np.testing.assert_array_equal(found, NetworkMethod(network).predict(fabric, queries))
 
 
 def test_each_fabric_is_answered_by_its_own_network_and_their_domains_are_joined():
@@ -60,20 +55,6 @@ def test_each_fabric_is_answered_by_its_own_network_and_their_domains_are_joined
         (alone,) = restore_methods(options, [part])
         np.testing.assert_array_equal(together.predict(cloth, queries), alone.predict(cloth, queries))
         assert together.bytes_stored(cloth) == alone.bytes_stored(cloth)
-
-
-@pytest.mark.parametrize("bound", [True, False])
-def test_the_network_of_selvage_alone_answers_what_the_method_does(bound):
-    network = SelvageNetwork(SMALL["selvage"], [DENIM])
-    torch.nn.init.normal_(network.last.weight, std=0.3)  # they are 0 at first
-    method = Selvage(network).with_bound(bound)
-    assert isinstance(method, Portable) and not isinstance(SoftNodes(), Portable)
-    queries = draw_queries(QueryOptions(), DENIM.weave.repeat, 2, 0, 300)
-    own = method.predict(DENIM, queries)
-    assert np.abs(own).max() > 0
-    # The same products in another order: a few roundings of the largest terms.
-    answers = method.per_query(DENIM).answered(queries)
-    np.testing.assert_allclose(answers, own, rtol=1e-4, atol=1e-5 * np.abs(own).max())
 
 
 @pytest.mark.parametrize("chunk", [1, 10, 37, 100])

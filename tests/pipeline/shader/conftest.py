@@ -204,7 +204,7 @@ def webgl(exported, tmp_path_factory):
     return call
 
 
-def neumip_folder(folder, fabric, version=1, **options):
+def neumip_folder(folder, fabric, version=1, domain=None, **options):
     """Write a `neumip` whose random textures and perceptrons give components of all sizes."""
     design = NeumipOptions(**options)
     with torch.random.fork_rng():
@@ -216,7 +216,8 @@ def neumip_folder(folder, fabric, version=1, **options):
         }
     weights["decoder.6.bias"] = torch.tensor([0.5, 0.2, 1.0, -0.2])
     about = {"optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)}
-    card = {
+    known = {} if domain is None else {"domain": domain.model_dump(mode="json")}
+    card = known | {
         "options": design.model_dump(mode="json", context=IDENTITY),
         "version": {"model": version},
         "fabrics": [about],

@@ -17,7 +17,7 @@ OPTIONS = ("--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enab
 @pytest.mark.parametrize("fabrics", [KINDS, slow(preset_names())], ids=["some", "all"])
 @pytest.mark.parametrize("half", [False, True], ids=["float32", "float16"])
 def test_golden_vectors_are_answered(webgl, exported, neumip, fabrics, half):
-    for model, names in ((None, fabrics), ("selvage", fabrics), (neumip, [CLOTH])):
+    for model, names in ((None, fabrics), (neumip, [CLOTH])):
         cloths = [read(exported(name, model=model)) for name in names]
         for cloth, answers in zip(cloths, webgl(cloths, half, model=model), strict=True):
             check_answers(answers, cloth, ALLOWED["16 bits" if half else "browser"])
@@ -35,10 +35,9 @@ def test_every_kind_and_directions_drawn_are_answered(webgl, cpp, exported):
         assert off.mean() < 0.01
 
 
-@pytest.mark.parametrize("model", [None, slow("selvage")])
-def test_golden_vectors_are_answered_by_webgpu(exported, tmp_path, model):
-    source = (exported("gingham", 2, "wgsl", model=model) / "wgsl" / "evaluate.wgsl").read_text()
-    cloth = read(exported("voile", model=model))
+def test_golden_vectors_are_answered_by_webgpu(exported, tmp_path):
+    source = (exported("gingham", 2, "wgsl") / "wgsl" / "evaluate.wgsl").read_text()
+    cloth = read(exported("voile"))
     answers = answered("evaluate_wgsl.html", tmp_path, job_of(cloth.buffers, cloth.queries), source, *OPTIONS)
     if answers is None:
         pytest.skip("this browser has no WebGPU")

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 import torch
 
+from pipeline.fingerprint import fingerprint
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodesOptions
-from pipeline.models.registry import load_methods, load_model, pretrained_folder
+from pipeline.models.neumip.model import Neumip, NeumipNetwork
+from pipeline.models.registry import load_methods
 from pipeline.models.runtimes import RUNTIMES, runs
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
@@ -16,7 +18,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import LOWEST_VIEWER, faults
 from reports.measure.extremes import FAR, FOOTPRINTS, extremes, lustrous, measure_extremes
 from reports.options import EXTREME_PRECISIONS, RuntimeName
-from tests.pipeline.models.stand_ins import FakeMethod
+from tests.pipeline.models.stand_ins import SMALL, FakeMethod
 from weaves.fabric import load_fabric
 
 LINING = load_fabric("polyester_lining")
@@ -118,7 +120,8 @@ def test_the_names_of_runtimes_are_those_of_the_models():
 def test_no_method_answers_what_cannot_be_in_any_precision(cloth):
     """Finite, never negative, a million yarns away exactly the same, and beyond a hundred repeats the average."""
     torch.manual_seed(0)
-    methods = [Woven(WovenNetwork(WovenOptions(map_texels=16))), *load_model(pretrained_folder("selvage"))]
+    methods = [Woven(WovenNetwork(WovenOptions(map_texels=16)))]
+    methods += [Neumip({fingerprint(cloth.optics()): NeumipNetwork(SMALL["neumip"], cloth.weave.repeat)})]
     methods += [*load_methods(SoftNodesOptions()), *load_methods(PrefilteredOptions())]
     families = [[one, *runs(one, EXTREME_PRECISIONS)] for one in methods]
     values, curves = {}, {}
@@ -130,7 +133,7 @@ def test_no_method_answers_what_cannot_be_in_any_precision(cloth):
     # Encoded sizes end at one repeat, sums at the even average; half precision may round the other way.
     assert len(values["extreme_large"]) == 11 and max(values["extreme_large"].values()) < 1e-3
     half = values["extreme_rounding"]
-    for name in ("selvage", "woven"):
+    for name in ("neumip", "woven"):
         assert half[name, "eager-fp16"] < half[name, "eager-bf16"] < 2e-2
     if cloth is LINING:
-        assert curves["selvage", "extreme_error"][1e4] < 0.05
+        assert curves["soft_nodes", "extreme_error"][1e4] < 0.05

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.models.bounded import Bounded
 from pipeline.models.method import refuse_other

@@ -1,4 +1,4 @@
-from reports.page.alt_texts import alt_texts
+from reports.page.html import alt_texts
 from reports.tables.page_tables import page_frames, ranged_frames
 from reports.tables.table import WORDS
 

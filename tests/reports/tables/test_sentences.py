@@ -120,10 +120,10 @@ def test_headline_says_only_what_was_measured():
 
 def test_the_headline_is_of_what_is_learnt_and_bounded_where_that_was_measured():
     methods = [("point_sampled", "k = 1"), ("point_sampled", "k = 2"), ("woven", ""), ("neumip", "")]
-    methods += [("woven", "bounded"), ("selvage", ""), ("selvage", "unbounded")]
+    methods += [("woven", "bounded"), ("curved", ""), ("curved", "eager-bf16")]
     errors = pd.DataFrame(methods, columns=["method", "setting"])
-    assert told.learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("selvage", "")]
-    assert told.learnt(errors, {"woven", "neumip", "selvage"}) == [("point_sampled", "k = 1")]
+    assert told.learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("curved", "")]
+    assert told.learnt(errors, {"woven", "neumip", "curved"}) == [("point_sampled", "k = 1")]
     assert Bounded(SoftNodes()).setting == f"k = 2 {told.BOUNDED}"
 
 
@@ -150,10 +150,10 @@ def test_a_comparison_warns_of_busy_machines_alone(a, b, words):
 
 
 def test_facts_name_trainings_unseen_fabrics_and_the_energy_bound():
-    errors = pd.DataFrame({"method": ["woven", "selvage", "soft_nodes"], "setting": "", "zero_answers": 0.0})
+    errors = pd.DataFrame({"method": ["woven", "neumip", "soft_nodes"], "setting": "", "zero_answers": 0.0})
     errors = errors.assign(role="unseen", fabrics=[9, 1, 1])
     values = told.facts([], errors.assign(seeds=[1, 3, 0]))
-    assert (values["once"], values["several"], values["training_counts"]) == ("woven", "selvage", "3")
+    assert (values["once"], values["several"], values["training_counts"]) == ("woven", "NeuMIP", "3")
     assert values["unseen_fabrics"] == 9 and "one_unseen" not in values and "bounded" not in values
     values = told.facts([], errors.assign(seeds=0, fabrics=1, setting=told.BOUNDED))
     assert values["one_unseen"] == "One" and values["bounded"] and "once" not in values and "several" not in values

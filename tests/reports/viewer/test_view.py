@@ -12,7 +12,7 @@ from reports.viewer.generate import SHADERS, mark, shader, shipped, sources
 from reports.viewer.view import BEND_FACTORS, NARROWER, VIEWS, WIDTHS, bends, bent, whole_page, widths
 from tests.presets import PRESETS
 from tests.reports.viewer.conftest import viewer
-from tests.reports.viewer.test_viewer import assert_equal, components, expected, expected_of
+from tests.reports.viewer.test_viewer import assert_equal, components, expected
 from weaves.fabric import load_fabric
 
 ROOT = Path(__file__).parents[3]
@@ -64,7 +64,6 @@ def test_a_page_draws_what_python_does(small, tmp_path):
         page.run("viewer.go(3)")
         cloth = load_fabric("gingham")
         assert_equal(components(page, 2), expected(cloth, VIEWS["Sphere"], 2))
-        assert_equal(components(page, "selvage"), expected_of("selvage", cloth, VIEWS["Sphere"]))
         assert page.errors == [] and all(address.startswith(("file:", "data:")) for address in page.requests)
 
 

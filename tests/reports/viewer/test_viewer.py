@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.models.named import named_method, own_method
+from pipeline.models.named import named_method
 from pipeline.scenes.shade import coloured, colours
 from pipeline.shader.golden import read_sides, side_colours
 from pipeline.shader.tables import BEHIND, tabulate_sides
@@ -33,11 +33,6 @@ def components(page, method, state="viewer.state"):
 def expected(fabric, camera, level):
     """Return the components of soft nodes in Python, (SIZE, SIZE, 4), as the page draws them."""
     return squared(camera, lambda queries: read_queries(tabulate(fabric, level=level), queries).components)
-
-
-def expected_of(name, fabric, camera):
-    """Return the components of a method in Python, (SIZE, SIZE, 4): outside its training too, as a shader."""
-    return squared(camera, lambda queries: own_method(name, "test", "method").predict(fabric, queries))
 
 
 def squared(camera, answer, through=False):
@@ -72,25 +67,6 @@ def test_pictures_equal_python(fresh, name, level, pixel):
     found, wanted = components(fresh, level), expected(CLOTH, VIEWS[name], level)
     assert_equal(found, wanted)
     assert wanted[pixel].min() > 0.0 and np.abs(found - wanted)[pixel].max() < 5e-5 * wanted.max()
-
-
-@pytest.mark.parametrize("name", VIEWS)
-def test_selvage_equals_python_where_the_yarns_are_those_of_the_fabric(fresh, name):
-    fresh.run(f"viewer.go({list(VIEWS).index(name)}), viewer.set({{ left: 'selvage', right: '2' }})")
-    assert fresh.run("viewer.methods[0].label") == "Selvage"
-    assert_equal(components(fresh, "selvage"), expected_of("selvage", CLOTH, VIEWS[name]))
-    fresh.run("viewer.set({ thickness: 5 }).then(() => viewer.drawn)")
-    assert fresh.run("viewer.methods[0].label") == "Soft nodes, detail 2"
-    said = fresh.run("document.getElementById('notice').textContent")
-    assert said == "Selvage: known of the yarns as they are. Soft nodes are shown instead."
-
-
-def test_a_shader_of_selvage_that_does_not_compile_is_named(whole, tmp_path):
-    with viewer(whole, tmp_path) as own:
-        own.run("viewer.picture.sources.selvage = 'broken', viewer.set({ left: 'selvage' }).then(() => viewer.drawn)")
-        assert own.run("viewer.methods[0].label") == "Soft nodes, detail 2"
-        said = own.run("document.getElementById('notice').textContent")
-        assert said == "Selvage: its shader does not compile here. Soft nodes are shown instead."
 
 
 def test_light_comes_through_sheer_cloth(tmp_path):

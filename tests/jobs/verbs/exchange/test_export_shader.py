@@ -6,6 +6,7 @@ import pytest
 
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.card import write_model
+from pipeline.models.domain import Domain
 from pipeline.models.woven import WovenOptions
 from pipeline.shader import export_shader as verb
 from pipeline.shader import languages, soft_nodes, tables
@@ -52,15 +53,19 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(refusal, monke
     write_model(tmp_path / "woven", b"", {"options": options, "version": {"model": 1}})
     refusal(CLOTH, *shader, str(tmp_path / "woven"))
     monkeypatch.setattr(verb, "no_onnx", lambda: "not installed: onnxscript")
-    assert "not installed: onnxscript" in refusal(CLOTH, *shader, "selvage", "--language", "onnx")
-    monkeypatch.setattr(verb, "covering_model", lambda *_: object())
-    assert "has no shader; soft_nodes, selvage and" in refusal(CLOTH, *shader, "woven")
+    assert "not installed: onnxscript" in refusal(CLOTH, *shader, neumip, "--language", "onnx")
+    monkeypatch.setattr(verb, "load_model", lambda _: [object()])
+    assert "has no shader; soft_nodes and the folder of a trained neumip" in refusal(
+        CLOTH, *shader, str(tmp_path / "woven")
+    )
     assert not (tmp_path / "x").exists()
 
 
-@pytest.mark.slow
 def test_a_fabric_unlike_the_training_is_named(twillight, tmp_path):
-    code, said, _ = twillight("export", "gauze", "--shader", "out", "--model", "selvage")
-    assert code == 0 and "gauze is not like its training: optical_thickness = 2.5" in said
-    network = json.loads((tmp_path / "out" / "selvage.json").read_text())["network"]
+    thin = load_fabric(CLOTH).model_copy(update={"optical_thickness": 2.5})
+    folder = neumip_folder(tmp_path / "neumip", thin, domain=Domain.of({}, [load_fabric(CLOTH)]), texels_per_yarn=2)
+    (tmp_path / "thin.toml").write_text(thin.to_toml())
+    code, said, _ = twillight("export", "thin.toml", "--shader", "out", "--model", folder)
+    assert code == 0 and f"{thin.name} is not like its training: optical_thickness = 2.5" in said
+    network = json.loads((tmp_path / "out" / "neumip.json").read_text())["network"]
     assert network["outside"] == "optical_thickness = 2.5" and network["trained_on"]["optical_thickness"] == [2.0, 2.0]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.soft_nodes.answer import query_sums
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, DIFFUSE, OPEN_DIFFUSE, OPEN_SPECULAR, SPECULAR
@@ -79,7 +79,7 @@ def test_each_level_errs_less_on_wide_footprints():
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=(0.8, 8.0)), fabric.weave.repeat, 12, 0, 160)
     truth = estimate(fabric, queries, TruthOptions(relative_error=2e-3), 1).mean
-    errors = [relative_error(read_queries(tabulate(fabric, level=k), queries)[1], truth) for k in DETAILS]
+    errors = [relative_error(read_queries(tabulate(fabric, level=k), queries).components, truth) for k in DETAILS]
     assert all(finer < coarser for coarser, finer in itertools.pairwise(errors)), errors
     assert errors[2] < 0.75 * errors[1]
 
@@ -94,9 +94,11 @@ def test_footprints_along_the_axes():
     table = tabulate(fabric)
     for asked in (queries, turned):
         truth = estimate(fabric, asked, TruthOptions(relative_error=0.01), 1).mean
-        assert relative_error(read_queries(table, asked)[1], truth) < 0.04
+        assert relative_error(read_queries(table, asked).components, truth) < 0.04
     swapped = queries._replace(sigma=queries.sigma_minor, sigma_minor=queries.sigma)
-    np.testing.assert_allclose(read_queries(table, turned)[1], read_queries(table, swapped)[1], rtol=1e-5)
+    np.testing.assert_allclose(
+        read_queries(table, turned).components, read_queries(table, swapped).components, rtol=1e-5
+    )
 
 
 @pytest.mark.parametrize(
@@ -111,9 +113,9 @@ def test_footprints_at_an_angle(name, bound):
     table, truth = tabulate(fabric), estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
     size = np.sqrt(queries.sigma * queries.sigma_minor)
     rounded = queries._replace(sigma=size, sigma_minor=size)
-    wrong = relative_error(read_queries(table, queries)[1], truth)
+    wrong = relative_error(read_queries(table, queries).components, truth)
     assert wrong < bound
-    assert relative_error(read_queries(table, rounded)[1], truth) > 1.5 * wrong
+    assert relative_error(read_queries(table, rounded).components, truth) > 1.5 * wrong
 
 
 def test_long_footprints_and_low_viewers_are_cut():
@@ -144,7 +146,7 @@ def test_extremes_stay_finite_and_not_negative(width):
     queries = Queries.round(centre, centre, major, wi, wo)._replace(sigma_minor=minor)
     for values in read_queries(table, queries):
         assert np.isfinite(values).all()
-    assert (read_queries(table, queries)[1] >= 0).all()
+    assert (read_queries(table, queries).components >= 0).all()
 
 
 @pytest.mark.slow
@@ -156,7 +158,7 @@ def test_irregular_drafts_of_many_floats(side):
     fabric = woven("polyester_lining").model_copy(update={"draft": Matrix(rows=rows)})
     queries = draw_queries(QueryOptions(sigma=(2.0, 8.0), max_angle=75.0), fabric.weave.repeat, 7, 0, 40)
     truth = estimate(fabric, queries, TruthOptions(estimator="r2", relative_error=0.01, max_count=1 << 14), 1).mean
-    assert relative_error(read_queries(tabulate(fabric), queries)[1], truth) < 0.04
+    assert relative_error(read_queries(tabulate(fabric), queries).components, truth) < 0.04
 
 
 @pytest.mark.parametrize("sigma", [(0.05, 0.2), (0.5, 1.2), (6.0, 9.0)], ids=["narrow", "middle", "wide"])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.soft_nodes.answer import query_sums
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.analytic.soft_nodes.shade import BARE_AREA, BARE_DIFFUSE, BARE_SPECULAR
+from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA, OPEN_DIFFUSE, OPEN_SPECULAR
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
@@ -42,7 +42,7 @@ def test_a_point_sees_what_its_ray_meets(curvature, rims):
         if family < 2:
             expected[row, family] = shares
     assert not gaps.any()
-    found = sums[:, :, [BARE_AREA, BARE_SPECULAR, BARE_DIFFUSE]] / [1.0, 1.0, math.pi]
+    found = sums[:, :, [AREA, OPEN_SPECULAR, OPEN_DIFFUSE]] / [1.0, 1.0, math.pi]
     area, of_rays = (shares[:, :, 0].sum(axis=1)[:, None, None] for shares in (found, expected))
     met = ((area > 0.0) & (of_rays > 0.0)).ravel()
     assert met.mean() > (0.99 if rims else 0.9)

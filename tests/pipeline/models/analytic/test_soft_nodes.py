@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.features import read_queries
+from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.compiled.arrays import nbytes
@@ -20,7 +20,7 @@ def test_each_level_is_its_sums_in_chunks():
     assert [method.setting for method in methods] == [f"k = {level}" for level in DETAILS]
     for method, level in zip(methods, DETAILS, strict=True):
         table = tabulate(fabric, level=level)
-        np.testing.assert_array_equal(method.predict(fabric, asked), read_queries(table, asked)[1])
+        np.testing.assert_array_equal(method.predict(fabric, asked), read_queries(table, asked).components)
         assert method.bytes_stored(fabric) == nbytes(table)
 
 

@@ -1,58 +1,24 @@
-"""Symmetries of the features: what a network need not learn, and what exchanging warp and weft does."""
+"""Components and bounds that queries read of the sums, with the light in front and behind."""
 
 import math
 
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.features import (
-    EXCHANGED,
-    EXCHANGED_SIGN,
-    OF_QUERY,
-    cloth_features,
-    read_behind,
-    read_queries,
-)
+from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.analytic.methods import soft_table
-from tests.pipeline.truth.cloths import IMAGES, LOPSIDED
+from tests.pipeline.truth.cloths import LOPSIDED
 from tests.presets import slow
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
-SIZES = {"narrow": (0.05, 0.24), "middle": (0.25, 1.0), "wide": (3.0, 8.0)}
 
-
-@pytest.fixture(scope="module")
-def table():
-    return soft_table(LOPSIDED)
-
-
-@pytest.mark.parametrize("image", ["exchange", "mirror", "half a turn"])
-def test_a_cloth_drawn_in_another_way_has_the_features(table, image):
-    """Exchanging warp and weft permutes them. A mirror reverses the sense of the twists, as the half vector sees it."""
-    queries = draw_queries(QueryOptions(sigma=(0.05, 4.0), max_angle=75.0), LOPSIDED.weave.repeat, 5, 0, 150)
-    cloth, there = IMAGES[image](queries)
-    own, found = read_queries(table, queries).features, read_queries(soft_table(cloth), there).features
-    expected = EXCHANGED_SIGN * own[:, EXCHANGED] if image == "exchange" else own
-    # A node on the border of two cells of a grid may read either.
-    difference = np.abs(expected - found)
-    assert difference.max() < 0.05 and difference.mean() < 1e-4
-    if image == "exchange":
-        assert np.abs(own[:, EXCHANGED] - found)[:, 28:30].min() > 0.1
-
-
-def test_the_last_features_are_the_cloths_own(table):
-    asked = draw_queries(QueryOptions(), LOPSIDED.weave.repeat, 1, 0, 20)
-    features = read_queries(table, asked).features
-    np.testing.assert_array_equal(features[:, OF_QUERY:], np.tile(cloth_features(table), (20, 1)))
-    assert np.ptp(features[:, :OF_QUERY], axis=0).min() > 0.0
-
-
-def test_rows_do_not_depend_on_each_other(table):
+def test_rows_do_not_depend_on_each_other():
+    table = soft_table(LOPSIDED)
     asked = draw_queries(QueryOptions(), LOPSIDED.weave.repeat, 3, 0, 60)
     whole, part = read_queries(table, asked), read_queries(table, asked.take(slice(20, 40)))
     for all_rows, some in zip(whole, part, strict=True):
