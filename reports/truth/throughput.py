@@ -23,7 +23,6 @@ from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.method import CHUNK_ROWS, Method
-from pipeline.models.selvage import USUAL_ERROR
 from pipeline.models.selvage.model import Selvage
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
@@ -223,7 +222,7 @@ def _threads_compared(what: str, fabric: Fabric, answer: Callable[[Queries], obj
 def _models(fabric: Fabric) -> Iterator[Rate]:
     """Yield queries a second of soft nodes at all levels and of `selvage`, by one thread and by two."""
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, 4 * CHUNK_ROWS)
-    methods: list[Method] = [*map(SoftNodes, DETAILS), Selvage(USUAL_ERROR)]
+    methods: list[Method] = [*map(SoftNodes, DETAILS), Selvage()]
     for method in methods:
         what = " ".join(filter(None, ("queries,", method.name, method.setting)))
         answer = partial(method.predict, fabric)

@@ -43,7 +43,7 @@ def error_curve(squares: Float32, kinds: Index, seconds: Float64) -> Float64:
 
 def price_of(curve: Float64, error: float) -> float:
     """Return the highest price at which the root mean square is at most `error`; 0, the best answers, if none is."""
-    return float(PRICES[max(0, np.searchsorted(curve, error**2, side="right") - 1)])
+    return float(PRICES[max(0, int(np.searchsorted(curve, error**2, side="right")) - 1)])
 
 
 def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -> Chosen:
