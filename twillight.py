@@ -142,7 +142,8 @@ def load_model(name_or_folder: str | Path) -> Method:
     Method
         ``predict(fabric, queries)`` returns the components of N queries, float32 (N, 4). It refuses kinds of queries
         that the model does not know; yarns unlike those of its training are extrapolated. No bit of an answer depends
-        on the number of cores.
+        on the number of cores. `selvage` also takes ``error=.02``, the wished relative error of the colour, or
+        ``time=5e-6``, the wished mean seconds of a query on one thread of this machine.
 
     Raises
     ------
