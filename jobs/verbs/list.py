@@ -5,7 +5,7 @@ Only what is printed is read and checked: colours and recipes need libraries tha
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from cyclopts import Parameter
 from pydantic import TypeAdapter
@@ -13,14 +13,17 @@ from pydantic import TypeAdapter
 from jobs.recipe.shipped import RECIPES, recipe_names
 from jobs.terminal import print_lines, print_table
 from jobs.verbs.parameters import Local
+from weaves.errors import BadInput
 from weaves.fabric import PRESETS, Weave, load_fabric, preset_names
 from weaves.validation import read_toml
+
+_SIZE: Final = "384x288"
 
 
 def print_lists(
     *,
     pictures: Annotated[Local | None, Parameter(help="Folder for a picture of every fabric.")] = None,
-    size: Annotated[str, Parameter(help="WIDTHxHEIGHT of the pictures in pixels.")] = "384x288",
+    size: Annotated[str, Parameter(help="WIDTHxHEIGHT of the pictures in pixels.")] = _SIZE,
 ) -> None:
     """Print a table of fabrics and a table of recipes; or, of fabrics, write pictures."""
     if pictures is not None:
@@ -32,6 +35,8 @@ def print_lists(
         for name in preset_names():
             print_lines(write_swatch(load_fabric(name), pictures, film))
         return
+    if size != _SIZE:
+        raise BadInput("list", "", "--pictures is missing", "a folder is needed for pictures")
     fabrics, weave = [read_toml(PRESETS / f"{name}.toml") for name in preset_names()], TypeAdapter(Weave)
     rows = []
     for fabric in fabrics:

@@ -71,11 +71,13 @@ def show(
     cloth = load_fabric(fabric)
     if out is None and (maps or size != SWATCH_SIZE):
         raise BadInput("show", "", "--out is missing", "a folder is needed for pictures")
-    _print_fabric(cloth)
-    if out is not None:
-        from jobs.verbs.render import size_of  # modules that the numbers need not wait for
+    if out is None:
+        _print_fabric(cloth)
+    else:
+        from jobs.verbs.render import size_of  # modules that the numbers alone need not wait for
 
         film = size_of(size, "show")
+        _print_fabric(cloth)
         with Terminal().status("draft and maps" if maps else "draft"):
             paths = [*_drawn(cloth, out, draft), *(write_maps(cloth, out) if maps else [])]
         print_lines(*paths, write_swatch(cloth, out, film))
