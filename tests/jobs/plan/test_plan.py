@@ -151,8 +151,8 @@ def test_random_unseen_fabrics_are_measured_by_general_models_alone(files, tasks
     assert names == ["twill_4_4", "unseen_0_irregular", "unseen_1_irregular"]
 
 
-def test_the_full_plan_is_paper_sized():
-    tasks = plan(load_recipe("full"))
+def test_the_largest_plan_is_paper_sized():
+    tasks = plan(load_recipe("full_transmission"))
     assert sum(task.rows for task in tasks if task.stage == "generate") > 50_000_000
 
 
