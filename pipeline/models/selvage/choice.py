@@ -24,7 +24,7 @@ from pipeline.compiled.decorators import kernel
 Chosen = npt.NDArray[np.uint8]
 """Answers of N queries, (N,): numbers of levels from the cheapest on, then of the fallback."""
 
-PRICES: Final = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 400)])
+PRICES: Final[Float64] = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 400)])
 """Prices of a second, in squared errors."""
 
 _SAMPLE: Final = 512  # queries that the price of a wished time is found on
@@ -43,7 +43,7 @@ def error_curve(squares: Float32, kinds: Index, seconds: Float64) -> Float64:
 
 def price_of(curve: Float64, error: float) -> float:
     """Return the highest price at which the root mean square is at most `error`; 0, the best answers, if none is."""
-    return float(PRICES[max(0, np.searchsorted(curve, error**2, side="right") - 1)])
+    return float(PRICES[max(0, int(np.searchsorted(curve, error**2, side="right")) - 1)])
 
 
 def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -> Chosen:
