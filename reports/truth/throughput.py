@@ -223,7 +223,7 @@ def _threads_compared(what: str, fabric: Fabric, answer: Callable[[Queries], obj
 def _models(fabric: Fabric) -> Iterator[Rate]:
     """Yield queries a second of soft nodes at all levels and of `selvage`, by one thread and by two."""
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, _SEED, 0, 4 * CHUNK_ROWS)
-    methods: list[Method] = [*map(SoftNodes, DETAILS), Selvage(USUAL_ERROR)]
+    methods: list[Method] = [*map(SoftNodes, DETAILS), Selvage()]
     for method in methods:
         what = " ".join(filter(None, ("queries,", method.name, method.setting)))
         answer = partial(method.predict, fabric)
