@@ -24,7 +24,6 @@ from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.method import CHUNK_ROWS, Method
 from pipeline.models.selvage.model import Selvage
-from pipeline.models.selvage.wish import USUAL_ERROR
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.estimator import estimate
