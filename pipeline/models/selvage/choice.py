@@ -24,7 +24,7 @@ from pipeline.compiled.decorators import kernel
 Chosen = npt.NDArray[np.uint8]
 """Answers of N queries, (N,): numbers of levels from the cheapest on, then of the fallback."""
 
-PRICES: Final = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 400)])
+PRICES: Final[Float64] = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 400)])
 """Prices of a second, in squared errors."""
 
 _SAMPLE: Final = 512  # queries that the price of a wished time is found on
