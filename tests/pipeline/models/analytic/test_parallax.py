@@ -86,8 +86,7 @@ def _differ(found, truth):
     ],
 )
 def test_soft_nodes_see_what_view_rays_see(fabric, kind, most):
-    """Soft nodes differ from the truth by some per cent, the truth of the fabric plane by far more. Footprints of fixed
-    nodes, weighted where the viewer sees them, are too wide for lines."""
+    """Soft nodes, fixed or not, differ from the truth by a few per cent, the truth of the fabric plane far more."""
     seed, sigma, ratio = (5, (0.35, 0.7), 2.0) if kind == "fixed nodes" else (4, (0.06, 0.3), 1.5)
     queries = _kind(_queries(fabric, 60, seed, sigma), kind)
     truth = estimate(fabric, queries, RAYS, 1)
