@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from pipeline.analytic.importance.lobes import Lobes
 from pipeline.models.named import named_method
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.scenes.shade import shade
@@ -46,10 +47,15 @@ def bsdf_of(name):
     return PatchBSDF(load_fabric(CONFIGURATIONS[name][0]))
 
 
+def lobes_of(bsdf, name, count):
+    """Return the lobes of `count` equal looks, which are found once."""
+    return Lobes(*(np.repeat(rows, count, axis=0) for rows in bsdf.lobes(looks_of(name, 1))))
+
+
 def expected_shares(bsdf, name):
     """Integrate the density over each cell by midpoints: 4 times as many nodes move chi-square by less than .001."""
     wi = sphere(ROWS * NODES, COLUMNS * NODES)
-    pdf = bsdf.pdf(looks_of(name, len(wi), wi)).astype(np.float64)
+    pdf = bsdf.pdf(looks_of(name, len(wi), wi), lobes_of(bsdf, name, len(wi))).astype(np.float64)
     cell = 4.0 * math.pi / (ROWS * COLUMNS * NODES**2)
     return pdf.reshape(ROWS, NODES, COLUMNS, NODES).sum(axis=(1, 3)) * cell
 
@@ -63,7 +69,7 @@ def test_samples_follow_their_density(names):
         bsdf, looks = bsdf_of(name), looks_of(name, COUNT)
         shares, straight = expected_shares(bsdf, name), float(bsdf.straight(looks.take(slice(1)))[0])
         assert shares.sum() + straight == pytest.approx(1.0, abs=2e-3), name
-        sample = bsdf.sample(looks, np.random.default_rng(number).random((COUNT, 3)))
+        sample = bsdf.draw(looks, np.random.default_rng(number).random((COUNT, 3)), lobes_of(bsdf, name, COUNT))
         np.testing.assert_allclose(np.linalg.norm(sample.wi, axis=1), 1.0, atol=1e-6)
         assert (sample.pdf > 0).all()
         wi = sample.wi[~sample.straight].astype(float)
@@ -90,7 +96,8 @@ def test_weights_have_the_integral_of_eval_as_their_mean():
         scattered = even.mean() * 4.0 * math.pi
         looks = looks_of(name, count)
         through = float(bsdf.method.transparency(bsdf.fabric, looks.take(slice(1)))[0])
-        sample = bsdf.sample(looks, np.random.default_rng(100 + number).random((count, 3)))
+        random = np.random.default_rng(100 + number).random((count, 3))
+        sample = bsdf.sample(looks, random, lobes_of(bsdf, name, count))
         weight = sample.weight @ LUMINANCE
         assert np.isfinite(weight).all() and (weight >= 0).all()
         for kind, own, wanted in (("", ~sample.straight, scattered), (" straight", sample.straight, through)):
@@ -111,7 +118,7 @@ def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name):
     first, even = (bsdf.eval(queries) @ LUMINANCE for bsdf in (one, every))
     scattered = even.mean() * 4.0 * math.pi
     assert scattered > 1.005 * first.mean() * 4.0 * math.pi
-    sample = every.sample(looks, np.random.default_rng(11).random((count, 3)))
+    sample = every.sample(looks, np.random.default_rng(11).random((count, 3)), lobes_of(every, name, count))
     values = np.where(sample.straight, 0.0, sample.weight @ LUMINANCE)
     assert abs(values.mean() - scattered) < stats.norm.isf(0.5 * LEVEL) * values.std() / math.sqrt(count)
 
