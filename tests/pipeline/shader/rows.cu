@@ -15,13 +15,13 @@ void* copied(const void* data, size_t bytes) {
 
 }  // namespace
 
-// Answers 64 * groups rows by an entry point; `buffers` are all but the answers, in the order of the source. Returns the
-// last error of CUDA.
-extern "C" int answer_rows(int scatters, const void** buffers, const size_t* bytes, const size_t* elements, int count,
-                           float* answers, size_t answer_bytes, int groups) {
+// Answers 64 * groups rows by an entry point; `buffers` are all but the answers, in the order of the source, `lengths`
+// their bytes and then their elements. Returns the last error of CUDA.
+extern "C" int answer_rows(int scatters, const void** buffers, const size_t* lengths, int count, float* answers,
+                           size_t answer_bytes, int groups) {
     struct Buffer { void* data; size_t count; };
     std::vector<Buffer> parameters;
-    for (int k = 0; k < count; k++) parameters.push_back({copied(buffers[k], bytes[k]), elements[k]});
+    for (int k = 0; k < count; k++) parameters.push_back({copied(buffers[k], lengths[k]), lengths[count + k]});
     parameters.push_back({copied(answers, answer_bytes), answer_bytes / 16});
     cudaMemcpyToSymbol(SLANG_globalParams, parameters.data(), sizeof(GlobalParams_0));
     if (scatters) scatter<<<groups, 64>>>(); else evaluate<<<groups, 64>>>();

@@ -1,4 +1,4 @@
-"""The CUDA form on a GPU against the Python: all kinds of golden vectors, and directions drawn as in C++."""
+"""The CUDA form on a GPU against the Python."""
 
 import ctypes
 import shutil
@@ -13,24 +13,19 @@ from tests.pipeline.shader.conftest import ALIKE, ALLOWED, WIDTHS, check_answers
 
 pytestmark = pytest.mark.external  # slangc, nvcc and a GPU
 
-CALLER = Path(__file__).with_name("rows.cu")
 
-
-def compiled(source, library):
-    """Compile the CUDA form with its caller; skip the test if there is no nvcc or no GPU."""
-    for program in ("nvcc", "nvidia-smi"):
-        if shutil.which(program) is None:
-            pytest.skip(f"{program} is not installed")
+@pytest.fixture(scope="module")
+def cuda(exported, tmp_path_factory):
+    """A function that runs rows of queries by the program of fabrics whose threads do not differ in colour."""
+    for needed in ("nvcc", "nvidia-smi"):
+        if shutil.which(needed) is None:
+            pytest.skip(f"{needed} is not installed")
+    source = exported(ALIKE, 2, "cuda") / "cuda" / "evaluate.cu"
     # slangc writes it for a compiler at run time: there the declaration of the parameters also defines them.
-    text = source.read_text().replace('extern "C" __constant__', "__constant__")
-    own = library.with_suffix(".cu")
-    own.write_text(text)
-    command = ["nvcc", "-O3", "-arch=native", "-w", "-shared", "-Xcompiler", "-fPIC", f'-DSOURCE="{own}"']
-    subprocess.run([*command, "-o", library, CALLER], check=True)
-
-
-def caller(library):
-    """Return a function that runs rows of queries by a compiled library."""
+    source.write_text(source.read_text().replace('extern "C" __constant__', "__constant__"))
+    library = tmp_path_factory.mktemp("cuda") / "rows.so"
+    command = ["nvcc", "-O3", "-arch=native", "-w", "-shared", "-Xcompiler", "-fPIC", f'-DSOURCE="{source}"']
+    subprocess.run([*command, "-o", library, Path(__file__).with_name("rows.cu")], check=True)
     program = ctypes.CDLL(str(library))
 
     def call(buffers, queries, entry="evaluate"):
@@ -38,25 +33,15 @@ def caller(library):
         rows, answers = np.zeros((64 * groups, columns), np.float32), np.zeros((64 * groups, results), np.float32)
         rows[: len(queries), : queries.shape[1]] = queries
         arrays = [*(np.ascontiguousarray(values) for values in buffers.values()), rows]
-        fours = [name in ("nodes", "grid", "weights") for name in buffers] + [False]  # four values in an element
+        fours = [name in ("nodes", "grid") for name in buffers] + [False]  # four values in an element
         sizes = [-(-a.size // 4) if four else a.size for a, four in zip(arrays, fours, strict=True)]
-        error = program.answer_rows(
-            int(entry == "scatter"), (ctypes.c_void_p * len(arrays))(*(a.ctypes.data for a in arrays)),
-            (ctypes.c_size_t * len(arrays))(*(a.nbytes for a in arrays)), (ctypes.c_size_t * len(arrays))(*sizes),
-            len(arrays), answers.ctypes.data_as(ctypes.c_void_p), ctypes.c_size_t(answers.nbytes), groups,
-        )  # fmt: skip
-        assert error == 0, f"CUDA error {error}"
+        pointers = (ctypes.c_void_p * len(arrays))(*(a.ctypes.data for a in arrays))
+        lengths = (ctypes.c_size_t * (2 * len(arrays)))(*(a.nbytes for a in arrays), *sizes)
+        result = ctypes.c_void_p(answers.ctypes.data), ctypes.c_size_t(answers.nbytes)
+        assert program.answer_rows(entry == "scatter", pointers, lengths, len(arrays), *result, groups) == 0
         return answers[: len(queries)]
 
     return call
-
-
-@pytest.fixture(scope="module")
-def cuda(exported, tmp_path_factory):
-    """The caller of the program of fabrics whose threads do not differ in colour."""
-    library = tmp_path_factory.mktemp("cuda") / "rows.so"
-    compiled(exported(ALIKE, 2, "cuda") / "cuda" / "evaluate.cu", library)
-    return caller(library)
 
 
 @pytest.mark.parametrize(
@@ -65,8 +50,6 @@ def cuda(exported, tmp_path_factory):
 )
 def test_golden_vectors_are_answered(cuda, exported, name, level, kinds):
     cloth = read(exported(name, level, kinds=kinds))
-    answers = cuda(cloth.buffers, cloth.queries)
-    check_answers(answers, cloth, ALLOWED["CUDA"])
+    check_answers(cuda(cloth.buffers, cloth.queries), cloth, ALLOWED["CUDA"])
     rows = np.column_stack([cloth.queries, np.full((len(cloth.queries), 3), 0.5)])
-    scattered = cuda(cloth.buffers, rows, "scatter")
-    assert worst(scattered[:, [12, 11, 8, 9, 10]], cloth, 8) < ALLOWED["CUDA"]
+    assert worst(cuda(cloth.buffers, rows, "scatter")[:, [12, 11, 8, 9, 10]], cloth, 8) < ALLOWED["CUDA"]
