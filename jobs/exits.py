@@ -16,7 +16,7 @@ import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -43,6 +43,8 @@ def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) ->
     out : Path
         Folder of products if the command line names none.
     """
+    if sys.stdout is None:  # it was closed before the start
+        return _end("stdout is closed; send it to a file or to /dev/null", 2)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names that are no UTF-8, terminals that show less
@@ -65,10 +67,12 @@ def _handle(raised: BaseException, stops: Sequence[BaseException], tokens: Seque
         return _end(str(error), error.exit_code)
     if isinstance(error, KeyboardInterrupt):
         return _end(str(error) or f"stopped; {_CONTINUES}", error.code if isinstance(error, _Stopped) else 130)
-    if isinstance(error, BrokenPipeError):
-        # The reader of the output has closed it, such as `head`.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if isinstance(error, BrokenPipeError):  # the reader of the output has closed it, such as `head`
+        _drop_stdout()
         return 0
+    if isinstance(error, OSError) and error.filename is None and _stdout_fails():
+        _drop_stdout()
+        return _end(f"stdout: {error.strerror}; what was to be printed is lost", 1)
     if "upath" in sys.modules:  # object storage is in use
         from pipeline.storage import explained
 
@@ -80,6 +84,20 @@ def _handle(raised: BaseException, stops: Sequence[BaseException], tokens: Seque
         return _end("twillight --install-completion: the shell is not known: add --shell bash, zsh or fish", 2)
     saved = _save_crash(tokens, "".join(traceback.format_exception(raised)), out)
     return _end(f"{type(error).__name__}: this is a bug in twillight; {saved}", 1)
+
+
+def _stdout_fails() -> bool:
+    """Return whether stdout takes no more: the error of a write names no file."""
+    try:
+        print(flush=True)  # noqa: T201, an empty line
+    except OSError:
+        return True
+    return False
+
+
+def _drop_stdout() -> None:
+    """Send what stdout still holds nowhere, so that Python ends without a word about it."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _missing(error: CycloptsError) -> str:
@@ -142,7 +160,8 @@ def _end(sentence: str, code: int) -> int:
 
 def print_error(sentence: str) -> None:
     """Print the sentence of an error to stderr, in one line and with no character that a terminal obeys."""
-    print(one_line(sentence), file=sys.stderr, flush=True)  # noqa: T201, rich would break the line
+    with suppress(OSError):  # a full or closed stderr leaves the exit code
+        print(one_line(sentence), file=sys.stderr, flush=True)  # noqa: T201, rich would break the line
 
 
 def _save_crash(tokens: Sequence[str], trace: str, out: Path) -> str:

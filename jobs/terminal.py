@@ -43,6 +43,10 @@ class Terminal(Console):
         for text, style, control in super().render(renderable, options):
             yield Segment(text if control else printable(text), style, control)
 
+    def on_broken_pipe(self) -> None:
+        """Leave the closed reader to `jobs.exits`; rich would end with exit code 1."""
+        raise
+
 
 def print_lines(*sentences: object, stderr: bool = False) -> None:
     """Print sentences as they are, each in one line."""

@@ -32,6 +32,8 @@ def atomic_path(path: Path, *, durable: bool = True) -> Iterator[Path]:
             yield (copy := Path(folder) / path.name)
             storage.store(copy, path)
         return
+    if path.is_dir():
+        raise BadInput(str(path), "", "is a folder", "the path of a file is needed")
     temporary = path.with_name(f".tmp-{path.name}")
     try:
         with disk_errors(path):

@@ -13,7 +13,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any, Final, TypeVar
@@ -79,6 +79,7 @@ def in_own_process(
             stderr=subprocess.DEVNULL,
             env={**os.environ, **ONE_THREAD, "PYTHONPATH": paths},
             pass_fds=[there.fileno()],
+            start_new_session=True,  # it ends with all processes that it starts
         )
     there.close()
     try:
@@ -86,6 +87,9 @@ def in_own_process(
         while True:
             if not here.poll(_SECONDS_BETWEEN_LOOKS):
                 look()
+                # A process that it started may hold its end of the pipe.
+                if process.poll() is not None and not here.poll():
+                    raise ProcessEnded(process.returncode)
                 continue
             kind, content = here.recv()
             if kind == "raised":
@@ -97,7 +101,8 @@ def in_own_process(
     except (EOFError, ConnectionError) as error:
         raise ProcessEnded(process.wait()) from error
     finally:
-        process.kill()
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         here.close()
 
@@ -134,7 +139,7 @@ def _end_with_parent(pipe: Connection) -> None:
     try:
         pipe.recv()
     except (EOFError, OSError):
-        os._exit(1)
+        os.killpg(0, signal.SIGKILL)
 
 
 def _portable(error: BaseException) -> Exception:

@@ -63,7 +63,7 @@ def place(name: str, where: str = "--out") -> Path:
             _register_patient_s3()
         found = UPath(name, use_listings_cache=False, **_OPTIONS.get(protocol, {}))
         found.fs  # noqa: B018, it is made here
-    except (ImportError, ValueError) as error:
+    except (ImportError, ValueError, TypeError, OSError) as error:  # such as zip://, which needs a file
         allowed = "a folder or an address of fsspec is needed, as s3://bucket/prefix"
         raise BadInput(where, "", name, f"{allowed} ({one_line(error, 80)})") from error
     return cast("Path", found)

@@ -145,7 +145,7 @@ class Ledger:
         receipt, removed = self.receipt(task), []
         for path in task.products if receipt else ():
             for file in {path, *self._copies(path)}:
-                if self.store.is_file(file) and receipt and not self._is_whole(file, receipt, verify=True):
+                if self.store.size(file) is not None and receipt and not self._is_whole(file, receipt, verify=True):
                     self.store.remove(file)
                     removed.append(file)
         return sorted(removed)

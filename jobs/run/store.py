@@ -9,6 +9,7 @@ may be removed while no run uses it.
 from __future__ import annotations
 
 import glob
+import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -75,8 +76,11 @@ class Store:
         """Note that another process has written a file; a folder of this machine is looked at each time."""
 
     def remove(self, path: str) -> None:
-        """Remove a file if it is there."""
-        (self.out / path).unlink(missing_ok=True)
+        """Remove a file if it is there, and a folder in its place."""
+        try:
+            (self.out / path).unlink(missing_ok=True)
+        except IsADirectoryError:
+            shutil.rmtree(self.out / path)
 
     def link(self, source: str, target: str, size: int) -> None:
         """Let a second path name the bytes of a file, of this size."""

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from jobs.run.cluster import MOST_WORKERS
 from jobs.terminal import number, print_lines, print_table, progress
-from jobs.verbs.parameters import FabricName, Place, given
+from jobs.verbs.parameters import FabricName, Place, Whole, given
 from pipeline.cores import cores
 from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file, truth_answerer
 from pipeline.truth.estimator import ESTIMATORS
@@ -32,7 +32,7 @@ class TruthFlags:
     estimator: Annotated[str | None, Parameter(help="Estimator of the truth: auto, owen, r2, mc, …")] = None
     relative_error: Annotated[float | None, Parameter(help="Relative error at which an estimate stops.")] = None
     absolute_error: Annotated[float | None, Parameter(help="Absolute error at which it stops, in 1/sr.")] = None
-    max_count: Annotated[int | None, Parameter(help="Most points of a row, a power of 2.")] = None
+    max_count: Annotated[Whole | None, Parameter(help="Most points of a row, a power of 2.")] = None
     footprint: Annotated[str | None, Parameter(help="gaussian or box.")] = None
     frame: Annotated[str | None, Parameter(help="Normal of the cosines inside the yarns: ply or macro.")] = None
     normaliser: Annotated[str | None, Parameter(help="Area in the denominator: visible or projected.")] = None
@@ -64,8 +64,8 @@ def evaluate(
     ] = None,
     extrapolate: Annotated[bool, Parameter(help="Evaluate it also for yarns outside its training domain.")] = False,
     truth: Annotated[TruthFlags, Parameter(name="*")] = TruthFlags(),
-    seed: Annotated[int, Parameter(help="Seed of the random numbers.")] = 0,
-    workers: Annotated[int, Parameter(help="Threads; 0: one per core.")] = 0,
+    seed: Annotated[Whole, Parameter(help="Seed of the random numbers.")] = 0,
+    workers: Annotated[Whole, Parameter(help="Threads; 0: one per core.")] = 0,
     skip_bad: Annotated[bool, Parameter(help="List rows that cannot be evaluated, and continue.")] = False,
 ) -> None:
     """Evaluate the queries of a file, by the ground truth or a model, and print a summary.

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from jobs.terminal import Terminal, print_lines, progress
-from jobs.verbs.parameters import FabricName, Local, given
+from jobs.verbs.parameters import FabricName, Local, Whole, given
 from pipeline.atomic import atomic_write
 from reports.exports.export import export
 from weaves.draft_files.read import DraftThreads, cut_out, read_draft
@@ -38,7 +38,7 @@ class ShaderFlags:
     model: Annotated[
         str | None, Parameter(help="Of a shader: soft_nodes (default), or the folder of a trained neumip.")
     ] = None
-    level: Annotated[int | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None
+    level: Annotated[Whole | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None
     language: Annotated[
         list[str],
         Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),
@@ -54,7 +54,7 @@ class BsdfFlags:
     """Choices of a BSDF on the command line."""
 
     solar: Annotated[str | None, Parameter(help="Of a BSDF: the same fabric in the colours of the solar band.")] = None
-    points: Annotated[int | None, Parameter(help="Of a BSDF: points of a pair of patches, a power of two; 4.")] = None
+    points: Annotated[Whole | None, Parameter(help="Of a BSDF: points of a pair of patches, a power of two; 4.")] = None
 
 
 def import_draft(
@@ -105,9 +105,9 @@ def export_fabric(
     maps: Annotated[Local | None, Parameter(help="Folder of texture maps and materials to write.")] = None,
     shader: Annotated[Local | None, Parameter(help="Folder of a shader with its tables to write.")] = None,
     bsdf: Annotated[Local | None, Parameter(help="BSDF for daylight simulation to write, ending in .xml.")] = None,
-    vertices: Annotated[int | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
-    repeats: Annotated[int | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
-    size: Annotated[int | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None,
+    vertices: Annotated[Whole | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
+    repeats: Annotated[Whole | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
+    size: Annotated[Whole | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None,
     of_shader: Annotated[ShaderFlags, Parameter(name="*")] = ShaderFlags(),
     of_bsdf: Annotated[BsdfFlags, Parameter(name="*")] = BsdfFlags(),
 ) -> None:

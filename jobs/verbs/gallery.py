@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from jobs.terminal import print_lines
 from jobs.verbs.exchange import named_flags
-from jobs.verbs.parameters import NOTHING, Local
+from jobs.verbs.parameters import NOTHING, Local, Whole
 from jobs.verbs.show import write_swatch
 from pipeline.atomic import atomic_write, refuse_unwritable
 from pipeline.materials.planes import layout
@@ -25,7 +25,7 @@ def gallery(
     /,
     *,
     out: Annotated[Local, Parameter(help="Folder of the site; files of the same names are replaced.")],
-    size: Annotated[int, Parameter(help="Texels of the longer side of maps, a power of two.")] = 1024,
+    size: Annotated[Whole, Parameter(help="Texels of the longer side of maps, a power of two.")] = 1024,
     language: Annotated[list[str], Parameter(help="Of shaders, as for `export`, beside Slang; several.")] = NOTHING,
 ) -> None:
     """Write the site, and print where it opens.

@@ -30,6 +30,11 @@ def _local(type_: object, tokens: Sequence[Token]) -> Path:
     return path
 
 
+def _whole(type_: object, tokens: Sequence[Token]) -> int:
+    """Return an integer as it is written; cyclopts itself rounds 1.5 to 2."""
+    return int(tokens[0].value)
+
+
 def given(flags: Any) -> dict[str, Any]:
     """Return the fields of a dataclass of flags that are given, not None."""
     return {name: value for name, value in asdict(flags).items() if value is not None}
@@ -46,6 +51,8 @@ NOTHING: Final[list[str]] = []
 
 Local = Annotated[Path, Parameter(converter=_local)]
 """A path of this machine."""
+Whole = Annotated[int, Parameter(converter=_whole)]
+"""An integer, never rounded."""
 Place = Annotated[Any, Parameter(converter=_place)]
 """A path; `Any`, because one of object storage is no `pathlib.Path` to pydantic, which cyclopts may call."""
 Out = Annotated[Place, Parameter(help="Folder of all products, or an address such as s3://bucket/x.")]
@@ -57,7 +64,7 @@ OUT: Final = Path("out")
 class WorkerFlags:
     """Processes that do the tasks, and how their progress is shown."""
 
-    workers: Annotated[int, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")] = 0
+    workers: Annotated[Whole, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")] = 0
     scheduler: Annotated[
         str, Parameter(help="Address or scheduler file of a running dask scheduler; default: this machine.")
     ] = ""

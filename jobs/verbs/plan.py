@@ -15,7 +15,7 @@ from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.reasons import ELSEWHERE, reasons
 from jobs.terminal import duration, print_lines, print_table
-from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName
+from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName, Whole
 from pipeline.cores import cores
 from weaves.errors import BadInput
 
@@ -56,7 +56,7 @@ def print_plan(
     *,
     add: Add = NOTHING,
     out: Out = OUT,
-    workers: Annotated[int, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
+    workers: Annotated[Whole, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
 ) -> None:
     """Print the plan of a recipe; nothing is computed. BadInput if the recipe or the workers cannot be used."""
     if not 0 <= workers <= MOST_WORKERS:

@@ -113,14 +113,19 @@ def _made(ledger: Ledger, every: Iterable[str]) -> set[str]:
         folder = Path(path).parent
         with suppress(BadInput):
             places.update(str(folder / name) for name in read_files(ledger.out / folder))
-    made = set()
+    made, copied = set(), set()
     for path in every:
         name, top = Path(path).name, Path(path).parts[0]
         if path in places or _RECEIPT.fullmatch(path) or (top in _FOLDERS and is_leftover(name)):
             made.add(path)
-        elif top == DATASETS and name == FILE:
+        elif name.endswith(".parquet"):
+            copied.add(Path(path).parent)
+    for path in every:
+        # A manifest goes with its shards: a copied data set, of which no receipt knows, stays whole.
+        folder = Path(path).parent
+        if Path(path).parts[0] == DATASETS and Path(path).name == FILE and folder not in copied:
             with suppress(BadInput):
-                Manifest.load((ledger.out / path).parent)
+                Manifest.load(ledger.out / folder)
                 made.add(path)
     return made
 

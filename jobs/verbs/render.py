@@ -14,12 +14,12 @@ import numpy as np
 from cyclopts import Parameter
 
 from jobs.terminal import duration, print_lines, progress
-from jobs.verbs.parameters import NOTHING, Local, SceneName
+from jobs.verbs.parameters import NOTHING, Local, SceneName, Whole
 from pipeline import versions
 from pipeline.atomic import atomic_write, refuse_unwritable
 from pipeline.cores import cores
 from pipeline.scenes.catalogue import load_scene
-from pipeline.scenes.loading import Loaded, load
+from pipeline.scenes.loading import MOST_PIXELS, Loaded, load
 from pipeline.scenes.options import BOUNCES, Bounces, SceneOptions
 from pipeline.scenes.picture import MOST_SAMPLES, PictureMethod, PicturePart, Plane, TruthAnswers, picture
 from pipeline.scenes.scene import Cloth, Scene
@@ -34,9 +34,6 @@ from weaves.fabric import load_fabric
 from weaves.validation import validated
 
 WHERE: Final = "render"
-
-MOST_PIXELS: Final = 16_384
-"""Longest side of a picture."""
 
 MOST_FRAMES: Final = 100_000
 """Most frames of a film."""
@@ -94,9 +91,9 @@ def render(
     fabric: Annotated[list[str], Parameter(help="Fabric in place of the next cloth's own; several.")] = NOTHING,
     method: Annotated[str, Parameter(help="truth, selvage, soft_nodes, point_sampled:16, … or a folder.")] = "selvage",
     size: Annotated[str, Parameter(help="WIDTHxHEIGHT in pixels; default: the film of the scene.")] = "",
-    frames: Annotated[int | None, Parameter(help="Frames of a film or folder; default: the scene's.")] = None,
-    samples: Annotated[int, Parameter(help="Rays a pixel: 1, 4, 9, … 64; more smooth silhouettes.")] = 1,
-    directions: Annotated[int, Parameter(help="Directions that an environment light is replaced by.")] = 8,
+    frames: Annotated[Whole | None, Parameter(help="Frames of a film or folder; default: the scene's.")] = None,
+    samples: Annotated[Whole, Parameter(help="Rays a pixel: 1, 4, 9, … 64; more smooth silhouettes.")] = 1,
+    directions: Annotated[Whole, Parameter(help="Directions that an environment light is replaced by.")] = 8,
     bounces: Annotated[Bounces, Parameter(help="Bounces of light between yarns.")] = BOUNCES,
     tone: Annotated[Literal["srgb", "reinhard"], Parameter(help="Tone curve; srgb cuts at 1.")] = "srgb",
     exposure: Annotated[float, Parameter(help="Exposure in stops; 0: that of the page.")] = 0.0,

@@ -19,7 +19,7 @@ from jobs.recipe.fallback_share import fallback_share
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.terminal import print_lines, print_table
-from jobs.verbs.parameters import NOTHING, ON, OUT, Add, Out, SceneName
+from jobs.verbs.parameters import NOTHING, ON, OUT, Add, Out, SceneName, Whole
 from jobs.verbs.records import records_file
 from jobs.verbs.require_recipe import EFFORT, savings, write_recipe
 from jobs.verbs.run import work
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 _SAMPLE = 2000  # queries for the time of the fallback
 _JUDGED = 100  # queries per fabric for its error
+_MOST_FRAMES = 10_000
 
 
 def require(
@@ -46,7 +47,7 @@ def require(
     error: Annotated[float, Parameter(help="Largest relative RMSE of the colour; .05 is 5 %.")] = float("inf"),
     time: Annotated[float, Parameter(help="Longest time of a frame on one thread, in milliseconds.")] = float("inf"),
     recipe: Annotated[str, Parameter(help="General recipe with a finished page.")] = "quick",
-    frames: Annotated[int, Parameter(help="Frames of the camera path that are analysed.")] = 4,
+    frames: Annotated[Whole, Parameter(help="Frames of the camera path that are analysed.")] = 4,
     margin: Annotated[float, Parameter(help="Factor by which the ranges of queries are widened.")] = 1.25,
     method: Annotated[str, Parameter(help="Method of the general recipe; default: the cheapest.")] = "",
     effort: Annotated[float, Parameter(help="Share of its rows per fabric and of its training steps.")] = EFFORT,
@@ -129,7 +130,9 @@ def require(
 
 
 def _refuse_limits(**limits: float) -> None:
-    """Refuse a number that is too small: frames and margin from 1 on, others above 0."""
+    """Refuse a number that is too small, and too many frames: frames and margin from 1 on, others above 0."""
+    if limits["frames"] > _MOST_FRAMES:
+        raise BadInput("require", "--frames", limits["frames"], f"at most {_MOST_FRAMES:,} frames can be analysed")
     for key, value in limits.items():
         least = 1 if key in ("frames", "margin") else 0
         if not (value >= least and value > 0):

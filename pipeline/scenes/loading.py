@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,12 +15,15 @@ from pipeline.scenes.lights import Light, lights_of
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.rays import shape_numbers
 from pipeline.scenes.scene import PREFIX, Cloth, Scene
-from pipeline.scenes.sources import elements
+from pipeline.scenes.sources import refuse_deadly
 from pipeline.scenes.variant import instantiate, mitsuba
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 
 Floats = npt.NDArray[np.float64]
+
+MOST_PIXELS: Final = 16_384
+"""Most pixels a side of a film."""
 
 
 class FilmWindow(NamedTuple):
@@ -163,7 +166,7 @@ def _world(mi: Any, scene: Scene, where: str) -> Any:
     """Return the scene as Mitsuba loads it."""
     try:
         if isinstance(scene.source, Path):
-            elements(scene)  # refuses what Mitsuba would not survive
+            refuse_deadly(scene)
             world = instantiate(mi, scene.source, where)
         else:
             world = mi.load_dict(scene.source(mi), optimize=False)
@@ -209,6 +212,8 @@ def _camera(mi: Any, world: Any, where: str) -> Camera:
         settings |= {name: _number(found[name]) for name in offsets}
     to_world = np.asarray(found["to_world"].matrix, np.float64).reshape(4, 4, -1)[..., 0]
     width, height = (int(length) for length in sensor.film().size())
+    if max(width, height) > MOST_PIXELS:
+        raise BadInput(where, "film", f"{width}x{height}", f"at most {MOST_PIXELS:,} pixels a side are allowed")
     return Camera(to_world, parallel, settings, (width, height))
 
 

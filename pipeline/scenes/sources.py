@@ -1,14 +1,22 @@
 """Cloths and files of a scene, read without Mitsuba.
 
-Mitsuba itself ends without a sentence where elements are nested some ten thousand deep, and waits for ever for a pipe
-that a scene names as a file. So a scene's XML is checked before Mitsuba reads it (`elements`).
+Mitsuba itself ends without a sentence where elements are nested some ten thousand deep, or a face names a vertex that
+is not there, and waits for ever for a pipe that a scene names as a file. So a scene is checked before Mitsuba reads it:
+its XML (`elements`), and its triangles in PLY and in Mitsuba's own format (`refuse_deadly`).
 """
 
 from __future__ import annotations
 
+import math
+import re
+import struct
+import zlib
 from pathlib import Path
 from typing import Final, NamedTuple
 from xml.parsers import expat
+
+import numpy as np
+import numpy.typing as npt
 
 from pipeline.scenes.scene import PREFIX, Scene
 from weaves.errors import BadInput, one_line
@@ -20,6 +28,30 @@ MOST_DEPTH: Final = 32
 _MOST_BYTES: Final = 16 * MIB
 _MOST_ELEMENTS: Final = 200_000
 _MOST_INCLUDED: Final = 64
+_LARGEST: Final = 3.4e38  # of single precision
+_NO_NUMBERS: Final = {"string", "ref", "boolean", "include", "alias"}
+
+
+_MOST_HEADER: Final = 1 << 16  # bytes
+_MOST_UNPACKED: Final = 1 << 30  # bytes
+
+_CODES: Final = {
+    name: code
+    for names, code in (
+        (("char", "int8"), "i1"),
+        (("uchar", "uint8"), "u1"),
+        (("short", "int16"), "i2"),
+        (("ushort", "uint16"), "u2"),
+        (("int", "int32"), "i4"),
+        (("uint", "uint32"), "u4"),
+        (("float", "float32"), "f4"),
+        (("double", "float64"), "f8"),
+    )
+    for name in names
+}
+"""NumPy's names of the types of PLY."""
+
+Corners = npt.NDArray[np.float64]
 
 
 class Element(NamedTuple):
@@ -53,6 +85,12 @@ def files(scene: Scene) -> list[Path]:
     folder = scene.source.parent
     named = [folder / name for element in elements(scene) if (name := element.filename())]
     return [scene.source, *sorted({path for path in named if path.is_file()})]
+
+
+def refuse_deadly(scene: Scene) -> None:
+    """Refuse what Mitsuba would not survive: as `elements`, and faces of a vertex that is not there."""
+    for path in files(scene):
+        _refuse_lost_vertices(path)
 
 
 def elements(scene: Scene) -> list[Element]:
@@ -113,6 +151,7 @@ def _parsed(path: Path) -> list[Element]:
 def _refuse(element: Element, path: Path, home: Path) -> None:
     """Refuse an element that names files in a way that cannot be checked, or names one that is no regular file."""
     where, name = str(path), element.filename()
+    _refuse_numbers(element, where)
     if element.tag == "path":
         folder = element.attributes.get("value", "")
         raise BadInput(where, "path", folder, "leave it out, and name files beside the scene")
@@ -120,3 +159,91 @@ def _refuse(element: Element, path: Path, home: Path) -> None:
         raise BadInput(where, "filename", name, "names of files and of properties are written out, without parameters")
     for place in {home, element.folder} if name else ():
         refuse_irregular(place / name, f"a file, which the scene {path.name} names,")
+
+
+def _refuse_numbers(element: Element, where: str) -> None:
+    """Refuse numbers that single precision does not hold, and a scale or matrix that makes a shape flat.
+
+    Mitsuba takes them, and shows a black or an odd picture.
+    """
+    of = element.attributes
+    name = of.get("name", "")
+    for key, text in of.items() if element.tag not in _NO_NUMBERS else ():
+        numbers = _numbers(text) if key not in ("name", "id", "type") else np.empty(0)
+        if not (np.abs(numbers) <= _LARGEST).all():
+            allowed = "finite numbers of single precision are needed"
+            raise BadInput(where, f"{element.tag} {name}".rstrip(), text, allowed)
+        if element.tag == "scale" and (numbers == 0).any():
+            raise BadInput(where, f"scale {key}", text, "must not be 0")
+    if element.tag == "matrix" and (matrix := _numbers(of.get("value", ""))).size in (9, 16):
+        side = math.isqrt(matrix.size)
+        if np.linalg.matrix_rank(matrix.reshape(side, side)[:3, :3]) < 3:
+            raise BadInput(where, "matrix", of["value"], "must have an inverse")
+
+
+def _numbers(text: str) -> npt.NDArray[np.float64]:
+    """Return the numbers of an attribute; none if it holds anything else."""
+    try:
+        return np.array(text.replace(",", " ").split(), np.float64)
+    except ValueError:
+        return np.empty(0)
+
+
+def _refuse_lost_vertices(path: Path) -> None:
+    """Refuse a mesh with a face of a vertex that is not there; what is no such mesh is left to Mitsuba."""
+    with path.open("rb") as file:
+        read = {b"ply": _ply, b"\x1c\x04\x03": _serialized, b"\x1c\x04\x04": _serialized}.get(file.read(3))
+    if read is None:
+        return
+    try:
+        corners, vertices = read(path)
+    except (ValueError, KeyError, IndexError, OSError, struct.error, zlib.error):
+        return
+    wrong = corners[(corners < 0) | (corners >= vertices)]
+    if wrong.size:
+        raise BadInput(str(path), "vertex of a face", int(wrong[0]), f"the mesh has {vertices:,}, counted from 0")
+
+
+def _ply(path: Path) -> tuple[Corners, int]:
+    """Return the corners of the faces of a PLY file, and its number of vertices."""
+    with path.open("rb") as file:
+        head = re.match(rb"ply\r?\n(?s:.*?)end_header\r?\n", file.read(_MOST_HEADER))
+        if head is None:
+            raise ValueError("no header")
+        file.seek(head.end())
+        body = file.read()
+    order, counts, fields = "", {"": 0}, dict[str, list[tuple[str, str] | tuple[str, str, int]]]({"": []})
+    for words in map(str.split, head[0].decode("latin-1").splitlines()):
+        match words:
+            case ["format", form, _]:
+                order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[form]
+            case ["element", name, count]:
+                counts[name], fields[name] = int(count), []
+            case ["property", "list", number, kind, name]:
+                last = fields[next(reversed(fields))]
+                last += [(f"{name} n", order + _CODES[number]), (name, order + _CODES[kind], 3)]
+            case ["property", kind, name]:
+                fields[next(reversed(fields))].append((name, order + _CODES[kind]))
+    corners = next(field[0] for field in fields["face"] if len(field) == 3)
+    before = list(counts)[: list(counts).index("face")]
+    if order:
+        start = sum(counts[name] * np.dtype(fields[name]).itemsize for name in before)
+        return np.frombuffer(body, np.dtype(fields["face"]), counts["face"], start)[corners], counts["vertex"]
+    skipped = sum(counts[name] * len(fields[name]) for name in before)
+    width = sum(3 if len(field) == 3 else 1 for field in fields["face"])
+    numbers = np.array(body.split()[skipped : skipped + width * counts["face"]], np.float64).reshape(-1, width)
+    first = next(i for i, field in enumerate(fields["face"]) if field[0] == corners)
+    return numbers[:, first : first + 3], counts["vertex"]
+
+
+def _serialized(path: Path) -> tuple[Corners, int]:
+    """Return the corners of the first mesh of a file in Mitsuba's format, and its number of vertices."""
+    packed = path.read_bytes()
+    _, version = struct.unpack_from("<HH", packed)
+    data = zlib.decompressobj().decompress(packed[4:], _MOST_UNPACKED)
+    flags, start = *struct.unpack_from("<I", data), 4
+    start = data.index(b"\0", start) + 1 if version == 4 else start
+    vertices, faces = struct.unpack_from("<QQ", data, start)
+    columns = 3 + 3 * bool(flags & 0x1) + 2 * bool(flags & 0x2) + 3 * bool(flags & 0x8)
+    start += 16 + vertices * columns * (8 if flags & 0x2000 else 4)
+    return np.frombuffer(data, "<u4", 3 * faces, start), vertices

@@ -29,7 +29,8 @@ from pipeline.shards.query_file import (
     ANSWERS,
     OPTIONAL,
     BadRow,
-    Faults,
+    FindFaults,
+    bad_rows,
     blocks,
     check_columns,
     checked_queries,
@@ -55,7 +56,7 @@ class Answerer(NamedTuple):
     """Takes queries and the place of the first in the file. BadInput if it cannot answer."""
     about: dict[str, Any]
     """Facts of it for the result's metadata."""
-    faults: Faults = faults
+    faults: FindFaults = faults
     """Faults of queries that it cannot answer."""
     prepare: Callable[[Queries], None] = lambda queries: None
     """Takes the queries of a block before threads begin with them."""
@@ -178,11 +179,11 @@ def evaluate_file(
         summary, pool = Summary(), ThreadPoolExecutor(threads)
         stack.callback(pool.shutdown, cancel_futures=True)  # what is stopped early begins nothing more
         for block in blocks(queries, file):
-            batch, bad = checked_queries(block, summary.rows, repeat, answerer.faults)
+            batch, bad = checked_queries(block, repeat, answerer.faults)
             if listing:
-                listing.writerows(bad)
+                listing.writerows(bad_rows(block, summary.rows, bad))
             good = np.ones(len(batch.u), np.bool_)
-            good[[row.row - summary.rows for row in bad]] = False
+            good[list(bad)] = False
             answers = _answers(pool, answerer, batch, good, summary, chunk, lambda rows: progress(rows / total))
             columns = [*block.columns, *_arrays(batch, answers, good, answerer.errors)]
             writer.write_table(pa.table(columns, schema=schema), ROW_GROUP)

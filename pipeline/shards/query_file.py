@@ -50,6 +50,9 @@ def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
         with _readable(path):
             here = stack.enter_context(local_copy(path))
             file = pq.ParquetFile(here, page_checksum_verification=True, buffer_size=_BUFFER)
+        about = file.metadata
+        if about.num_rows != (rows := sum(about.row_group(i).num_rows for i in range(about.num_row_groups))):
+            raise BadInput(str(path), "rows in the footer", about.num_rows, f"its row groups have {rows:,}")
         yield stack.enter_context(file)
 
 
@@ -86,17 +89,20 @@ def check_columns(path: Path, schema: pa.Schema) -> None:
             raise BadInput(where, f"type of column {name}", str(kind), "must be float (32 bits) or double (64 bits)")
 
 
-Faults = Callable[[Queries], dict[int, tuple[str, object, str]]]
+Faults = dict[int, tuple[str, object, str]]
 """Faults of queries: row -> (column, value, what is allowed)."""
+FindFaults = Callable[[Queries], Faults]
 
 
-def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], wrong: Faults = faults) -> None:
-    """Read all queries once and refuse the file if any has no answer."""
+def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], find: FindFaults = faults) -> None:
+    """Read all queries once and refuse the file if any has no answer, by the first and the number of the others."""
     asked = [name for name in QUERY_COLUMNS if name in file.schema_arrow.names]
     first, count, start = None, 0, 0
     for block in blocks(path, file, asked):
-        _, bad = checked_queries(block, start, repeat, wrong)
-        first = first or next(iter(bad), None)
+        _, bad = checked_queries(block, repeat, find)
+        if bad and first is None:
+            row = min(bad)
+            first = next(bad_rows(block, start, {row: bad[row]}))
         count += len(bad)
         start += len(block)
     if first:
@@ -105,13 +111,8 @@ def refuse_bad(path: Path, file: pq.ParquetFile, repeat: tuple[int, int], wrong:
         raise BadInput(str(path), f"row {first.row}, column {first.column}", first.value, allowed)
 
 
-def checked_queries(
-    block: pa.Table, start: int, repeat: tuple[int, int], wrong: Faults = faults
-) -> tuple[Queries, list[BadRow]]:
-    """Return a block's queries in single precision and its bad rows.
-
-    `start` is the file's index of its first row; `wrong` returns the faults of queries.
-    """
+def checked_queries(block: pa.Table, repeat: tuple[int, int], find: FindFaults = faults) -> tuple[Queries, Faults]:
+    """Return a block's queries in single precision and their faults."""
     given = {name: block[name].to_numpy() for name in QUERY_COLUMNS if name in block.column_names}
     single: dict[str, npt.NDArray[np.float32]] = {}
     for name in QUERY_COLUMNS:
@@ -124,22 +125,30 @@ def checked_queries(
             far = np.isfinite(column) & (single[name] != column)
             single[name][far] = np.fmod(column[far], repeat[name == "v"]).astype(np.float32)
     batch = queries_of(single)
-    return batch, [
-        _bad_row(block, row, start, name, allowed) for row, (name, _, allowed) in sorted(wrong(batch).items())
-    ]
+    return batch, find(batch)
 
 
-def _bad_row(block: pa.Table, row: int, start: int, name: str, allowed: str) -> BadRow:
-    """Describe a fault by the file's own columns and values."""
-    columns = [f"{name}_{axis}" for axis in "xyz"] if name in ("wi", "wo") else [name]
-    values = [block[column][row].as_py() for column in columns]
-    empty = [column for column, value in zip(columns, values, strict=True) if value is None]
-    if empty:
-        return BadRow(start + row, empty[0], None, "must not be null")
+def bad_rows(block: pa.Table, start: int, found: Faults) -> Iterator[BadRow]:
+    """Yield the faults of a block in the order of its rows, by the file's own columns and values.
+
+    `start` is the file's index of its first row.
+    """
+    axes = {name: [f"{name}_{axis}" for axis in "xyz"] if name in ("wi", "wo") else [name] for name in Queries._fields}
+    named = {name: {c: block[c].to_pylist() for c in axes[name]} for name in {name for name, _, _ in found.values()}}
+    for row, (name, _, allowed) in sorted(found.items()):
+        values = {column: of[row] for column, of in named[name].items()}
+        yield _bad_row(start + row, name, values, allowed)
+
+
+def _bad_row(row: int, name: str, values: dict[str, float | None], allowed: str) -> BadRow:
+    """Describe the fault of a row of the file, which has these values in the columns of the field `name`."""
+    for column, value in values.items():
+        if value is None:
+            return BadRow(row, column, None, "must not be null")
     if len(values) > 1:
-        return BadRow(start + row, f"{columns[0]}..{columns[-1][-1]}", values, allowed)
-    value = values[0]
+        return BadRow(row, f"{name}_x..z", list(values.values()), allowed)
+    value = float(values[name])  # type: ignore[arg-type]  # it is not None
     with np.errstate(over="ignore", under="ignore"):
         rounded = np.float32(value)
     lost = np.isfinite(value) and value != 0 and (rounded == 0 or not np.isfinite(rounded))
-    return BadRow(start + row, name, value, allowed + (" in single precision" if lost else ""))
+    return BadRow(row, name, value, allowed + (" in single precision" if lost else ""))

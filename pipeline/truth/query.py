@@ -158,8 +158,9 @@ def faults(queries: Queries, parallax: bool = False) -> dict[int, tuple[str, obj
     found: dict[int, tuple[str, object, str]] = {}
 
     def note(rows: Any, name: str, allowed: str) -> None:
-        for row in np.flatnonzero(rows).tolist():
-            found.setdefault(row, (name, getattr(queries, name)[row].tolist(), allowed))
+        index = np.flatnonzero(rows)
+        for row, value in zip(index.tolist(), getattr(queries, name)[index].tolist(), strict=True):
+            found.setdefault(row, (name, value, allowed))
 
     for name, column in zip(Queries._fields, queries, strict=True):
         note(~np.isfinite(column).all(axis=tuple(range(1, column.ndim))), name, "must be finite")

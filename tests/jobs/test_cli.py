@@ -153,3 +153,18 @@ def test_check_of_a_fabric_shows_its_invariants_and_fails_if_one_is_broken(twill
     code, text, told = twillight("check", "denim")
     assert code == 1 and text.count("NO") == 2
     assert told == "denim: 2 of 4 invariants do not hold: made of denim, far off\n"
+
+
+@pytest.mark.parametrize(
+    ("redirected", "expected", "sentence"),
+    [
+        ("> /dev/full", 1, "stdout: No space left on device; what was to be printed is lost\n"),
+        (">&-", 2, "stdout is closed; send it to a file or to /dev/null\n"),
+        ("| true", 0, ""),
+        ("> /dev/full 2>&1", 1, ""),
+    ],
+)
+def test_an_output_that_takes_nothing_is_one_sentence(redirected, expected, sentence):
+    command = f"set -o pipefail; {sys.executable} -m jobs.cli list {redirected}"
+    done = subprocess.run(["bash", "-c", command], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (expected, sentence)

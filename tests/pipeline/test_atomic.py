@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 
 from pipeline.atomic import atomic_path, atomic_write
@@ -17,3 +19,6 @@ def test_an_error_while_writing_leaves_the_old_file_and_a_file_is_no_folder(tmp_
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(BadInput, match="can be written"):
         atomic_write(path / "a.bin", b"")
+    for folder in (tmp_path, Path()):
+        with pytest.raises(BadInput, match="is a folder: the path of a file is needed"):
+            atomic_write(folder, b"")

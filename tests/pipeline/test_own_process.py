@@ -8,6 +8,7 @@ import psutil
 import pytest
 
 from pipeline.own_process import ProcessEnded, in_own_process
+from tests.faults.runs import gone
 from tests.pipeline.sent_code import Code
 from weaves.errors import BadInput
 
@@ -67,3 +68,19 @@ def test_the_process_ends_when_its_parent_is_killed():
         child = psutil.Process(int(parent.stdout.readline()))
         parent.kill()
         child.wait(timeout=120)
+
+
+SLEEPER = "__import__('subprocess').Popen(['sleep', '3600'], close_fds=False).pid"
+
+
+def ended(pid):
+    """Return whether a process ends within some seconds."""
+    return not psutil.pid_exists(pid) or not gone([psutil.Process(pid)])
+
+
+def test_processes_that_it_starts_end_with_it_and_do_not_hide_its_end():
+    assert ended(in_own_process(Code(f"lambda p: {SLEEPER}")))
+    started = []
+    with pytest.raises(ProcessEnded, match="exit code 3"):
+        in_own_process(Code(f"lambda p: (p({SLEEPER}), __import__('os')._exit(3))"), progress=started.append)
+    assert ended(int(started[0]))

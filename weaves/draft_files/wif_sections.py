@@ -247,14 +247,14 @@ def _yarns_of(wif: _Wif, axis: str, where: str) -> WarpWeftData:
         )
     if default not in wif.color_table:
         # Most programs state no default where each thread has a colour of its own.
-        if not colours or set(colours) != set(range(1, len(colours) + 1)):
-            stated = f"Color = {default}" if yarns.color else "no Color"
-            without = min(set(range(1, threads + 1)) - set(colours))
-            raise BadInput(where, "", f"{section} has {stated}", f"{known}; thread {without} has no colour of its own")
-        default = colours[1]
-        if len(colours) < threads:
-            others = f"threads from {len(colours) + 1} on"
-            warnings.warn(f"{section} states no Color: {others} have that of thread 1.", stacklevel=1)
+        without = sorted(set(range(1, threads + 1)) - set(colours))
+        if yarns.color and (not colours or set(colours) != set(range(1, len(colours) + 1))):
+            raise BadInput(where, "", f"{section} has Color = {default}", known)
+        stated = f"Color = {default}, which is not in [COLOR TABLE]" if yarns.color else "no Color"
+        default = colours[min(colours)] if colours else min(wif.color_table)
+        if without:
+            threads_without = f"{len(without)} thread{'s' if len(without) > 1 else ''} from {without[0]} on"
+            warnings.warn(f"{section} states {stated}: {threads_without} take the first, {default}.", stacklevel=1)
     for key in ("spacing", "thickness"):
         lengths: dict[int, float] = getattr(wif, f"{axis}_{key}")
         if lengths and getattr(yarns, key) is None:

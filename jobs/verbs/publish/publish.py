@@ -15,6 +15,7 @@ from cyclopts import Parameter
 from filelock import FileLock, Timeout
 
 from jobs.terminal import print_lines, size, tracked
+from jobs.verbs.parameters import Local
 from jobs.verbs.publish.card import LOADER, card, citation_file, licence_id
 from jobs.verbs.publish.citation import Citation
 from jobs.verbs.publish.contents import About, PublishedPart, own_shards, parts_of
@@ -35,9 +36,9 @@ _UNCITED: Final = Citation()
 
 
 def publish(
-    dataset: Annotated[Path, Parameter(help="Folder of a data set, out/datasets/NAME-FINGERPRINT.")],
+    dataset: Annotated[Local, Parameter(help="Folder of a data set, out/datasets/NAME-FINGERPRINT.")],
     *,
-    to: Annotated[Path | None, Parameter(help="Folder to write; empty or not there.")] = None,
+    to: Annotated[Local | None, Parameter(help="Folder to write; empty or not there.")] = None,
     licence: Annotated[str | None, Parameter(help="SPDX identifier of the data's licence, such as CC-BY-4.0.")] = None,
     citation: Annotated[Citation, Parameter(name="*")] = _UNCITED,
 ) -> None:

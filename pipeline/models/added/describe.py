@@ -37,6 +37,7 @@ _OF_METRICS: Final = {"title": "", "unit": "1", "better": "lower", "format": "si
 """Attributes that a metric may have, with their defaults."""
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+_SETTING: Final = re.compile(r"[\w .,=+%()-]{0,40}")  # it becomes part of file names and of tables in Markdown
 
 
 def describe(text: str, own: Mapping[str, Any], more: Mapping[str, Any]) -> AddedMethod | AddedFunction:
@@ -134,8 +135,9 @@ def _stated(has: Mapping[str, Any], text: str) -> dict[str, Any]:
     name, setting, version = has["name"], has["setting"], has["version"]
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise BadInput(ADD, "", text, f"name = {brief(name)} must be letters, digits, - and _, 64 at most")
-    if not isinstance(setting, str) or len(setting) > 40 or not setting.isprintable():
-        raise BadInput(ADD, "", text, f"setting = {brief(setting)} must be a text of at most 40 letters")
+    if not isinstance(setting, str) or not _SETTING.fullmatch(setting):
+        allowed = "must be at most 40 letters, digits, spaces and . , = + - % ( )"
+        raise BadInput(ADD, "", text, f"setting = {brief(setting)} {allowed}")
     if isinstance(version, bool) or not isinstance(version, int | str) or not 0 < len(str(version)) <= 64:
         raise BadInput(ADD, "", text, f"version = {brief(version)} must be an integer or a short text")
     kinds, known = has.get("kinds", []), get_args(Kind)

@@ -6,6 +6,7 @@ a call that takes too long (`pipeline.models.added.apart`).
 
 from __future__ import annotations
 
+import math
 import struct
 import threading
 import time
@@ -19,7 +20,7 @@ import numpy as np
 
 from pipeline.models.added.added_code import AddedFunction, AddedMethod
 from pipeline.models.added.source import locate
-from weaves.errors import WorkFailed, one_line
+from weaves.errors import BadInput, WorkFailed, brief, one_line
 
 if TYPE_CHECKING:
     from pipeline.compiled.arrays import Float32
@@ -129,7 +130,9 @@ def faults_of(name: str, function: str, limit: float, root: Path) -> Iterator[No
     except MethodFailed:
         raise
     except BaseException as error:  # SystemExit too: the method must not end the work of others
-        raise MethodFailed(name, f"{function}: {described(error, root)}") from error
+        failed = MethodFailed(name, f"{function}: {described(error, root)}")
+        # A RuntimeError caused by a StopIteration is the latter to contextlib, which would raise it again.
+        raise failed from (None if isinstance(error, StopIteration) else error)
     finally:
         WATCH.mark(-1, *call)
 
@@ -199,8 +202,9 @@ class Guarded:
         """Return the bytes that a renderer stores for a fabric; MethodFailed unless it is an integer >= 0."""
         with self._call("bytes_stored"):
             found: object = self.method.bytes_stored(fabric)
-        if isinstance(found, bool) or not isinstance(found, int | np.integer) or found < 0:
-            raise MethodFailed(self.name, f"bytes_stored returned {found!r}; an integer from 0 on is needed")
+        if isinstance(found, bool) or not isinstance(found, int | np.integer) or not 0 <= found < 2**63:
+            allowed = "an integer from 0 to 2^63 - 1 is needed"
+            raise MethodFailed(self.name, f"bytes_stored returned {brief(found)}; {allowed}")
         return int(found)
 
     def _call(self, function: str) -> Any:
@@ -232,20 +236,17 @@ def unchecked(method: Method) -> Method:
 def load_function(options: AddedFunction) -> Callable[..., float]:
     """Import a function from outside; the function returned raises MethodFailed unless it returns a finite number.
 
-    Raises
-    ------
-    WorkFailed
-        If the code is not the planned one.
-    MethodFailed
-        If it cannot be imported.
+    Errors as `imported`.
     """
     function, root = imported(options)
 
     def measured(*arguments: Any) -> float:
         with faults_of(options.name, "the metric", options.limit, root):
             value = function(*arguments)
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-            raise MethodFailed(options.name, f"it returned {value!r}; a finite number is needed")
+            number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+            finite = number and math.isfinite(value)
+        if not finite:
+            raise MethodFailed(options.name, f"it returned {brief(value)}; a finite number is needed")
         return float(value)
 
     return measured
@@ -266,15 +267,13 @@ def new(make: Callable[..., Method], options: AddedMethod, root: Path) -> Method
 def imported(options: AddedMethod | AddedFunction) -> tuple[Any, Path]:
     """Import code from outside; return the class or function, and its file or the folder of its package.
 
-    Raises
-    ------
-    WorkFailed
-        If the code is not the planned one.
-    MethodFailed
-        If it cannot be imported.
+    MethodFailed if the code is gone, is not the planned one, or cannot be imported.
     """
-    source = locate(options.source, options.folder)
-    source.verify(options.sha256)
+    try:
+        source = locate(options.source, options.folder)
+        source.verify(options.sha256)
+    except (BadInput, WorkFailed, OSError) as error:
+        raise MethodFailed(options.name, str(error)) from error
     with faults_of(options.name, "import", options.limit, source.root):
         module = source.imported()
     return source.of(module), source.root

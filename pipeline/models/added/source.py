@@ -24,6 +24,9 @@ ADD: Final = "--add"
 MOST_BYTES: Final = 512 * 2**20
 """Largest package."""
 
+MOST_FILE: Final = 16 * 2**20
+"""Largest file of code."""
+
 _OURS: Final = ("weaves", "pipeline", "reports", "jobs", "twillight")
 
 
@@ -60,6 +63,8 @@ class CodeSource(NamedTuple):
     def sha256(self) -> str:
         """Return the hash of the file, or of all files of the package and their names; BadInput if it is too large."""
         if self.root.is_file():
+            if self.root.stat().st_size > MOST_FILE:
+                raise BadInput(ADD, "", self.text, f"the file {self.root.name} has more than {MOST_FILE:,} bytes")
             return file_sha256(self.root)
         found, total = hashlib.sha256(), 0
         for path in sorted(self.root.rglob("*")):

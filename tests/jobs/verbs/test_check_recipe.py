@@ -70,6 +70,16 @@ def test_a_shard_that_is_gone_and_files_cut_short_are_named_and_made_again(run):
     same(made_up.contents(run.out), expected)
 
 
+def test_a_folder_in_the_place_of_a_shard_is_named_and_the_shard_made_again(run):
+    expected, shard = made_up.contents(run.out), run.of(Shard)
+    place = run.out / shard.products[0]
+    place.unlink()
+    (place / "inside").mkdir(parents=True)
+    code, _, told = run()
+    assert code != 0 and str(place) in told and run("--repair")[0] == 0
+    same(made_up.contents(run.out), expected, but=[f"ledger/{shard.id}.json"])
+
+
 def test_a_foreign_file_is_named_and_kept(run):
     foreign = (run.out / run.of(Shard).products[0]).with_name("part-0123456789abcdef.parquet")
     foreign.write_text("not a shard")

@@ -1,3 +1,4 @@
+import shutil
 from functools import partial
 
 import pytest
@@ -58,3 +59,13 @@ def test_bytes_of_shards_that_another_data_set_keeps_are_not_counted(two, tmp_pa
     freed = said.split(f"{shards.relative_to(tmp_path / 'out')} 5 ")[1].split()
     manifest = (shards / "manifest.json").stat().st_size
     assert freed[1] == "kB" and float(freed[0]) == pytest.approx(manifest / 1000, rel=0.01)
+
+
+def test_a_copied_data_set_keeps_its_manifest(two, tmp_path):
+    datasets = tmp_path / "out" / "datasets"
+    copied = shutil.copytree(next(datasets.glob("narrow-*")), datasets / "copied")
+    for index, shard in enumerate(copied.glob("*.parquet")):  # of another folder of products
+        shard.rename(copied / f"part-{index:016x}.parquet")
+    before = made_up.contents(copied)
+    assert two("wide.toml", "--delete")[0] == 0
+    assert made_up.contents(copied) == before and not list(datasets.glob("narrow-*"))

@@ -1,6 +1,8 @@
 import os
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,7 @@ SUN = '<emitter type="directional"><vector name="direction" x="0" y="0" z="-1"/>
 BALL = '<shape type="sphere"><bsdf type="diffuse" id="fabric_denim"/></shape>'
 MESH = '<shape type="obj"><string name="filename" value="{}"/><bsdf type="diffuse" id="fabric_denim"/></shape>'
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+PLACED = '<transform name="to_world">{}</transform><bsdf'
 MAP = '<texture type="bitmap" name="reflectance"><string name="filename" value="lost.png"/></texture>'
 
 BROKEN = {
@@ -37,11 +40,47 @@ BROKEN = {
     BALL.replace("/></shape>", f">{MAP}</bsdf></shape>") + SUN + CAMERA: "lost.png",
     '<shape type="ply"><string name="filename" value="lost.ply"/></shape>' + BALL + SUN + CAMERA: "lost.ply",
     MESH.format("bare.obj") + SUN + CAMERA: "needs uv coordinates",
+    BALL + SUN + CAMERA.replace('"16"', '"16385"'): "film = '16385x12': at most 16,384 pixels a side",
+    BALL + SUN + CAMERA.replace("<film", '<float name="fov" value="nan"/><film'): "float fov = 'nan': finite numbers",
+    BALL + SUN + CAMERA.replace("0,0,4", "0,inf,4"): "lookat = '0,inf,4': finite numbers",
+    BALL + SUN.replace("-1", "1e39") + CAMERA: "vector direction = '1e39': finite numbers",
+    BALL.replace("<bsdf", PLACED.format('<scale x="0"/>')) + SUN + CAMERA: "scale x = '0': must not be 0",
+    BALL.replace("<bsdf", PLACED.format('<matrix value="1 0 0 0 1 0 0 0 0"/>')) + SUN + CAMERA: "must have an inverse",
+    **{
+        MESH.format(name).replace("obj", "ply", 1) + SUN + CAMERA: "vertex of a face = 9" for name in ("a.ply", "b.ply")
+    },
+    MESH.format("a.serialized").replace("obj", "serialized", 1) + SUN + CAMERA: "vertex of a face = 9",
 }
+
+
+PLY = """ply
+format {} 1.0
+comment faces of a vertex that is not there
+element vertex 3
+property float x
+property float y
+property float z
+element face 1
+property uchar flags
+property list uchar int vertex_indices
+end_header
+"""
+PLACES, FACE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32), [0, 1, 9]
+
+
+def write_meshes_with_lost_vertices(folder):
+    """Write a mesh whose only face has vertex 9 of three, in every format."""
+    (folder / "a.ply").write_text(PLY.format("ascii") + "0 0 0\n1 0 0\n0 1 0\n5 3 0 1 9\n")
+    face = struct.pack(">BB3i", 5, 3, *FACE)
+    (folder / "b.ply").write_bytes(PLY.format("binary_big_endian").encode() + PLACES.astype(">f4").tobytes() + face)
+    mesh = struct.pack("<I5sQQ", 0x1000, b"name", 3, 1) + PLACES.tobytes() + struct.pack("<3I", *FACE)
+    header, index = struct.pack("<HH", 0x041C, 4), struct.pack("<QI", 0, 1)
+    (folder / "a.serialized").write_bytes(header + zlib.compress(mesh) + index)
 
 
 def written(folder, body):
     (folder / "bare.obj").write_text(TRIANGLE)
+    write_meshes_with_lost_vertices(folder)
     path = folder / "scene.xml"
     path.write_text(f'<scene version="3.0.0">{body}</scene>')
     return path
@@ -58,7 +97,8 @@ def refused(call):
 @pytest.mark.parametrize("body", BROKEN, ids=range(len(BROKEN)))
 def test_every_fault_is_one_sentence(body, tmp_path):
     sentence = refused(lambda: load(load_scene(written(tmp_path, body)), OPTIONS))
-    assert BROKEN[body] in sentence and "scene.xml" in sentence and ".cpp" not in sentence
+    named = next((name for name in ("a.ply", "b.ply", "a.serialized") if name in body), "scene.xml")
+    assert BROKEN[body] in sentence and named in sentence and ".cpp" not in sentence
 
 
 FRESH = """

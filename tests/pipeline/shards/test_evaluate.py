@@ -165,6 +165,23 @@ def test_viewers_too_low_for_parallax_are_bad_rows(case):
     assert case.run(skip_bad=True).bad == 2
 
 
+def test_a_footer_that_claims_other_rows_than_there_are_is_refused(case):
+    case.write(query_columns(), 1000)
+    content, field = case.queries.read_bytes(), b"\x16\xd8\x04\x19"  # number of rows, 300, before the row groups
+    assert content.count(field) == 1
+    case.queries.write_bytes(content.replace(field, b"\x16\x80\x00\x19"))
+    assert "rows in the footer = 0: its row groups have 300" in case.refused()
+
+
+def test_only_the_first_of_many_bad_rows_is_described(case, monkeypatch):
+    describe = Mock(wraps=query_file._bad_row)
+    monkeypatch.setattr(query_file, "_bad_row", describe)
+    columns = query_columns()
+    columns["sigma"][:] = -1
+    assert f"row 0, column sigma = -1.0: must be greater than 0 ({ROWS - 1} more" in case.write(columns).refused()
+    assert describe.call_count == 1
+
+
 @pytest.mark.parametrize("row_group_size", [10, 1000])
 def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, monkeypatch, row_group_size):
     case.write(query_columns(), row_group_size)

@@ -63,6 +63,9 @@ def test_palettes_of_any_range(read, most, red):
     assert (draft.ends.colours[0], draft.picks.colours[0]) == ("#ffffff", "#aa1020")
 
 
+READ = ("missing_color_table", "color missing", "too many treadles")
+"""Samples for a refusal that are read with a remark."""
+
 FROM_ZERO = numbered([pick % 4 for pick in range(8)])
 
 IMPERFECT = {
@@ -74,6 +77,10 @@ IMPERFECT = {
     "more picks than stated": ({"WEFT": "Threads=6\nColor=2"}, ["[WEFT] states 6 threads, the draft has 8"]),
     "no palette": ({"COLOR_PALETTE": None}, ["no Range: 0 to 255"]),
     "no colours": ({"COLOR_TABLE": None, "WARP_COLORS": "1=3"}, ["ends are dark"]),
+    "no colour of picks": ({"WEFT": "Threads=8"}, ["[WEFT] states no Color: 8 threads from 1 on take the first, 1"]),
+    "no colour of some": (
+        {"WEFT": "Threads=8", "WEFT_COLORS": "3=2"}, ["[WEFT] states no Color: 7 threads from 1 on take the first, 2"]
+    ),
     "a treadle tied to nothing": ({"TREADLING": numbered([1, 2, 3, 4, "1,9", 2, 3, 4])}, ["to treadle 9"]),
 }  # fmt: skip
 """What real programs write, and what the remarks on it say."""
@@ -137,7 +144,7 @@ def test_the_sample_files_of_the_library_are_read_or_refused(read):
         draft = read_draft(SAMPLES[name])
         assert draft.warp_over.shape == (len(draft.picks.colours), len(draft.ends.colours)), name
     for name, path in ((name, SAMPLES[name]) for name in BAD):
-        if path.suffix == ".wif" and any(case in name for case in ("missing_color_table", "too many treadles")):
+        if path.suffix == ".wif" and any(case in name for case in READ):
             assert read(path.read_bytes(), path.suffix).remarks
         else:
             refusal(read, path.read_bytes(), path.suffix)
@@ -181,7 +188,6 @@ MALFORMED = {
     "no threads": (wif(WARP="Threads=0\nColor=1"), "[WARP] threads"),
     "many ends": (wif(THREADING="2000000000=1"), "[THREADING] 2000000000"),
     "colour that is not there": (wif(WARP="Threads=8\nColor=7"), "[WARP] has Color = 7"),
-    "no colour": (wif(WEFT="Threads=8"), "[WEFT] has no Color"),
     "colour of an end": (wif(WARP_COLORS="3=7"), "[WARP COLORS] 3"),
     "long line": (wif(TIEUP="1=" + "1," * 9000), "[TIEUP] has a line"),
     "long gap": (wif(TEXT=("a" + " " * 8000 + "b\n") * 100, THREADING=None), "[THREADING]"),

@@ -64,6 +64,8 @@ def test_every_file_of_a_package_counts(tmp_path, monkeypatch):
         ('"2.1", ""', '2.1, ""', "version = 2.1 must be an integer or a short text"),
         ('version, setting, kinds = "theirs", "2.1"', 'setting, kinds = "theirs"', "lacks the attribute 'version'"),
         ('"theirs", "2.1"', '"../theirs", "2.1"', "name = '../theirs' must be letters"),
+        ('"2.1", ""', '"2.1", "../a"', "setting = '../a' must be at most 40 letters, digits, spaces"),
+        ('"2.1", ""', '"2.1", "a | `b`"', "setting = 'a | `b`' must be at most 40 letters, digits, spaces"),
         ('{"stretch"}', '{"sideways"}', "kinds = ['sideways'] must be some of behind, stretch, curvature"),
         ("    def covers", "    network = print\n\n    def covers", "has a function 'network' and lacks 'load'"),
         ("    def covers", "    of_one_material = True\n\n    def covers", "and lacks a function 'network'"),
@@ -76,6 +78,13 @@ def test_code_that_is_no_method_gets_a_sentence(path, old, new, sentence):
     assert METHOD.count(old) == 1
     path.write_text(METHOD.replace(old, new))
     with pytest.raises(BadInput, match=f"^--add: .*{re.escape(sentence)}"):
+        describe(f"{path}:Theirs", {}, {})
+
+
+def test_a_file_of_gigabytes_is_refused_unread(path):
+    with path.open("r+b") as file:
+        file.truncate(3 << 30)
+    with pytest.raises(BadInput, match=r"the file theirs\.py has more than 16,777,216 bytes"):
         describe(f"{path}:Theirs", {}, {})
 
 

@@ -10,7 +10,7 @@ from pipeline.models.added.source import locate
 from pipeline.models.method import Method
 from pipeline.truth.query import Queries
 from tests.pipeline.models.stand_ins import FakeMethod
-from weaves.errors import BadInput, WorkFailed
+from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 OPTIONS = AddedMethod(name="theirs", source="/theirs.py:Theirs", sha256="0" * 64, stated="1", setting="k = 2")
@@ -70,6 +70,7 @@ def changed(queries):
         (ValueError("no such cloth"), "predict: ValueError: no such cloth"),
         (SystemExit(0), "predict: SystemExit"),
         (MemoryError(), "predict: MemoryError"),
+        (StopIteration(), "predict: StopIteration"),
         (BadInput("queries", "wi", 1, "too steep"), "predict: BadInput: queries: wi = 1: too steep"),
     ],
 )
@@ -99,9 +100,9 @@ def test_a_measurement_that_counts_wrong_values_gets_them():
     assert unchecked(other) is other
 
 
-@pytest.mark.parametrize("wrong", [-1, 2.5, True, None, "8"])
+@pytest.mark.parametrize("wrong", [-1, 2.5, True, None, "8", 2**63, 10**5000], ids=range(7))
 def test_bytes_are_an_integer_and_faults_name_their_function(wrong):
-    with pytest.raises(MethodFailed, match="an integer from 0 on is needed"):
+    with pytest.raises(MethodFailed, match=r"an integer from 0 to 2\^63 - 1 is needed"):
         guarded(wrong).bytes_stored(DENIM)
     with pytest.raises(MethodFailed, match=r"^theirs: prepare: RuntimeError: no table of two lines$"):
         guarded(wrong).prepare(DENIM)
@@ -113,7 +114,10 @@ def test_code_that_is_not_the_planned_one_is_refused_and_failures_cross_processe
     path = tmp_path / "theirs.py"
     path.write_text("raise RuntimeError('this must not run')")
     options = OPTIONS.model_copy(update={"source": f"{path}:Theirs"})
-    with pytest.raises(WorkFailed, match=r"SHA-256 is .* on this machine, and 000000000000… was planned"):
+    with pytest.raises(MethodFailed, match=r"SHA-256 is .* on this machine, and 000000000000… was planned"):
+        load_added(options)
+    path.unlink()
+    with pytest.raises(MethodFailed, match=r"^theirs: .*there is no file"):
         load_added(options)
 
 
@@ -125,6 +129,7 @@ def test_code_that_is_not_the_planned_one_is_refused_and_failures_cross_processe
         ("float('nan')", "theirs: it returned nan; a finite number is needed"),
         ("None", "theirs: it returned None; a finite number is needed"),
         ("True", "theirs: it returned True; a finite number is needed"),
+        ("10**5000", "theirs: the metric: OverflowError: int too large to convert to float"),
         ("1 / 0", "theirs: the metric: ZeroDivisionError: division by zero (metrics.py, line 2)"),
     ],
 )
