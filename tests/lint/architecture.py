@@ -23,7 +23,7 @@ LIBRARIES = {
     "pipeline.compiled": ["numba"],
     "pipeline.shards": ["pyarrow"],
     "pipeline.storage": ["upath", "fsspec", "s3fs"],
-    "pipeline.scenes": ["mitsuba", "drjit"],
+    "pipeline.scenes": ["mitsuba", "drjit", "trimesh"],
     "pipeline.mitsuba": ["mitsuba", "drjit"],
     "pipeline.models": ["torch", "onnx", "onnxruntime", "safetensors"],
     "pipeline.training": ["torch", "safetensors"],
