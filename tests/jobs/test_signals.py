@@ -21,7 +21,12 @@ def test_a_signal_in_a_library_that_hides_it_is_a_stop(number, code, capsys):
             problem = ValueError("Error building validator")
         raise problem
 
-    assert run_to_exit(verb, ["run"], Path("out")) == code and capsys.readouterr().err.startswith("stopped")
+    # A shell starts what runs in the background with Ctrl-C ignored, and so it stays.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert run_to_exit(verb, ["run"], Path("out")) == code and capsys.readouterr().err.startswith("stopped")
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.external  # processes with clusters of dask
