@@ -19,7 +19,7 @@ MODELS: Final[dict[str, int]] = {
     "curved": 2,
     "point_sampled": 5,
     "prefiltered": 2,
-    "selvage": 7,
+    "selvage": 8,
     "soft_nodes": 7,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""

@@ -22,7 +22,7 @@ import cyclopts
 import numpy as np
 
 from jobs.recipe.load import load_recipe
-from pipeline.models.selvage.cloth_numbers import FLOOR, GREY, NODE_LEVELS, cloth_numbers, colours, probes
+from pipeline.models.selvage.cloth_numbers import FLOOR, GREY, NODE_LEVELS, colours, numbers_of, probed, probes
 from pipeline.models.selvage.errors import CASES, CURVED, OF_CLOTH, terms_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -44,7 +44,7 @@ def samples(fabric: Fabric, case: int, rows: int, seed: int) -> tuple[np.ndarray
     squares = np.minimum(((answers - true[:, None]) / (true + FLOOR)[:, None]) ** 2, LARGEST)
     variance = (np.linalg.norm(truth.standard_error * GREY, axis=1) / (true + FLOOR)) ** 2
     terms = terms_of(queries).astype(np.float64)
-    of_cloth = [number * terms[:, OF_CLOTH] for number in cloth_numbers(fabric, behind)[1:]]
+    of_cloth = [number * terms[:, OF_CLOTH] for number in numbers_of(probed(fabric, behind)[1])[1:]]
     seen = truth.mean.any(axis=1) & (answers > 0.0).any(axis=1)
     return np.concatenate([terms, *of_cloth], axis=1)[seen], squares[seen], variance[seen]
 

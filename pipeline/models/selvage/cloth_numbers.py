@@ -30,15 +30,16 @@ NUMBERS: Final = 5
 
 _PAIRS: Final = ((0, 3), (1, 3), (2, 3), (3, 4))  # of answers
 _ROWS: Final = 2048  # single queries decide fewer numbers of more of them
-_EVERY: Final = 4  # of them is answered by the fallback, which takes longest
+_EVERY: Final = 2  # of them is answered by the fallback, which takes longest
 _SEED: Final = 0xC107
 _LEAST, _MOST = 1e-3, 1.0  # differences
 _MIDDLE = 4.0  # minus the logarithm of a usual difference
 
 
-def cloth_numbers(fabric: Fabric, behind: bool) -> Float64:
-    """Return the numbers of a cloth for light from one side, (NUMBERS,)."""
-    return numbers_of(colours(fabric, probes(fabric, behind, False), _EVERY))
+def probed(fabric: Fabric, behind: bool) -> tuple[Queries, Float64]:
+    """Return queries of flat cloth with light from one side, and their `colours`; most without the fallback's."""
+    queries = probes(fabric, behind, False)
+    return queries, colours(fabric, queries, _EVERY)
 
 
 def probes(

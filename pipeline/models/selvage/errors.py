@@ -4,11 +4,14 @@ The mean squared error of a level of soft nodes, or of the fallback, is the expo
 the query: size and length of its footprint, inclinations of viewer and light, bend of the cloth. Its coefficients are
 linear in numbers y of the cloth, so that a cloth turns the table C into coefficients of its own, once:
 
-    log E[e^2] = sum_t x_t(query) sum_z C_tz y_z(cloth)
+    log E[e^2] = sum_t x_t(query) sum_z C_tz y_z(cloth) + log f(cloth, range of sizes)
 
 An error e is that of a grey cloth's colour, relative to the true colour plus a floor. The numbers of a cloth say how
 far its answers differ from one another, on some queries of flat cloth: logarithms of root mean squares, for each side
-of the light. No truth is needed for them. tests/fits/fit_selvage_errors.py makes the table from random cloths.
+of the light. The factors f of a level are the mean squares of its differences from the fallback over what the
+polynomial expects there, in each range of sizes: where a level takes up another way, errors have a step, which is no
+polynomial and differs from cloth to cloth. No truth is needed for either. tests/fits/fit_selvage_errors.py makes the
+table from random cloths.
 
 Of curved cloth the fallback has larger errors than the finest nodes, and is never taken.
 """
@@ -25,7 +28,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import kernel
-from pipeline.models.selvage.cloth_numbers import NUMBERS, cloth_numbers
+from pipeline.models.selvage.cloth_numbers import FLOOR, NUMBERS, numbers_of, probed
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -39,6 +42,9 @@ OF_CLOTH: Final = (0, 1, 4)
 TERMS: Final = 15
 """Terms of the polynomial."""
 
+SIZES: Final = np.log(np.array([0.1, 0.3, 1.0, 3.0], np.float32))
+"""Limits of the ranges of sizes with factors of their own: logarithms of yarn spacings."""
+
 CASES: Final = 4
 """Cases, each with coefficients of its own: light in front, behind; curved cloth with light in front, behind."""
 
@@ -48,6 +54,7 @@ CURVED: Final = 2
 _LEAST_COSINE = np.float32(0.03)  # lower directions are as this one
 _SMALLEST, _LARGEST = np.float32(math.log(0.03)), np.float32(math.log(16.0))  # sizes beyond are as these
 _BENDS = np.float32(30.0)  # of flat cloth on: curvature well above which errors are of another kind
+_PRIOR = 16  # rows of each range that the polynomial counts for
 _NEVER = 50.0  # logarithm of an error that no wish allows
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
@@ -80,9 +87,11 @@ def _write_logarithms(queries: Queries, cases: Index, coefficients: Float32, ter
     """Write the logarithms of the mean squared errors of N queries, (N, answers)."""
     for n in range(len(result)):
         write_terms(queries, n, terms)
-        own = coefficients[cases[n]]
+        own, place = coefficients[cases[n]], TERMS
+        for end in SIZES:
+            place += int(terms[1] > end)
         for answer in range(len(own)):
-            total = _0
+            total = own[answer, place]
             for t in range(TERMS):
                 total += own[answer, t] * terms[t]
             result[n, answer] = total
@@ -115,7 +124,10 @@ def _write_all_terms(queries: Queries, result: Float32) -> None:
 
 
 def coefficients_of(fabric: Fabric, behind: bool) -> Float32:
-    """Return the coefficients of a cloth, (cases, answers, TERMS); those of light from behind are 0 unless wanted."""
+    """Return the coefficients of a cloth, (cases, answers, TERMS and ranges of sizes).
+
+    Those of light from behind are 0 unless wanted.
+    """
     return (_BOTH if behind else _FRONT).of(fabric)
 
 
@@ -134,12 +146,30 @@ def _table() -> list[list[Float64]]:
 
 def _side(fabric: Fabric, behind: bool) -> Float32:
     """Return coefficients with those of one side of the light, the others 0."""
-    numbers, rows = cloth_numbers(fabric, behind), _table()
-    result = np.zeros((CASES, len(rows[0]), TERMS), np.float32)
+    (queries, colours), rows = probed(fabric, behind), _table()
+    numbers = numbers_of(colours)
+    result = np.zeros((CASES, len(rows[0]), TERMS + len(SIZES) + 1), np.float32)
     for case in range(int(behind), CASES, 2):
         result[case, :, 0] = _NEVER
         for answer, row in enumerate(rows[case]):
-            result[case, answer] = expand(row, numbers)
+            result[case, answer, :TERMS] = expand(row, numbers)
+    known = ~np.isnan(colours[:, -1])
+    factors = size_factors(queries.take(known), colours[known], result)
+    result[int(behind) :: 2, :-1, TERMS:] = np.log(factors)
+    return result
+
+
+def size_factors(queries: Queries, colours: Float64, coefficients: Float32) -> Float64:
+    """Return the factors of each level and range of sizes, from the colours of all answers to N queries."""
+    best = colours[:, -1:]
+    squares = ((colours[:, :-1] - best) / (best + FLOOR)) ** 2
+    expected = squared_errors(queries, coefficients)[:, :-1]
+    places = np.searchsorted(SIZES, terms_of(queries)[:, 1])
+    result = np.ones((squares.shape[1], len(SIZES) + 1))
+    for place in np.unique(places):
+        rows = places == place
+        prior = _PRIOR * expected[rows].mean(axis=0)
+        result[:, place] = (squares[rows].sum(axis=0) + prior) / (expected[rows].sum(axis=0) + prior)
     return result
 
 

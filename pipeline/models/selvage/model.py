@@ -134,7 +134,7 @@ class Selvage:
         return sum(node.bytes_stored(fabric) for node in self._nodes) + coefficients_of(fabric, False).nbytes
 
     def _coefficients(self, fabric: Fabric, queries: Queries) -> Float32:
-        """Return the coefficients of the answers at hand, (cases, answers, TERMS)."""
+        """Return the coefficients of the answers at hand, as `coefficients_of`."""
         return coefficients_of(fabric, _behind(queries))[:, : len(self._answers)]
 
     def _prices(self, fabric: Fabric, queries: Queries, error: float) -> Float64:

@@ -9,9 +9,11 @@ from pipeline.models.selvage.errors import (
     CASES,
     ERROR_TABLE,
     OF_CLOTH,
+    SIZES,
     TERMS,
     cases_of,
     coefficients_of,
+    size_factors,
     squared_errors,
 )
 from pipeline.models.selvage.model import Selvage
@@ -39,6 +41,24 @@ def test_numbers_of_a_cloth_are_differences_of_its_answers():
     other[:, 0] += 0.01 * np.e
     assert numbers_of(other)[1] - numbers_of(one)[1] == pytest.approx(1.0)
     np.testing.assert_array_equal(numbers_of(one)[2:], numbers[2:])
+
+
+def test_factors_find_where_a_level_errs_more_than_expected():
+    """Ten times as much as 1 % in one range of sizes; chi-square intervals of 4 deviations."""
+    queries, random = probes(DENIM, False, False, 4000), np.random.default_rng(3)
+    coefficients = np.zeros((CASES, 5, TERMS + len(SIZES) + 1), np.float32)
+    coefficients[..., 0] = np.log(1e-4)
+    places = np.searchsorted(SIZES, np.log(np.sqrt(queries.sigma * queries.sigma_minor)))
+    differences = 0.01 * (0.2 + FLOOR) * random.normal(size=(len(places), 4))
+    differences[places == 1, 0] *= 10.0
+    found = size_factors(queries, np.column_stack([0.2 + differences, np.full(len(places), 0.2)]), coefficients)
+    rows = np.bincount(places)
+    wanted = np.ones((4, len(rows)))
+    wanted[0, 1] = (100.0 * rows[1] + 16) / (rows[1] + 16)
+    assert (np.abs(found / wanted - 1.0) < 4.0 * np.sqrt(2.0 / rows)).all()
+    coefficients[..., TERMS:] = np.log(np.vstack([found, np.ones(len(rows))]))
+    expected = squared_errors(queries, coefficients)[:, :4]
+    assert expected[places == 1, 0].min() > 50.0 * expected[places == 1, 1].max()
 
 
 def test_a_query_errs_alike_alone_and_among_others():
