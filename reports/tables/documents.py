@@ -43,7 +43,6 @@ README_METHODS: Final[Mapping[tuple[str, str], str]] = {
     ("woven", ""): "`woven`: one network for all fabrics",
     ("woven", BOUNDED): "`woven` under the energy bound",
     ("soft_nodes", "k = 2"): "`soft_nodes`: a sum over few nodes, nothing is trained",
-    ("selvage", "error 2 %"): "`selvage:.02`: soft nodes of the level that 2 % needs, query by query",
 }
 """Methods and settings that README.md shows, each in words."""
 
