@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
-from pipeline.models.selvage.errors import CASES, cases_of
+from pipeline.models.selvage.errors import CASES, SIZE_LIMITS, cases_of
 from pipeline.per_fabric import PerFabric
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
@@ -24,7 +24,7 @@ from weaves.fabric import Fabric
 Answer = Callable[[Fabric, Queries, int], object]
 """Answers queries about a fabric, with a seed."""
 
-_ENDS: Final = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # of standard deviations, in yarn spacings
+_ENDS: Final = (0.03, *SIZE_LIMITS, 10.0)  # of standard deviations, in yarn spacings
 _SIZES: Final = len(_ENDS) - 1
 USUAL_SECONDS: Final = 1e-6 * np.array(
     [

@@ -42,8 +42,9 @@ OF_CLOTH: Final = (0, 1, 4)
 TERMS: Final = 15
 """Terms of the polynomial."""
 
-SIZES: Final = np.log(np.array([0.1, 0.3, 1.0, 3.0], np.float32))
-"""Limits of the ranges of sizes with factors of their own: logarithms of yarn spacings."""
+SIZE_LIMITS: Final = (0.1, 0.3, 1.0, 3.0)
+"""Limits of the ranges of sizes with factors of their own, in yarn spacings."""
+SIZES: Final = np.log(np.array(SIZE_LIMITS, np.float32))
 
 CASES: Final = 4
 """Cases, each with coefficients of its own: light in front, behind; curved cloth with light in front, behind."""
@@ -101,11 +102,11 @@ def squared_errors(queries: Queries, coefficients: Float32) -> Float32:
     """Return the expected squared errors of all answers to N queries, (N, answers), by `coefficients_of` a cloth."""
     result = np.empty((len(queries.u), coefficients.shape[1]), np.float32)
     terms = np.empty(TERMS, np.float32)
-    _write_logarithms(contiguous(queries), cases_of(queries), np.ascontiguousarray(coefficients), terms, result)
+    _write_logarithms(_contiguous(queries), cases_of(queries), np.ascontiguousarray(coefficients), terms, result)
     return np.exp(result, out=result)
 
 
-def contiguous(queries: Queries) -> Queries:
+def _contiguous(queries: Queries) -> Queries:
     """Return queries whose columns kernels read, float32 and contiguous."""
     return Queries(*(np.ascontiguousarray(column, np.float32) for column in queries))
 
@@ -113,7 +114,7 @@ def contiguous(queries: Queries) -> Queries:
 def terms_of(queries: Queries) -> Float32:
     """Return the terms of N queries, (N, TERMS)."""
     result = np.empty((len(queries.u), TERMS), np.float32)
-    _write_all_terms(contiguous(queries), result)
+    _write_all_terms(_contiguous(queries), result)
     return result
 
 
