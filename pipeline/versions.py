@@ -19,8 +19,8 @@ MODELS: Final[dict[str, int]] = {
     "curved": 2,
     "point_sampled": 5,
     "prefiltered": 2,
-    "selvage": 8,
-    "soft_nodes": 7,
+    "selvage": 9,
+    "soft_nodes": 8,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 

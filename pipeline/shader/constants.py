@@ -118,7 +118,7 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
         },
     },
     visibility: {"NARROWINGS": "_NARROWINGS", "STRIP_POINTS": "_STRIP_POINTS"},
-    line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING"},
+    line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING", "NEAR_END": "_NEAR_END"},
     mixture: {"LITTLE": "_LITTLE", "WIDEST": "_WIDEST"},
 }  # fmt: skip
 

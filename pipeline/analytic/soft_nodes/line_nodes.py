@@ -45,6 +45,7 @@ Falls = npt.NDArray[np.uint8] | None
 _0, _1, _2, _HALF = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(0.5)
 _RIGHT = np.float32(1.7)  # more than any angle across
 _VERTICAL = np.float32(0.99999)
+_NEAR_END = np.float32(0.02)  # cells of a grid
 _GRAZING = np.float32(1e-3)  # least cosine, over that from above, by which areas are divided
 _FAR, _LEVELS, _GAUSS = np.float32(1e9), np.float32(LEVELS), np.float32(1.0 / math.sqrt(3.0))
 _INVERSE_PI = np.float32(1.0 / math.pi)
@@ -202,17 +203,24 @@ def shade_lines_behind(
     yarn: Float32,
     family: int,
     thickness: np.float32,
+    hidden_ends: bool,
 ) -> Five:
-    """Return the same with the light behind, whose horizons are those of the back."""
+    """Return the same with the light behind, whose horizons are those of the back.
+
+    With `hidden_ends` rims where floats end are dark: there the back shows the edge of a crossing yarn, which lies
+    lower than the yarn beside it.
+    """
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
     layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
     step_a, step_b = (1, size) if family == WARP else (size, 1)
     level, sharp = -d.iz * _LEVELS, sharpness / _LEVELS
+    near_end = _NEAR_END if hidden_ends else -_1
     a, c, s, a0, through = _0, _0, _0, _0, _0
     for k in range(len(firsts)):
         at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
         cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
-        lit = _lit(light, falls, fall, cell, level, sharp)
+        hidden = draft[LENGTH, k] == _0 and (at.row < near_end or at.row > np.float32(size) - near_end)
+        lit = _0 if hidden else _lit(light, falls, fall, cell, level, sharp)
         of_node = node_behind(d, at.frame, at.along, at.across, _1, lit, at.weight, layer)
         a += of_node[0]
         c += of_node[1]

@@ -437,7 +437,10 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
         draft, firsts, yarn, own = scratch.drafts[kind], scratch.firsts[kind, :count], table.yarn[family], result[kind]
         if back:
-            sums = shade_lines_behind(draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness)
+            hidden_ends = table.heights[1 - family, RADIUS] >= 0.5  # no gap beside the crossing yarn
+            sums = shade_lines_behind(
+                draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness, hidden_ends
+            )
             write_sums(sums, own)
         elif look.bend_i > _0:
             write_sums(
