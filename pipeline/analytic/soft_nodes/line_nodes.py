@@ -207,8 +207,8 @@ def shade_lines_behind(
 ) -> Five:
     """Return the same with the light behind, whose horizons are those of the back.
 
-    With `hidden_ends` rims where floats end are dark: there the back shows the edge of a crossing yarn, which lies
-    lower than the yarn beside it.
+    With `hidden_ends` the back shows, at the rim where a float ends, the upright edge of a crossing yarn: light from
+    the float's side does not reach it.
     """
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
     layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
@@ -219,7 +219,9 @@ def shade_lines_behind(
     for k in range(len(firsts)):
         at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
         cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
-        hidden = draft[LENGTH, k] == _0 and (at.row < near_end or at.row > np.float32(size) - near_end)
+        inwards = d.iy * draft[ROWS_PER, k]
+        inwards = -inwards if at.row > np.float32(size) - near_end else (inwards if at.row < near_end else -_1)
+        hidden = draft[LENGTH, k] == _0 and inwards > _0
         lit = _0 if hidden else _lit(light, falls, fall, cell, level, sharp)
         of_node = node_behind(d, at.frame, at.along, at.across, _1, lit, at.weight, layer)
         a += of_node[0]
