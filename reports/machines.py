@@ -47,10 +47,7 @@ def names_of(machines: Sequence[Machine]) -> list[str]:
 def join(parts: Mapping[str, Sequence[Record]]) -> Joined:
     """Join the Records of machines, given by the names of the machines.
 
-    Raises
-    ------
-    BadInput
-        If Records of one machine hold several machines already.
+    BadInput if Records of one machine hold several machines already.
     """
     records: list[Record] = []
     known: dict[tuple[object, ...], Record] = {}

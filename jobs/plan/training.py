@@ -117,10 +117,7 @@ class Training(Task):
     def run(self, out: Path, progress: Progress) -> None:
         """Train; a network from outside in a process that can be ended.
 
-        Raises
-        ------
-        MethodFailed
-            If the code of a network from outside fails.
+        MethodFailed if the code of a network from outside fails.
         """
         if isinstance(self.options, AddedMethod):
             from pipeline.models.added.apart import run_apart

@@ -26,15 +26,12 @@ _BESIDE: Final = ("model", "name", "version", "limit", "training", "seeds", "run
 class Added:
     """The methods from outside that a recipe may name.
 
+    BadInput if one cannot be used, is given twice, or has the name of a method of the package.
+
     Parameters
     ----------
     given : sequence of str
         Values of `--add`: ``module:name``, ``file.py:name``, or the name of an installed method.
-
-    Raises
-    ------
-    BadInput
-        If one cannot be used, is given twice, or has the name of a method of the package.
     """
 
     def __init__(self, given: Sequence[str] = ()) -> None:
@@ -62,6 +59,9 @@ class Added:
     def entered(self, content: Mapping[str, Any], where: str, all_given: bool) -> dict[str, Any]:
         """Return a recipe's file in which entries of methods from outside have all that the code says of them.
 
+        BadInput if an entry names a method that is neither of the package, nor given, nor installed, or that cannot be
+        used.
+
         Parameters
         ----------
         content : mapping
@@ -70,11 +70,6 @@ class Added:
             Its path, for error messages.
         all_given : bool
             Enter the methods of `--add` that it does not name.
-
-        Raises
-        ------
-        BadInput
-            If an entry names a method that is neither of the package, nor given, nor installed, or that cannot be used.
         """
         entries = content.get("models", [])
         if not isinstance(entries, list):

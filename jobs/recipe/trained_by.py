@@ -28,6 +28,8 @@ def with_trained_by(
 ) -> tuple[dict[str, Any], dict[str, Recipe]]:
     """Replace entries of models that another recipe trains by their entries there.
 
+    BadInput if there is no such recipe or no such model in it, nothing to train, or another key than `_KEYS`.
+
     Parameters
     ----------
     content : mapping
@@ -43,11 +45,6 @@ def with_trained_by(
         The file with those entries written out.
     dict
         From the name of each such model to the recipe that trains it.
-
-    Raises
-    ------
-    BadInput
-        If there is no such recipe or no such model in it, nothing to train, or another key than `_KEYS`.
     """
     entries = content.get("models")
     if not isinstance(entries, list):
@@ -66,10 +63,7 @@ def with_trained_by(
 def check_trained_by(recipe: Recipe, where: str) -> None:
     """Check that models which another recipe trains can be measured beside this one's.
 
-    Raises
-    ------
-    BadInput
-        If the physics or a fabric of the same name differs, or a general model's fabrics do not fit.
+    BadInput if the physics or a fabric of the same name differs, or a general model's fabrics do not fit.
     """
     named = {fabric.name: fabric for fabric in (*recipe.seen, *recipe.unseen)}
     for index, model in enumerate(recipe.models):

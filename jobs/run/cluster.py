@@ -54,14 +54,8 @@ HERE: Final = Scheduler()
 def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) -> Iterator[Any]:
     """Connect to a scheduler, or start a cluster of so many workers that ends with this process.
 
-    `say` receives a sentence when a scheduler has no worker yet.
-
-    Raises
-    ------
-    BadInput
-        If no scheduler answers, or it has no worker.
-    WorkFailed
-        If the processes of the cluster on this machine cannot start, or the scheduler is lost within the block.
+    `say` receives a sentence when a scheduler has no worker yet. BadInput if no scheduler answers, or it has no worker;
+    WorkFailed if the processes of the cluster on this machine cannot start, or the scheduler is lost within the block.
     """
     # Before dask is imported, and inherited by workers: it reports every shutdown as a warning.
     os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "critical")

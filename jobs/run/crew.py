@@ -72,10 +72,7 @@ class Crew:
     def look(self, now: bool = False) -> None:
         """Ask the scheduler for its workers, once a second at most or `now`, and check those that are new.
 
-        Raises
-        ------
-        WorkFailed
-            If every worker is refused.
+        WorkFailed if every worker is refused.
         """
         if not now and time.monotonic() - self._looked < _SECONDS_BETWEEN_LOOKS:
             return

@@ -63,6 +63,9 @@ def execute(
 ) -> RunSummary:
     """Run the unfinished tasks of some stages.
 
+    BadInput if the number of workers or the scheduler cannot be used; WorkFailed if a needed task of another stage is
+    not done, the workers cannot start or have other software, or the scheduler is lost.
+
     Parameters
     ----------
     tasks : sequence of Task
@@ -82,14 +85,6 @@ def execute(
         Terminal that shows progress.
     progress : str
         How it is shown.
-
-    Raises
-    ------
-    BadInput
-        If the number of workers or the scheduler cannot be used.
-    WorkFailed
-        If a needed task of another stage is not done, the workers cannot start or have other software, or the
-        scheduler is lost.
     """
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput("--workers", "", workers, f"must be from 0 (one a core) to {MOST_WORKERS}")

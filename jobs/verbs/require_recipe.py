@@ -55,6 +55,8 @@ def write_recipe(
 ) -> None:
     """Write the recipe of one method in the scene's domain, and load it to check it.
 
+    BadInput if the model has no such options, or the recipe cannot be used.
+
     Parameters
     ----------
     path : Path
@@ -75,11 +77,6 @@ def write_recipe(
         Options of the model that are other than in the general recipe, such as a smaller width.
     add : sequence of str
         Methods from outside the package that the general recipe was loaded with.
-
-    Raises
-    ------
-    BadInput
-        If the model has no such options, or the recipe cannot be used.
     """
     model = next(model for model in general.models if model.options.name == method)
     named = Added(add).model_of(model.options) if isinstance(model.options, AddedMethod) else model.options.model

@@ -88,10 +88,7 @@ def measure_errors(method: Method, rows: HeldOutFabric, seed: int) -> list[Recor
 def measure_added(method: Method, metric: AddedMetric, rows: HeldOutFabric, seed: int) -> Record:
     """Measure a metric from outside; arguments as for `measure_errors`.
 
-    Raises
-    ------
-    MethodFailed
-        If the metric's code fails, or returns no finite number.
+    MethodFailed if the metric's code fails, or returns no finite number.
     """
     enter(metric.row)
     measured = load_function(metric)

@@ -32,6 +32,8 @@ from reports.tables.page_tables import page_frames, ranged_frames
 def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] = lambda fraction: None) -> Path:
     """Write a page into `folder` and return the path of ``index.html``.
 
+    BadInput if a picture is missing, or the folder cannot be written.
+
     Parameters
     ----------
     folder : Path
@@ -40,11 +42,6 @@ def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] 
         Its content.
     progress : callable
         Called with the share that is done.
-
-    Raises
-    ------
-    BadInput
-        If a picture is missing, or the folder cannot be written.
     """
     frames = page_frames(page.records)
     written = [OF_A_PAGE, machine_path(Path(OF_A_PAGE)).name]

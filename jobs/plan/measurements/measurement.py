@@ -18,7 +18,7 @@ from reports.page.content import PictureFile
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
-    from reports.record import Provenance, Record
+    from reports.record import Record
 
 _SUBJECTS: Final = ("study", "metric", "model", "fabric", "scene")
 """Fields that say what is measured, in the order of a title."""
@@ -30,8 +30,6 @@ class Measurement(Task):
     stage: ClassVar[Stage] = "bench"
     code: ClassVar[tuple[str, ...]] = ("bench",)
     """Its code among `pipeline.versions` and ``bench``, beside that of its models and of their ways to run."""
-    seconds: ClassVar[float] = 1.0
-    """Estimated seconds on one core."""
     endings: ClassVar[tuple[str, ...]] = ()
     """Of the files of a kind that makes files for others, not Records: pictures of the truth, for example."""
 
@@ -91,11 +89,6 @@ class Measurement(Task):
         return Made(task=self.id, path=self.products[0])
 
     @property
-    def cost(self) -> float:
-        """Estimated seconds on one core."""
-        return self.seconds
-
-    @property
     def threads(self) -> int:
         """Most threads that a method may use while it is measured."""
         return 1
@@ -103,15 +96,6 @@ class Measurement(Task):
     def picture(self, setting: str, view: str = "") -> Path:
         """Return the path of the picture of a setting."""
         return Path("-".join(filter(None, (self.stem, setting.replace(" = ", ""), view))) + ".exr")
-
-    @property
-    def provenance(self) -> Provenance:
-        """Data set and training that its numbers come from, where there is one."""
-        from reports.record import Provenance
-
-        dataset, model = getattr(self, "dataset", None), getattr(self, "model", None)
-        trained = {"model": " ".join(model.needs), "seed": model.seed} if model else {}
-        return Provenance(dataset=dataset.fingerprint if dataset else "", **trained)
 
     def versions(self) -> dict[str, int]:
         """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
@@ -132,12 +116,8 @@ class Measurement(Task):
     def run(self, out: Path, progress: Progress) -> None:
         """Measure, and write the Records; with code from outside, in a process that can be ended.
 
-        A method that fails ends a measurement of it alone. One of several methods starts again without it.
-
-        Raises
-        ------
-        MethodFailed
-            If the only method fails.
+        A method that fails ends a measurement of it alone. One of several methods starts again without it. MethodFailed
+        if the only method fails.
         """
         added = [one for one in held(self, Trained) if isinstance(one.options, AddedMethod)]
         if not added and not list(held(self, AddedMetric)):
@@ -186,10 +166,12 @@ class Measurement(Task):
         raise NotImplementedError
 
     def _stamped(self, record: Record) -> Record:
-        """Return a Record with the provenance, and the role of the fabric where all have the same."""
-        about = self.provenance.model_copy(update={"origin": record.provenance.origin})
-        role = getattr(self, "role", record.role)
-        return record.model_copy(update={"provenance": about, "role": role})
+        """Return a Record with its data set and training, and the fabric's role where all have the same."""
+        dataset, model = getattr(self, "dataset", None), getattr(self, "model", None)
+        about: dict[str, object] = {"dataset": dataset.fingerprint} if dataset else {}
+        about |= {"model": " ".join(model.needs), "seed": model.seed} if model else {}
+        provenance = record.provenance.model_copy(update=about)
+        return record.model_copy(update={"provenance": provenance, "role": getattr(self, "role", record.role)})
 
 
 def _label(subject: object) -> str:

@@ -114,12 +114,8 @@ def image_errors(
     """Measure a picture against the truth's, linear RGB (H, W, 3), with the latter's standard error.
 
     The mask (H, W) is True where there is lit cloth; what other pixels hold does not matter. `floor` is the result of
-    `noise_floor` for this truth; it takes half of the time if it is not given.
-
-    Raises
-    ------
-    BadInput
-        If a value that counts is not finite, the truth is dark, or fewer than two blocks of pixels count.
+    `noise_floor` for this truth; it takes half of the time if it is not given. BadInput if a value that counts is not
+    finite, the truth is dark, or fewer than two blocks of pixels count.
     """
     m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
     mse, relative = _light_errors(m[lit], t[lit], s[lit], lit, options)

@@ -164,10 +164,7 @@ class Shot:
 def shoot(name: str, options: ShotOptions, path: Path, progress: Callable[[float], None] = lambda share: None) -> None:
     """Work out a scene's frames with the truth's answers and write them to `path`; `progress` receives their share.
 
-    Raises
-    ------
-    BadInput
-        If the scene cannot be used (`pipeline.scenes`), or shows no cloth.
+    BadInput if the scene cannot be used (`pipeline.scenes`), or shows no cloth.
     """
     loaded = load(load_scene(name), options.options)
     bases: list[npt.NDArray[np.floating]] = []
