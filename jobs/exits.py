@@ -34,14 +34,8 @@ _CONTINUES: Final = "finished work is kept, and the same command continues"
 def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) -> int:
     """Call a verb and return its exit code, after printing the sentence of an error.
 
-    Parameters
-    ----------
-    verb : callable
-        The verb with its arguments; an integer that it returns is the exit code.
-    tokens : sequence of str
-        Its command line, for the report of a crash.
-    out : Path
-        Folder of products if the command line names none.
+    An integer that the verb returns is the exit code. The report of a crash has its command line, and lies in the
+    folder `out` if that names none.
     """
     if sys.stdout is None:  # it was closed before the start
         return _end("stdout is closed; send it to a file or to /dev/null", 2)

@@ -30,38 +30,19 @@ _SECONDS_BETWEEN: Final = 1.0  # two estimates
 
 
 class Schedule(NamedTuple):
-    """A simulated run.
-
-    Attributes
-    ----------
-    workers : int
-        Number of workers.
-    makespan : float
-        Seconds from the first start to the last end.
-    work : float
-        Seconds of all tasks.
-    tail : float
-        Seconds at the end in which not all workers are busy: the straggler tail.
-    """
+    """A simulated run."""
 
     workers: int
     makespan: float
+    """Seconds from the first start to the last end."""
     work: float
+    """Seconds of all tasks."""
     tail: float
+    """Seconds at the end in which not all workers are busy: the straggler tail."""
 
     @classmethod
     def of(cls, tasks: Sequence[Task], seconds: Mapping[str, float], workers: int) -> Schedule:
-        """Simulate a run.
-
-        Parameters
-        ----------
-        tasks : sequence of Task
-            The tasks to do; needs outside them count as done.
-        seconds : mapping
-            Duration of each task, by its id.
-        workers : int
-            Number of workers, each with one task at a time.
-        """
+        """Simulate a run on workers with one task at a time each; needs outside the tasks count as done."""
         own = {task.id for task in tasks}
         ready = Ready(tasks, {need for task in tasks for need in task.needs if need not in own})
         running: list[tuple[float, int, Task]] = []  # with the time of its end
@@ -125,14 +106,8 @@ class Estimate:
     def seconds_left(self, tasks: Sequence[Task], under_way: Mapping[str, tuple[float, float]], workers: int) -> float:
         """Return how long a run goes on, by a simulation of its schedule, which is renewed now and then.
 
-        Parameters
-        ----------
-        tasks : sequence of Task
-            The tasks that have not ended, each after those it needs.
-        under_way : mapping
-            Of those that have begun the time of the beginning, by `time.monotonic`, and the finished share; by id.
-        workers : int
-            Number of workers.
+        The tasks have not ended, each after those it needs. Of those `under_way`, by their ids, the time of the
+        beginning (by `time.monotonic`) and the finished share are known.
         """
         now = time.monotonic()
         if not tasks:

@@ -24,14 +24,10 @@ _BESIDE: Final = ("model", "name", "version", "limit", "training", "seeds", "run
 
 
 class Added:
-    """The methods from outside that a recipe may name.
+    """The methods from outside that a recipe may name, by the values of `--add`.
 
-    BadInput if one cannot be used, is given twice, or has the name of a method of the package.
-
-    Parameters
-    ----------
-    given : sequence of str
-        Values of `--add`: ``module:name``, ``file.py:name``, or the name of an installed method.
+    A value is ``module:name``, ``file.py:name``, or the name of an installed method. BadInput if one cannot be used, is
+    given twice, or has the name of a method of the package.
     """
 
     def __init__(self, given: Sequence[str] = ()) -> None:
@@ -59,17 +55,8 @@ class Added:
     def entered(self, content: Mapping[str, Any], where: str, all_given: bool) -> dict[str, Any]:
         """Return a recipe's file in which entries of methods from outside have all that the code says of them.
 
-        BadInput if an entry names a method that is neither of the package, nor given, nor installed, or that cannot be
-        used.
-
-        Parameters
-        ----------
-        content : mapping
-            The file.
-        where : str
-            Its path, for error messages.
-        all_given : bool
-            Enter the methods of `--add` that it does not name.
+        With `all_given` the methods of `--add` that it does not name are entered too. BadInput if an entry names a
+        method that is neither of the package, nor given, nor installed, or that cannot be used.
         """
         entries = content.get("models", [])
         if not isinstance(entries, list):

@@ -27,16 +27,10 @@ MOST_RECIPES: Final = 32
 
 
 def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:
-    """Read a recipe.
+    """Read a recipe of the package by its name, or a TOML file by its path, which ends in ``.toml``.
 
-    BadInput if there is no such recipe, or anything in it, in its fabrics or among `add` cannot be used.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        Name of a recipe of the package, or path of a TOML file (ending in ``.toml``).
-    add : sequence of str
-        Methods and metrics from outside the package (`jobs.recipe.added`).
+    Methods and metrics from outside the package are in `add` (`jobs.recipe.added`). BadInput if there is no such
+    recipe, or anything in it, in its fabrics or among `add` cannot be used.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":

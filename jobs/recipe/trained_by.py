@@ -28,23 +28,9 @@ def with_trained_by(
 ) -> tuple[dict[str, Any], dict[str, Recipe]]:
     """Replace entries of models that another recipe trains by their entries there.
 
-    BadInput if there is no such recipe or no such model in it, nothing to train, or another key than `_KEYS`.
-
-    Parameters
-    ----------
-    content : mapping
-        A recipe's file.
-    where : str
-        Path of the recipe, for error messages.
-    load : callable
-        Returns the recipe of a name, which stands at a key of the file.
-
-    Returns
-    -------
-    dict
-        The file with those entries written out.
-    dict
-        From the name of each such model to the recipe that trains it.
+    Return the file with those entries written out, and the recipe that trains each such model, by the model's name.
+    `load` returns the recipe of a name, which stands at a key of the file. BadInput if there is no such recipe or no
+    such model in it, nothing to train, or another key than `_KEYS`.
     """
     entries = content.get("models")
     if not isinstance(entries, list):

@@ -41,15 +41,9 @@ _SECONDS_OF_SILENCE: Final = 5.0  # between two looks while kernels are compiled
 class Crew:
     """The workers that may get tasks.
 
-    Parameters
-    ----------
-    client : distributed.Client
-        Client of the scheduler.
-    external : bool
-        True for a scheduler of somebody else: its workers are checked. Those of this run have the driver's software.
-    hear : callable
-        Receives the messages of workers: a dictionary with ``task`` and ``share``, ``sentence``, or ``kernel``. Calls
-        come from a thread of dask's.
+    Those of a scheduler of somebody else (`external`) are checked; those of this run have the driver's software. `hear`
+    receives the messages of workers, a dictionary with ``task`` and ``share``, ``sentence``, or ``kernel``, from a
+    thread of dask's.
     """
 
     def __init__(self, client: Any, external: bool, hear: Callable[[Mapping[str, Any]], None]) -> None:
@@ -132,18 +126,10 @@ class Crew:
             show(len(groups), ())
 
     def start(self, task: Task, out: str, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
-        """Give a task to a worker.
+        """Give a task to a worker, not to one of `avoided` if there is a choice.
 
-        Parameters
-        ----------
-        task : Task
-            The task.
-        out : str
-            Output folder, as every worker must see it.
-        inputs : mapping
-            Hashes of the products that it needs, by path.
-        avoided : collection of str
-            Addresses of workers that do not get it if there is a choice.
+        Every worker must see the output folder as `out`; `inputs` are the hashes of the products that the task needs,
+        by path.
         """
         self._number += 1  # a second try must not get the first one's result
         key = f"{task.stage}-{task.id}-{self._topic}-{self._number}"

@@ -50,16 +50,7 @@ def faults(
 ) -> list[Fault]:
     """Return all faults of a recipe: of its tasks in the order of the plan, then of manifests, then foreign files.
 
-    Parameters
-    ----------
-    recipe : Recipe
-        The recipe.
-    tasks : sequence of Task
-        Its plan.
-    ledger : Ledger
-        Ledger of the output folder.
-    seen : callable
-        Called with the share of the tasks whose products were read.
+    `seen` is called with the share of the tasks whose products were read.
     """
     found: list[Fault] = []
     with ThreadPoolExecutor(cores()) as pool:

@@ -55,28 +55,11 @@ def write_recipe(
 ) -> None:
     """Write the recipe of one method in the scene's domain, and load it to check it.
 
-    BadInput if the model has no such options, or the recipe cannot be used.
-
-    Parameters
-    ----------
-    path : Path
-        File to write.
-    requirement : Requirement
-        Requirements of the scene.
-    general : Recipe
-        Recipe that has the method, truth and training.
-    method, setting : str
-        The method, by its name there, and its setting; empty for all of its settings.
-    scene : str
-        Name of a scene of the package, or path of one, from the current folder.
-    fabrics : mapping
-        For each fabric's name its reference, a preset or a path from the current folder, and the fabric.
-    effort : float
-        Share of the training rows a fabric and of the steps, > 0; 1: all of them.
-    options : mapping
-        Options of the model that are other than in the general recipe, such as a smaller width.
-    add : sequence of str
-        Methods from outside the package that the general recipe was loaded with.
+    `general` has the method, truth and training, and was loaded with the methods `add` from outside; `setting` is empty
+    for all settings of the method. A scene, and the reference beside each fabric by the fabric's name, is a name or a
+    path from the current folder. `effort` is the share of the training rows a fabric and of the steps, > 0; `options`
+    are those of the model that are other than in the general recipe. BadInput if the model has no such options, or the
+    recipe cannot be used.
     """
     model = next(model for model in general.models if model.options.name == method)
     named = Added(add).model_of(model.options) if isinstance(model.options, AddedMethod) else model.options.model

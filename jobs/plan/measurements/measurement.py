@@ -136,17 +136,7 @@ class Measurement(Task):
                 left_out[failure.name] = failure.reason
 
     def write(self, out: Path, left_out: Mapping[str, str], progress: Progress) -> None:
-        """Measure, and write the Records.
-
-        Parameters
-        ----------
-        out : Path
-            Output folder.
-        left_out : mapping
-            Methods from outside that failed in this measurement, each with the reason.
-        progress : callable
-            Receives the finished share.
-        """
+        """Measure, and write the Records; methods from outside that are `left_out` failed here, for reasons."""
         from reports.record import Record, this_machine, write_records
 
         measured = self.without(list(left_out)) if left_out else self
