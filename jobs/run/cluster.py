@@ -29,21 +29,16 @@ _SECONDS_FOR_A_WORKER: Final = 60  # a cluster that adapts starts one when there
 
 
 class Scheduler(NamedTuple):
-    """A running scheduler.
-
-    Attributes
-    ----------
-    address : str
-        Its address, or the path of the file that it was started with (``dask scheduler --scheduler-file``); empty: a
-        cluster on this machine.
-    ca, certificate, key : str
-        Files for TLS: certificate of the authority, and this client's own certificate and key; empty: none.
-    """
+    """A running scheduler, and files for TLS."""
 
     address: str = ""
+    """Or the path of its ``--scheduler-file``; empty: a cluster on this machine."""
     ca: str = ""
+    """Certificate of the authority; empty: none."""
     certificate: str = ""
+    """Of this client."""
     key: str = ""
+    """Of this client."""
 
 
 HERE: Final = Scheduler()

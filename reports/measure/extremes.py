@@ -94,12 +94,9 @@ def measure_extremes(
 ) -> list[Record]:
     """Measure methods, each followed by its lower precisions, at their extremes on the cloths that they cover.
 
-    Returns
-    -------
-    list of Record
-        For each method and fabric `extreme_error`, the worst over footprints with all of them as its curve, and
-        `extreme_grazing`; `extreme_rounding` for lower precisions; `extreme_far`, `extreme_large`,
-        `extreme_not_finite`, `extreme_negative`. A number is left out if no answer is finite.
+    Records of each method and fabric are `extreme_error`, the worst over footprints with all of them as its curve, and
+    `extreme_grazing`; `extreme_rounding` for lower precisions; `extreme_far`, `extreme_large`, `extreme_not_finite`,
+    `extreme_negative`. A number is left out if no answer is finite.
     """
     records = []
     for fabric, role in fabrics:

@@ -57,14 +57,9 @@ def render_frames(fabric: Fabric, options: FrameOptions, path: Path) -> None:
 
 
 def measure_aliasing(method: Method, fabric: Fabric, options: FrameOptions, frames: Path) -> list[Record]:
-    """Measure flicker and excess energy of a method on the moving plane.
+    """Measure flicker and excess energy of a method, which must cover the fabric, on the moving plane.
 
-    Parameters
-    ----------
-    method : Method
-        Must cover the fabric.
-    frames : Path
-        The truth's frames that `render_frames` wrote with the same options.
+    `frames` are the truth's, which `render_frames` wrote with the same options.
     """
     reference = _read(frames, options)
     method.prepare(fabric)

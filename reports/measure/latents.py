@@ -89,17 +89,9 @@ def measure_paths(
 ) -> list[Record]:
     """Return the errors of blending and of encoding anew along the path between two fabrics.
 
-    Parameters
-    ----------
-    method : Method
-        Must be one that `Blends`.
-    distribution : QueryOptions
-        Distribution of the `rows` queries, the same ones at every share.
-
-    Returns
-    -------
-    list of Record
-        `path_error` and, for yarns, `reencode_error`: the value is the error in the middle, the curve that at `SHARES`.
+    The method must be one that `Blends`. The `rows` queries of the distribution are the same ones at every share.
+    Records are `path_error` and, for yarns, `reencode_error`: the value is the error in the middle, the curve that at
+    `SHARES`.
     """
     queries, records = draw_queries(distribution, pair.first.weave.repeat, _SEED, 0, rows), []
     answers = _truths(pair, queries, truth)

@@ -52,18 +52,8 @@ _README_COLUMNS: Final = ("method", "MSE", "× lower", "× lower, unseen", "flic
 def readme_block(records: Sequence[Record], machine: Machine, old: str, where: str) -> str:
     """Return the block: table, headline of `woven`, and where it was measured.
 
-    BadInput if the Records hold no errors and times of two random points.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Of one page.
-    machine : Machine
-        Where its times were taken.
-    old : str
-        The block as it is now; its times are kept where they still hold.
-    where : str
-        File of the Records, for the error.
+    Records and machine are those of one page, from the file `where`. Of the `old` block the times are kept where they
+    still hold. BadInput if the Records hold no errors and times of two random points.
     """
     condensed, errors = summary_table(records), error_table(records)
     needed = {"MSE seen", "× lower, seen", "MSE unseen", "× lower, unseen", "flicker", "× time"}

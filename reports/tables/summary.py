@@ -363,19 +363,9 @@ def unranged(errors: pd.DataFrame) -> set[tuple[str, str, str]]:
 def over_fabrics(values: npt.ArrayLike) -> tuple[float, float, float]:
     """Return the geometric mean of errors or ratios, one a fabric, and its 95 % interval over fabrics.
 
-    Parameters
-    ----------
-    values : array_like (fabrics,)
-        Figures of one method.
+    The mean is NaN if there is no figure, or one is not above 0, as an error that is lost in the noise of the truth;
+    the interval of a single fabric is NaN too.
 
-    Returns
-    -------
-    mean, low, high : float
-        NaN if there is no figure, or one is not above 0, as an error that is lost in the noise of the truth. The
-        interval of a single fabric is NaN.
-
-    Notes
-    -----
     Student's t interval of the mean of the logarithms: exp(m ± t_{.975, n-1} s / sqrt(n)), with n fabrics, and mean m
     and standard deviation s of the logarithms. It holds if the fabrics are drawn at random and the logarithms are
     normal.
@@ -397,20 +387,10 @@ def over_unseen(row: Any) -> bool:
 
 
 def columns_over_fabrics(errors: pd.DataFrame, base: pd.DataFrame) -> dict[str, float]:
-    """Return the columns of a method that are means over fabrics.
+    """Return the columns of a method that are means over fabrics; `base` has the rows of 2 points, or none.
 
-    Parameters
-    ----------
-    errors : DataFrame
-        One row a fabric, with the columns `fabric` and `ERRORS`.
-    base : DataFrame
-        The same of point sampling at 2 points, or no rows.
-
-    Returns
-    -------
-    dict
-        For `ratio` (MSE of 2 points over the method's on the same fabric) and each of `ERRORS` the geometric mean
-        <name>_fabrics and the ends of its 95 % interval, <name>_fabrics_low and <name>_fabrics_high.
+    For `ratio` (MSE of 2 points over the method's on the same fabric) and each of `ERRORS` the geometric mean
+    <name>_fabrics and the ends of its 95 % interval, <name>_fabrics_low and <name>_fabrics_high.
     """
     other = base.set_index("fabric")["mse"].reindex(errors["fabric"])
     figures = {"ratio": other.to_numpy() / errors["mse"].to_numpy()}

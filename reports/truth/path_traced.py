@@ -77,14 +77,8 @@ def measure(
 ) -> Iterator[Traced]:
     """Measure every method in every scene; error and time are means over frames with different random numbers.
 
-    Parameters
-    ----------
-    size : int
-        Side of a frame in pixels.
-    samples : mapping
-        Numbers of samples a pixel, by method; the last method is `OTHER`.
-    reference : (str, int)
-        The method of the reference frames, and its samples.
+    `size` is the side of a frame in pixels. `samples` has numbers of samples a pixel by method, the last one `OTHER`;
+    `reference` is the method of the reference frames, and its samples.
     """
     for name in scenes:
         truths = [_frames(name, reference[0], size)(reference[1], 1000 + k)[0] for k in range(2)]

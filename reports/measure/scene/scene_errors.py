@@ -65,19 +65,11 @@ def write_truth(shot: Shot, path: Path) -> None:
 def measure_scene(
     methods: Sequence[Fallback], shot: Shot, options: SceneErrorOptions, pictures: Mapping[str, Path]
 ) -> list[Record]:
-    """Measure the settings of a method on a scene.
+    """Measure the settings of a method on a scene; those that do not cover every cloth are left out.
 
-    Parameters
-    ----------
-    methods : sequence of Fallback
-        One a setting; those that do not cover every cloth are left out.
-    shot : Shot
-        The scene's frames.
-    options : SceneErrorOptions
-        Options of the comparison, and the seed of random methods.
-    pictures : mapping
-        Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
-        of its differences from the truth as layers (`reports.images.exr`, `reports.measure.scene.scene_errors`).
+    The options are those of the comparison, and the seed of random methods. `pictures` says where the frames of which
+    setting are written, as an OpenEXR: the first as the picture, the others and the maps of its differences from the
+    truth as layers (`reports.images.exr`).
     """
     image, truths, noises, lit = options.image, shot.pictures(), shot.noise(), shot.lit
     floor, records = noise_floor(truths[0], noises[0], lit[0], image), []
@@ -199,11 +191,7 @@ def relative_differences(
 def fovvideovdp(subject: Record, film: Float64, truth: Float64) -> list[Record]:
     """Return the quality of a film in JOD as a Record; nothing where pyfvvdp is not installed.
 
-    Parameters
-    ----------
-    film, truth : float64 (F, H, W)
-        Linear luminance of the method's frames and of the truth's, irradiance included (as in
-        `reports.measure.pictures`).
+    Film and truth are linear luminance (F, H, W), irradiance included (as in `reports.measure.pictures`).
     """
     try:
         library: Any = import_module("pyfvvdp")
