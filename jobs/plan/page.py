@@ -27,7 +27,6 @@ class Page(Task):
     """The task that writes the page of a recipe."""
 
     stage: ClassVar[Stage] = "report"
-    seconds: ClassVar[float] = 15.0
 
     recipe: str
     """Name of the recipe."""
@@ -107,6 +106,11 @@ class Page(Task):
         from reports.page.files import read_files
 
         return (*(f"{self.folder}/{name}" for name in read_files(out / self.folder)), *reversed(self.products))
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return 15.0
 
     def versions(self) -> dict[str, int]:
         """Return the version of the benchmark."""

@@ -67,12 +67,12 @@ class Schedule(NamedTuple):
 
 def doublings(tasks: Sequence[Task], seconds: Mapping[str, float]) -> list[Schedule]:
     """Return the schedules of 1, 2, 4, … workers, up to the first number that stops scaling."""
-    found = [Schedule.of(tasks, seconds, 1)]
-    while found[-1].makespan > 0 and found[-1].workers < len(tasks):
-        found.append(Schedule.of(tasks, seconds, 2 * found[-1].workers))
-        if found[-1].makespan > (1 - LEAST_GAIN) * found[-2].makespan:
+    schedules = [Schedule.of(tasks, seconds, 1)]
+    while schedules[-1].makespan > 0 and schedules[-1].workers < len(tasks):
+        schedules.append(Schedule.of(tasks, seconds, 2 * schedules[-1].workers))
+        if schedules[-1].makespan > (1 - LEAST_GAIN) * schedules[-2].makespan:
             break
-    return found
+    return schedules
 
 
 class Estimate:

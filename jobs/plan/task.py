@@ -78,8 +78,6 @@ class Task(TaskPart):
     """True if it may run beside others in one process: it uses no random numbers and threads of a library."""
     timed: ClassVar[bool] = False
     """True if it measures time."""
-    seconds: ClassVar[float] = 1.0
-    """Estimated seconds on one core, where all tasks of a kind take as long."""
 
     @property
     def group(self) -> str:
@@ -108,7 +106,7 @@ class Task(TaskPart):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core of a desktop of 2023; a run corrects them by the tasks that have ended."""
-        return self.seconds
+        return 1.0
 
     @property
     def rows(self) -> int:

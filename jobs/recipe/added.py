@@ -42,7 +42,7 @@ class Added:
             method = describe(source, {}, {})
             if isinstance(method, AddedFunction):
                 metric = validated(AddedMetric, method.model_dump(), text)
-                if metric.name in [one.name for one in self.metrics]:
+                if metric.name in [known.name for known in self.metrics]:
                     raise BadInput(ADD, "", text, f"a metric {metric.name!r} is given twice")
                 self.metrics.append(metric)
                 continue
@@ -95,7 +95,7 @@ class Added:
 
 def _installed() -> dict[str, str]:
     """Return the methods of installed packages: their source by name."""
-    return {one.name: one.value.replace(" ", "") for one in entry_points(group=GROUP)}
+    return {entry.name: entry.value.replace(" ", "") for entry in entry_points(group=GROUP)}
 
 
 def _unknown(model: str, known: Iterator[str] | Sequence[str]) -> str:

@@ -11,12 +11,12 @@ import logging
 import multiprocessing
 import os
 import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from jobs.exits import handled
 from pipeline.own_process import ONE_THREAD, interrupts_held
 from weaves.errors import BadInput, WorkFailed
 from weaves.reading import MIB, read_json
@@ -117,17 +117,11 @@ async def _answer(address: str, security: Any) -> None:
 @contextmanager
 def _ends_deferred() -> Iterator[None]:
     """Defer SIGTERM and SIGHUP to the end of the block, in this process alone: processes that start within are free."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
     received: list[int] = []
-    numbers = signal.SIGTERM, signal.SIGHUP
-    before = {number: signal.signal(number, lambda number, frame: received.append(number)) for number in numbers}
     try:
-        yield
+        with handled(lambda number, frame: received.append(number), signal.SIGTERM, signal.SIGHUP):
+            yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         if received:
             signal.raise_signal(received[0])
 

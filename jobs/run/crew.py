@@ -75,7 +75,7 @@ class Crew:
         self._checked = {address: why for address, why in self._checked.items() if address in self._threads}
         if new := [address for address in self._threads if address not in self._checked] if self._external else []:
             self._check(new)
-        self.accepted = [one for one in self._threads if not self._external or self._checked.get(one) == ""]
+        self.accepted = [address for address in self._threads if not self._external or self._checked.get(address) == ""]
 
     @property
     def slots(self) -> int:

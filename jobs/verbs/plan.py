@@ -120,13 +120,14 @@ def _print_schedule(tasks: Sequence[Task], facts: Facts, workers: int) -> None:
     Notes below say the time without work for all at the end (tail), where it stops scaling, and what was measured.
     """
     left = facts.left(tasks)
-    schedules = {one.workers: one for one in doublings(tasks, facts.seconds)}
+    schedules = {schedule.workers: schedule for schedule in doublings(tasks, facts.seconds)}
     last = max(schedules)
     chosen = schedules[workers] = Schedule.of(tasks, facts.seconds, workers)
     rows = []
-    for count, one in sorted(schedules.items()):
+    for count, schedule in sorted(schedules.items()):
         rest = duration(Schedule.of(left, facts.seconds, count).makespan)
-        rows.append((f"{count:,}", duration(one.makespan), rest, f"{one.efficiency:.0%}", duration(one.tail)))
+        whole, tail = duration(schedule.makespan), duration(schedule.tail)
+        rows.append((f"{count:,}", whole, rest, f"{schedule.efficiency:.0%}", tail))
     notes = (
         f"{workers:,} workers: {duration(chosen.makespan)}, of which the last {duration(chosen.tail)} with idle "
         "workers (tail)",

@@ -104,9 +104,9 @@ def render(
     suffice.
     """
     how = look(size, samples, directions, tone, exposure, bounces)
-    found = dressed(load_scene(scene), fabric)
+    dressed_scene = dressed(load_scene(scene), fabric)
     start = time.monotonic()
-    maker = make(found, method, _frames(frames, found, out), how, out)
+    maker = make(dressed_scene, method, _frames(frames, dressed_scene, out), how, out)
     width, height = maker.size
     share = "" if method == "truth" else f"; {maker.share:.0%} of the queries by the fallback"
     print_lines(f"{out}: {width} x {height}, {duration(time.monotonic() - start)}{share}")

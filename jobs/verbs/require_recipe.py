@@ -110,10 +110,10 @@ def savings(path: Path, general: Recipe, add: Sequence[str] = ()) -> str:
     own = load_recipe(path, add)
     same = alone(general, {model.options.name for model in own.models})
     (rows, learnt), (rows_general, learnt_general) = effort_of(own), effort_of(same)
-    said = f"{rows:,} rows to generate in place of {rows_general:,} ({rows_general / rows:.1f} times fewer)"
+    generated = f"{rows:,} rows to generate in place of {rows_general:,} ({rows_general / rows:.1f} times fewer)"
     times = learnt_general / learnt if learnt else 0.0
     training = f"{learnt:,} queries to learn from in place of {learnt_general:,} ({times:.1f} times)"
-    return f"Against {general.name} with this method alone: {said}, {training if learnt else 'nothing to train'}."
+    return f"Against {general.name} with this method alone: {generated}, {training if learnt else 'nothing to train'}."
 
 
 def _rows(general: Recipe, effort: float) -> dict[str, int]:
@@ -154,8 +154,8 @@ def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:
 
 def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
     """Return point sampling with 2 points, the baseline, if the general recipe has it."""
-    found = [model for model in general.models if model.options.name == _BASELINE != method]
-    return [{"model": _BASELINE} | _model(model, [2], 1.0) for model in found]
+    baselines = [model for model in general.models if model.options.name == _BASELINE != method]
+    return [{"model": _BASELINE} | _model(model, [2], 1.0) for model in baselines]
 
 
 def _model(
@@ -182,8 +182,8 @@ def _model(
 def _bench(general: Recipe, scene: str) -> dict[str, Any]:
     """Return the general recipe's measurements, of this scene and of the method as it is."""
     bench = general.bench.model_copy(update={"bounds": False, "runtimes": ()})
-    found = bench.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
-    return found | {"scenes": found.get("scenes", {}) | {"names": [scene]}}
+    measurements = bench.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    return measurements | {"scenes": measurements.get("scenes", {}) | {"names": [scene]}}
 
 
 def _beside(path: Path, reference: str) -> str:

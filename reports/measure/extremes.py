@@ -110,8 +110,8 @@ def measure_extremes(
             for method in family:
                 subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, role=role)
                 method.prepare(fabric)
-                answers, found = _measured(subject, method, fabric, inputs, true)
-                records += found
+                answers, measured = _measured(subject, method, fabric, inputs, true)
+                records += measured
                 if own is not None:
                     records += _of(subject, "extreme_rounding", _relative(answers, own), len(own))
                 own = answers if own is None else own

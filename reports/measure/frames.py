@@ -115,6 +115,6 @@ def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Float64:
 
 def _spectrum(subject: Record, frames: Float64, noise: Float64, mean: float) -> Record:
     """Return the radially averaged spectrum, relative to the squared mean of the truth."""
-    found = spectrum(frames, noise)
-    curve = tuple((float(k), float(p) / mean**2) for k, p in zip(found.frequency, found.power, strict=True))
-    return subject.of("spectrum", found.high / mean**2, len(frames), curve=curve)
+    rings = spectrum(frames, noise)
+    curve = tuple((float(k), float(p) / mean**2) for k, p in zip(rings.frequency, rings.power, strict=True))
+    return subject.of("spectrum", rings.high / mean**2, len(frames), curve=curve)

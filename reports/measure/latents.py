@@ -71,8 +71,8 @@ class Blends(Protocol):
 def pairs() -> list[Pair]:
     """Return the pairs: three drafts, each with the yarns of another preset, and two drafts of the same yarns."""
     result = []
-    for one, other, differs in LATENT_PAIRS:
-        first, second = load_fabric(one), load_fabric(other)
+    for name, other, differs in LATENT_PAIRS:
+        first, second = load_fabric(name), load_fabric(other)
         update = {"draft": second.draft} if differs == "draft" else {"warp": second.warp, "weft": second.weft}
         result.append(Pair(first, first.model_copy(update={"name": other} | update), differs))
     return result
@@ -98,8 +98,8 @@ def measure_paths(
     subject = Record(method=method.name, setting=method.setting, fabric=pair.first.name, note=pair.about)
     for metric, values in _along(method, pair, queries):
         errors = [
-            colour_error(found, answer, COLOUR_WEIGHTS, resamples=0).relative_rmse
-            for found, answer in zip(values, answers, strict=True)
+            colour_error(blended, answer, COLOUR_WEIGHTS, resamples=0).relative_rmse
+            for blended, answer in zip(values, answers, strict=True)
         ]
         curve = tuple(zip(SHARES, errors, strict=True))
         records.append(subject.of(metric, dict(curve)[0.5], rows, curve=curve))
@@ -120,7 +120,7 @@ def measure_edits(method: Method, fabric: Fabric, repeats: int = EDITS) -> list[
     for about, edits in (("a yarn", yarns), ("a colour", colours)):
         edited = [fabric.model_copy(update={"warp": fabric.warp.model_copy(update=edit)}) for edit in edits]
         # The first call warms up.
-        times = [milliseconds(partial(method.prepare, one)) for one in edited][1:]
+        times = [milliseconds(partial(method.prepare, cloth)) for cloth in edited][1:]
         records.append(timed(subject.model_copy(update={"note": about}), "encode_time", times))
     return records
 

@@ -166,8 +166,8 @@ def _without_repeats(tables: Iterable[ResultTable]) -> list[ResultTable]:
 
 def _ratio(column: Column) -> Column:
     """Return the column of × lower; the baseline's is 1."""
-    one = TableCell("1")
-    return Column(column.title, lambda row: one if (row.method, row.setting) == BASELINE else column.cell(row))
+    unity = TableCell("1")
+    return Column(column.title, lambda row: unity if (row.method, row.setting) == BASELINE else column.cell(row))
 
 
 def _fronts(tradeoff: pd.DataFrame, values: Values) -> list[ResultTable]:

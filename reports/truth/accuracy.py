@@ -93,11 +93,11 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
     """Measure every setting on so many default queries of every preset; `reference` is a power of two."""
     for fabric, queries in default_queries(fabrics, rows, _SEED):
         truth = estimate(fabric, queries, fixed("owen", reference), _SEED + 1)
-        found = [_compare(fabric, queries, truth, setting, options) for setting, options in SETTINGS.items()]
+        rows_of_fabric = [_compare(fabric, queries, truth, setting, options) for setting, options in SETTINGS.items()]
         # c of the law e = c N^-1/2: the geometric mean of plain Monte Carlo's median errors times sqrt(N).
-        random = [row for row in found if row.setting.startswith("mc,")]
+        random = [row for row in rows_of_fabric if row.setting.startswith("mc,")]
         spread = float(np.exp(np.mean([np.log(row.true_error * np.sqrt(row.points)) for row in random])))
-        for row in found:
+        for row in rows_of_fabric:
             needed = (spread / max(row.true_error, 1e-12)) ** 2
             yield replace(row, saved=needed / row.points)
 

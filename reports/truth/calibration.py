@@ -118,10 +118,10 @@ def measure(
     kinds: Sequence[str] = tuple(CLASSES),
 ) -> Iterator[Calibration]:
     """Measure the calibration of estimators with their default options; parameters as for `samples`."""
-    for kind, name, behind, found, exact in samples(fabrics, rows, estimators, reference, seed, kinds):
-        error, bound = calibrate(found, behind)
+    for kind, name, behind, answers, exact in samples(fabrics, rows, estimators, reference, seed, kinds):
+        error, bound = calibrate(answers, behind)
         doubt, _ = calibrate(exact, behind)
-        wrong = found.mean - exact.mean
+        wrong = answers.mean - exact.mean
         columns = [(part[:, :4], part[:, 4:]) for part in (wrong, error, bound, doubt)]
         if len(wrong) < 2:
             continue
@@ -166,8 +166,8 @@ def samples(
                     own = physics.model_copy(update={"estimator": name})
                     answers = uncalibrated(fabric, queries.take(known), own, seed)
                     parts.setdefault(name, []).append((queries.behind[known], answers, exact.take(known)))
-        for name, found in parts.items():
-            behind, answered, truths = zip(*found, strict=True)
+        for name, of_estimator in parts.items():
+            behind, answered, truths = zip(*of_estimator, strict=True)
             yield kind, name, np.concatenate(behind), _joined(answered), _joined(truths)
 
 
@@ -194,12 +194,12 @@ def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, flo
         # The reference's own variance may exceed errors that are far smaller than stated.
         return np.asarray(np.log(np.maximum(true.mean(axis=axis), _LEAST * whole) / whole))
 
-    found = stats.bootstrap(
+    bootstrap = stats.bootstrap(
         squares, logarithm, paired=True, vectorized=True, n_resamples=999, batch=99, method="percentile",
         rng=np.random.default_rng(0),
     )  # fmt: skip
     middle = float(logarithm(*squares, axis=0))
-    reach = float(stats.norm.ppf(0.5 + 0.5 * LEVEL)) * float(found.standard_error)
+    reach = float(stats.norm.ppf(0.5 + 0.5 * LEVEL)) * float(bootstrap.standard_error)
     return math.exp(0.5 * (middle - reach)), math.exp(0.5 * (middle + reach))
 
 

@@ -74,10 +74,10 @@ def measure(
             half = time.perf_counter()
             exact = component_colours(fabric, queries, _PRECISE, _SEED)
             end = time.perf_counter()
-            found, truth = coloured(components, mean), coloured(components, exact.mean)
-            square = float(np.mean((found - truth) ** 2) - np.mean(exact.standard_error**2))
+            approximate, truth = coloured(components, mean), coloured(components, exact.mean)
+            square = float(np.mean((approximate - truth) ** 2) - np.mean(exact.standard_error**2))
             loss = math.sqrt(max(square, 0.0) / float(np.mean(truth**2)))
-            bias = float(found.mean() / truth.mean() - 1.0)
+            bias = float(approximate.mean() / truth.mean() - 1.0)
             yield ColourLoss(name, f"{size:g}", loss, bias, (half - begun) / rows, (end - half) / rows, rows)
 
 

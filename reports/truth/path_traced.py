@@ -83,7 +83,7 @@ def measure(
     for name in scenes:
         truths = [_frames(name, reference[0], size)(reference[1], 1000 + k)[0] for k in range(2)]
         scale = float(np.mean(truths)) ** 2
-        found: list[Traced] = []
+        rows: list[Traced] = []
         for method, counts in reversed(list(samples.items())):
             frame_of = _frames(name, method, size)
             frame_of(1, 0)  # loads and tabulates
@@ -91,10 +91,10 @@ def measure(
                 made = [frame_of(count, seed) for seed in range(1, frames + 1)]
                 errors = [float(np.mean((frame - truths[0]) * (frame - truths[1]))) / scale for frame, _ in made]
                 error, seconds = float(np.mean(errors)), float(np.median([seconds for _, seconds in made]))
-                others = [one for one in found if one.method == OTHER]
+                others = [row for row in rows if row.method == OTHER]
                 gain = _error_in(seconds, others) / error if method != OTHER and error > 0 else math.nan
-                found.append(Traced(method, name, str(count), error, seconds, frames, gain))
-        yield from found
+                rows.append(Traced(method, name, str(count), error, seconds, frames, gain))
+        yield from rows
 
 
 def _frames(name: str, method: str, size: int) -> Callable[[int, int], tuple[Float64, float]]:
@@ -123,6 +123,6 @@ def _error_in(seconds: float, found: Sequence[Traced]) -> float:
 
     In less time than the fewest samples take, it is the error of these; in more than the most take, NaN: it is unknown.
     """
-    known = sorted((one.seconds, one.error) for one in found if one.error > 0)
+    known = sorted((row.seconds, row.error) for row in found if row.error > 0)
     times, errors = np.log(np.array(known)).T
     return float(np.exp(np.interp(math.log(seconds), times, errors, right=math.nan)))

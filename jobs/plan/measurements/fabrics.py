@@ -248,4 +248,4 @@ class OfAddedMetric(_OnHeldOut):
         from reports.measure.held_out import measure_added
 
         rows = self.held_out(out)
-        return [measure_added(one, self.metric, rows, self.errors.seed) for one in self.model.methods(out)]
+        return [measure_added(method, self.metric, rows, self.errors.seed) for method in self.model.methods(out)]

@@ -30,6 +30,8 @@ class Measurement(Task):
     stage: ClassVar[Stage] = "bench"
     code: ClassVar[tuple[str, ...]] = ("bench",)
     """Its code among `pipeline.versions` and ``bench``, beside that of its models and of their ways to run."""
+    seconds: ClassVar[float] = 1.0
+    """Estimated seconds on one core."""
     endings: ClassVar[tuple[str, ...]] = ()
     """Of the files of a kind that makes files for others, not Records: pictures of the truth, for example."""
 
@@ -89,6 +91,11 @@ class Measurement(Task):
         return Made(task=self.id, path=self.products[0])
 
     @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return self.seconds
+
+    @property
     def threads(self) -> int:
         """Most threads that a method may use while it is measured."""
         return 1
@@ -100,10 +107,10 @@ class Measurement(Task):
     def versions(self) -> dict[str, int]:
         """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
         code, ways = {*self.code}, list(held(self, RunOptions))
-        code |= {"bound"} if any(one.bounds for one in ways) else set()
+        code |= {"bound"} if any(way.bounds for way in ways) else set()
         options = [model.options for model in held(self, Trained)]
-        code |= {"fallback"} if any(one.model == "selvage" for one in options) else set()
-        models = {one.name: one.version for one in options}
+        code |= {"fallback"} if any(model.model == "selvage" for model in options) else set()
+        models = {model.name: model.version for model in options}
         numbers = {**vars(versions), "BENCH": catalogue.BENCH}
         return {name: numbers[name.upper()] for name in code} | models
 
@@ -119,7 +126,7 @@ class Measurement(Task):
         A method that fails ends a measurement of it alone. One of several methods starts again without it. MethodFailed
         if the only method fails.
         """
-        added = [one for one in held(self, Trained) if isinstance(one.options, AddedMethod)]
+        added = [model for model in held(self, Trained) if isinstance(model.options, AddedMethod)]
         if not added and not list(held(self, AddedMetric)):
             self.write(out, {}, progress)
             return
@@ -148,7 +155,7 @@ class Measurement(Task):
         ]
         models = [model.options for model in held(self, Trained)]
         origins = {options.name: options.origin for options in models if isinstance(options, AddedMethod)}
-        records = [one.made_by(origins[one.method]) if one.method in origins else one for one in records]
+        records = [record.made_by(origins[record.method]) if record.method in origins else record for record in records]
         write_records(out / self.records, records, this_machine(self.threads))
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:

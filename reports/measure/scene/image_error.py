@@ -88,19 +88,19 @@ class ImageErrors:
     def records(self, subject: Record) -> list[Record]:
         """Return every number as a Record of `subject`; numbers that are infinite (equal pictures) are left out."""
         r = self.mse_relative
-        found = subject.of_error(self.mse)
-        found.append(
+        records = subject.of_error(self.mse)
+        records.append(
             subject.of("mse_relative", r.value, r.count, standard_error=r.standard_error, low=r.low, high=r.high)
         )
-        found.append(subject.of("mse_relative_floor", r.noise, r.count))
+        records.append(subject.of("mse_relative_floor", r.noise, r.count))
         for metric in PERCEIVED:
             m = self.perceived[metric]
             low, high = (bound if math.isfinite(bound) else None for bound in (m.low, m.high))
             if math.isfinite(m.value):
-                found.append(subject.of(metric, m.value, m.pixels, low=low, high=high))
+                records.append(subject.of(metric, m.value, m.pixels, low=low, high=high))
             if math.isfinite(m.floor):
-                found.append(subject.of(f"{metric}_floor", m.floor, m.pixels))
-        return found
+                records.append(subject.of(f"{metric}_floor", m.floor, m.pixels))
+        return records
 
 
 def image_errors(

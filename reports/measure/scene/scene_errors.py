@@ -73,7 +73,7 @@ def measure_scene(
     """
     image, truths, noises, lit = options.image, shot.pictures(), shot.noise(), shot.lit
     floor, records = noise_floor(truths[0], noises[0], lit[0], image), []
-    for method in (one for one in methods if shot.covered_by(one)):
+    for method in filter(shot.covered_by, methods):
         answers = shot.answers(method, options.seed)
         shown = shot.pictures(answers)
         errors = image_errors(shown[0], truths[0], noises[0], lit[0], image, floor)
