@@ -27,7 +27,7 @@ from weaves.validation import read_toml
 if TYPE_CHECKING:
     from pipeline.truth.invariants import CheckResult
 
-WHERE = "check"
+_WHERE = "check"
 
 
 def check(
@@ -45,7 +45,7 @@ def check(
 
         return check_recipe.repair(subject, out, on, add) if repair else check_recipe.check_recipe(subject, out, add)
     if repair:
-        raise BadInput(WHERE, "--repair", subject, "only the files of a recipe can be made again; name a recipe")
+        raise BadInput(_WHERE, "--repair", subject, "only the files of a recipe can be made again; name a recipe")
     if isinstance(meant, Fabric):
         _check_fabric(meant)
         return 0
@@ -63,14 +63,16 @@ def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:
     file cannot be used.
     """
     presets, recipes = preset_names(), recipe_names()
-    folder = place(subject, WHERE)
+    folder = place(subject, _WHERE)
     if not is_local(folder):
         return folder
     kinds = [("preset", subject in presets), ("recipe", subject in recipes), ("folder", folder.is_dir())]
     if len(meant := [kind for kind, exists in kinds if exists]) > 1:
         # A path with a slash is never the name of a preset or a recipe.
         where = f"{'the folder ./' + subject if 'folder' in meant else 'the path of a .toml file'}"
-        raise BadInput(WHERE, "name", subject, f"is both {' and '.join(meant)}; name {where} by its path, or rename it")
+        raise BadInput(
+            _WHERE, "name", subject, f"is both {' and '.join(meant)}; name {where} by its path, or rename it"
+        )
     match meant:
         case ["folder"]:
             return folder
@@ -80,7 +82,7 @@ def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:
             return load_recipe(subject, add)
     if not subject.endswith(".toml"):
         allowed = "a recipe, a folder of a data set or a fabric is needed"
-        raise BadInput(WHERE, "name", subject, f"{allowed}; {nearest(subject, [*recipes, *presets])}")
+        raise BadInput(_WHERE, "name", subject, f"{allowed}; {nearest(subject, [*recipes, *presets])}")
     tables = read_toml(Path(subject)).keys() & {"dataset", "draft"}
     if len(tables) != 1:
         which = "has both [dataset] and [draft]" if tables else "has neither [dataset] nor [draft]"

@@ -19,7 +19,7 @@ from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName, Whole
 from pipeline.cores import cores
 from weaves.errors import BadInput
 
-MOST_WORKERS: Final = 100_000
+_MOST_WORKERS: Final = 100_000
 """Workers of a simulated schedule, at most."""
 
 
@@ -59,8 +59,8 @@ def print_plan(
     workers: Annotated[Whole, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
 ) -> None:
     """Print the plan of a recipe; nothing is computed. BadInput if the recipe or the workers cannot be used."""
-    if not 0 <= workers <= MOST_WORKERS:
-        raise BadInput("--workers", "", workers, f"must be from 1 to {MOST_WORKERS}")
+    if not 0 <= workers <= _MOST_WORKERS:
+        raise BadInput("--workers", "", workers, f"must be from 1 to {_MOST_WORKERS}")
     tasks = plan(load_recipe(recipe, add))
     facts = facts_of(tasks, Ledger(out))
     _print_plan(tasks, facts)

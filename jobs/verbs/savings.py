@@ -39,7 +39,7 @@ from weaves.errors import BadInput
 ENOUGH: Final = 3.0
 """Least factor by which a scene's recipe should reduce rows and training."""
 
-MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")
+_MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")
 """Records of a method on a scene that are held side by side."""
 
 DIFFERENCE: Final = "mse, own less general"
@@ -172,10 +172,10 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
     records = mean_over_seeds(read_records([path]))
     here = [record for record in records if record.scene == scene and not record.fabric]
     by_metric = {record.metric: record for record in here if (record.method, record.setting) == (method, setting)}
-    if lacking := [metric for metric in MEASURED if metric not in by_metric]:
+    if lacking := [metric for metric in _MEASURED if metric not in by_metric]:
         allowed = f"the page of {page} has no {lacking[0]} of {method} there; `twillight run {run}`"
         raise BadInput("savings", "scene", scene, allowed)
-    measured = [by_metric[metric] for metric in MEASURED]
+    measured = [by_metric[metric] for metric in _MEASURED]
     values = {(record.metric, record.unit): Value(record.value, record.low, record.high) for record in measured}
     base = [r.value for r in here if (r.method, r.setting) == BASELINE and r.metric == "frame_time"]
     relative = by_metric["frame_time"].value / base[0] if base else math.nan

@@ -42,10 +42,10 @@ MEASURES: Final[dict[str, tuple[Metric, Float64]]] = {
 }
 """Measured quantities: the Record's metric and the colour of each component."""
 
-LONGEST: Final = 0.02
+_LONGEST: Final = 0.02
 """Seconds that a timed call of one class, over its fabrics, should not exceed by much."""
 
-FEWEST: Final = 512
+_FEWEST: Final = 512
 """Least queries a fabric in such a call: the fixed cost of a call must not count as the cost of queries."""
 
 
@@ -58,8 +58,8 @@ def measure_by_size(
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.
 
     Errors are of all queries of a class. Timed are calls on one thread about every fabric that the method covers, of as
-    many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower
-    edge of the class, value); its value is that over all classes. `progress` receives the finished share.
+    many queries as `_LONGEST` allows. The time over all classes weighs them as they occur. The curve of a Record has
+    (lower edge of the class, value); its value is that over all classes. `progress` receives the finished share.
     """
     classes, shares = _classes(fabrics)
     cloths = [cloth for members in classes.values() for cloth, _, _ in members]
@@ -73,7 +73,7 @@ def measure_by_size(
             for cloth, _, _ in own:
                 method.prepare(cloth)
             drawn = [(cloth, queries) for cloth, queries, _ in own]
-            contenders.append(affordable(Contender(method.predict, drawn), LONGEST, FEWEST))
+            contenders.append(affordable(Contender(method.predict, drawn), _LONGEST, _FEWEST))
         timings = time_side_by_side(
             contenders,
             options.timing_repeats,

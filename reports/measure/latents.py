@@ -35,10 +35,10 @@ from weaves.yarn import Yarn
 SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Positions between the first fabric (0) and the second (1) at which errors are measured."""
 
-ROWS: Final = 1024
+_ROWS: Final = 1024
 """Queries at each of them."""
 
-EDITS: Final = 25
+_EDITS: Final = 25
 """Edits that are timed, of each kind."""
 
 _SEED = 31
@@ -85,7 +85,7 @@ def between(pair: Pair, share: float) -> Fabric:
 
 
 def measure_paths(
-    method: Method, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = ROWS
+    method: Method, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = _ROWS
 ) -> list[Record]:
     """Return the errors of blending and of encoding anew along the path between two fabrics.
 
@@ -106,7 +106,7 @@ def measure_paths(
     return records
 
 
-def measure_edits(method: Method, fabric: Fabric, repeats: int = EDITS) -> list[Record]:
+def measure_edits(method: Method, fabric: Fabric, repeats: int = _EDITS) -> list[Record]:
     """Return the time until answers can follow an edit of a yarn, and one of a colour: medians, in milliseconds.
 
     Edits change the warp's relief, or its diffuse colour, a little each time: no two fabrics are the same.

@@ -9,7 +9,7 @@ allowed beyond a bound. Over the queries and the four components of a class,
 
 Errors have heavy tails: of a thousand queries, ten may hold half the square of the errors. So a ratio has an interval,
 by the bootstrap over queries, and is wrong only if this lies outside `RATIOS`; a share is wrong only if a binomial test
-says that it is above `EXCEEDED`. Both at `LEVEL`.
+says that it is above `EXCEEDED`. Both at `_LEVEL`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from weaves.population import Population, Ranges, population_fabrics
 RATIOS: Final = (0.8, 1.25)
 """Ratios of calibrated errors."""
 
-LEVEL: Final = 0.99
+_LEVEL: Final = 0.99
 """Level of the intervals of ratios."""
 
 EXCEEDED: Final = 0.003
@@ -90,7 +90,7 @@ class Calibration:
     exceeded: Annotated[float, "bound_exceeded"]
     """Share of errors beyond their bound."""
     low: float | None
-    """Lower end of the ratio's interval, at `LEVEL`; None in Records of before intervals."""
+    """Lower end of the ratio's interval, at `_LEVEL`; None in Records of before intervals."""
     high: float | None
     """Upper end."""
     ratio_through: Annotated[float, "error_ratio_through"]
@@ -106,7 +106,7 @@ class Calibration:
         values = 4 * self.count
         beyond = stats.binomtest(round(self.exceeded * values), values, EXCEEDED, alternative="greater")
         low, high = (self.ratio if end is None else end for end in (self.low, self.high))
-        return low <= RATIOS[1] and high >= RATIOS[0] and float(beyond.pvalue) > 1.0 - LEVEL
+        return low <= RATIOS[1] and high >= RATIOS[0] and float(beyond.pvalue) > 1.0 - _LEVEL
 
 
 def measure(
@@ -183,7 +183,7 @@ def compared(wrong: Float64, error: Float64, bound: Float64, doubt: Float64) -> 
 
 
 def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, float]:
-    """Return the interval of the ratio of the components' errors at `LEVEL`; rows are queries.
+    """Return the interval of the ratio of the components' errors at `_LEVEL`; rows are queries.
 
     Of the logarithm of the squared ratio, with the standard error by the bootstrap over queries.
     """
@@ -199,7 +199,7 @@ def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, flo
         rng=np.random.default_rng(0),
     )  # fmt: skip
     middle = float(logarithm(*squares, axis=0))
-    reach = float(stats.norm.ppf(0.5 + 0.5 * LEVEL)) * float(bootstrap.standard_error)
+    reach = float(stats.norm.ppf(0.5 + 0.5 * _LEVEL)) * float(bootstrap.standard_error)
     return math.exp(0.5 * (middle - reach)), math.exp(0.5 * (middle + reach))
 
 

@@ -31,8 +31,8 @@ from reports.measure.timing import set_threads
 from reports.truth.row_records import RowRecords
 from weaves.fabric import load_fabric
 
-FABRICS: Final = ("gingham", "houndstooth")
-SIZES: Final = (0.15, 0.5, 1.0, 2.0, 4.0, 16.0, 64.0)
+_FABRICS: Final = ("gingham", "houndstooth")
+_SIZES: Final = (0.15, 0.5, 1.0, 2.0, 4.0, 16.0, 64.0)
 """Standard deviations of footprints, in yarn spacings."""
 
 _ROWS = 400
@@ -58,7 +58,7 @@ class ColourLoss:
 
 
 def measure(
-    rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, sizes: Sequence[float] = SIZES
+    rows: int = _ROWS, fabrics: Sequence[str] = _FABRICS, sizes: Sequence[float] = _SIZES
 ) -> Iterator[ColourLoss]:
     """Measure the loss on every fabric by every size, single-threaded, with `rows` queries each."""
     set_threads(1)

@@ -26,7 +26,7 @@ from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from reports.truth.row_records import RowRecords
 
-SCENES: Final = ("plane", "sphere", "drape")
+_SCENES: Final = ("plane", "sphere", "drape")
 """Scenes of which frames are rendered."""
 
 OURS: Final = "soft_nodes:2"
@@ -35,7 +35,7 @@ OURS: Final = "soft_nodes:2"
 OTHER: Final = "point_sampled:1"
 """One random point a sample."""
 
-REFERENCE: Final = "truth"
+_REFERENCE: Final = "truth"
 """The method that renders the reference frames."""
 
 SAMPLES: Final[dict[str, tuple[int, ...]]] = {OURS: (1, 4, 16), OTHER: (1, 2, 4, 8, 16, 32, 64)}
@@ -69,10 +69,10 @@ RECORDS: Final = RowRecords(Traced, setting=("samples",), method_field="method")
 
 
 def measure(
-    scenes: Sequence[str] = SCENES,
+    scenes: Sequence[str] = _SCENES,
     size: int = _SIZE,
     samples: Mapping[str, Sequence[int]] = SAMPLES,
-    reference: tuple[str, int] = (REFERENCE, _REFERENCE_SAMPLES),
+    reference: tuple[str, int] = (_REFERENCE, _REFERENCE_SAMPLES),
     frames: int = _FRAMES,
 ) -> Iterator[Traced]:
     """Measure every method in every scene; error and time are means over frames with different random numbers.

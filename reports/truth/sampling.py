@@ -43,10 +43,10 @@ from reports.truth.row_records import RowRecords
 from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric, load_fabric
 
-FABRICS: Final = ("silk_charmeuse", "polyester_lining", "organza", "denim")
+_FABRICS: Final = ("silk_charmeuse", "polyester_lining", "organza", "denim")
 """Lustrous cloth first."""
 
-SCENES: Final = tuple(SHIPPED)
+_SCENES: Final = tuple(SHIPPED)
 """Scenes whose looks are measured."""
 
 SETTINGS: Final = ("cosine", "cosine by sides", "one point", "lobes")
@@ -84,7 +84,7 @@ class Subject(NamedTuple):
 
 
 def measure(
-    looks: int = _LOOKS, fabrics: Sequence[str] = FABRICS, scenes: Sequence[str] = SCENES
+    looks: int = _LOOKS, fabrics: Sequence[str] = _FABRICS, scenes: Sequence[str] = _SCENES
 ) -> Iterator[VarianceSaving]:
     """Measure every sampler on every fabric, with all its light and with the specular part alone, and in scenes."""
     for name in fabrics:

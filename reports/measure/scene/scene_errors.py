@@ -40,10 +40,10 @@ from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
 from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
 
-LONGEST: Final = 0.01
+_LONGEST: Final = 0.01
 """Seconds of a timed call."""
 
-FEWEST: Final = 128
+_FEWEST: Final = 128
 """Least queries about a cloth in such a call: the fixed cost of a call must not count as the cost of queries."""
 
 # The display and the place from which FovVideoVDP looks at it.
@@ -116,7 +116,7 @@ def _over_time(
 def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, seed: int) -> list[Record]:
     """Time the first frame by all methods that cover its cloths, in turns on one thread, in milliseconds.
 
-    Each cloth is timed on as many of its queries as one call can answer in `LONGEST`, at least `FEWEST`. The time of
+    Each cloth is timed on as many of its queries as one call can answer in `_LONGEST`, at least `_FEWEST`. The time of
     all its queries is in proportion, so that a small cloth with slow queries gets its true weight.
     """
     if not (able := [method for method in methods if shot.covered_by(method)]):
@@ -132,7 +132,7 @@ def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, 
             # Quadrature's own preparation must not look like the time of a query: rare ones come late in a call.
             rare = np.flatnonzero(method.out_of_domain(fabric, queries))[:1]
             method.predict(fabric, queries.take(rare))
-            contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), LONGEST, FEWEST))
+            contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), _LONGEST, _FEWEST))
     timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
     readings = np.array([timing.samples for timing in timings]).reshape(len(able), len(subjects), -1)
     counts = np.array([len(queries.u) for _, queries in subjects])
