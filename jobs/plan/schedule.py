@@ -106,8 +106,8 @@ class Estimate:
     def seconds_left(self, tasks: Sequence[Task], under_way: Mapping[str, tuple[float, float]], workers: int) -> float:
         """Return how long a run goes on, by a simulation of its schedule, which is renewed now and then.
 
-        The tasks have not ended, each after those it needs. Of those `under_way`, by their ids, the time of the
-        beginning (by `time.monotonic`) and the finished share are known.
+        `tasks` have not ended, and each comes after those it needs. `under_way` has, by their ids, when tasks began (by
+        `time.monotonic`) and the finished share.
         """
         now = time.monotonic()
         if not tasks:

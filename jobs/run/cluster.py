@@ -36,9 +36,9 @@ class Scheduler(NamedTuple):
     ca: str = ""
     """Certificate of the authority; empty: none."""
     certificate: str = ""
-    """Of this client."""
+    """Certificate of this client."""
     key: str = ""
-    """Of this client."""
+    """Private key of this client."""
 
 
 HERE: Final = Scheduler()

@@ -152,7 +152,7 @@ class Measurement(Task):
                 left_out[failure.name] = failure.reason
 
     def write(self, out: Path, left_out: Mapping[str, str], progress: Progress) -> None:
-        """Measure, and write the Records; methods from outside that are `left_out` failed here, for reasons."""
+        """Measure, and write the Records; `left_out` has the methods from outside that failed here, with reasons."""
         from reports.record import Record, this_machine, write_records
 
         measured = self.without(list(left_out)) if left_out else self

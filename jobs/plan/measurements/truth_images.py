@@ -31,13 +31,13 @@ class _OfFabric(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield those of all named fabrics."""
+        """Yield the images of all named fabrics."""
         for fabric, _ in subjects.fabrics:
             yield from cls.of(fabric, subjects.recipe)
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
-        """Return those of a fabric that a recipe has."""
+        """Return the images of a fabric that a recipe asks for."""
         raise NotImplementedError
 
 
@@ -56,7 +56,7 @@ class TruthPicture(_OfFabric):
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
-        """Return one a view."""
+        """Return a picture for each view."""
         bench = recipe.bench
         same = {"fabric": fabric, "view": bench.view, "truth": bench.truth, "seed": bench.seed}
         return [cls(scene=view, extent=bench.size(view), **same) for view in bench.views]
@@ -96,7 +96,7 @@ class TruthFrames(_OfFabric):
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
-        """Return the one of the fabric."""
+        """Return the frames of the fabric, as a list of one."""
         return [cls(fabric=fabric, options=select(FrameOptions, recipe.bench))]
 
     @property
@@ -122,7 +122,7 @@ class TruthEdge(_OfFabric):
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
-        """Return the one of the fabric, where the recipe's queries are of curved cloth."""
+        """Return the edge of the fabric if queries of the recipe are of curved cloth."""
         return [cls(fabric=fabric, options=recipe.bench.edge)] if recipe.dataset.queries.curvature[1] > 0 else []
 
     @property
@@ -148,7 +148,7 @@ class LivePage(_OfFabric):
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
-        """Return the one of the fabric, if the recipe lists it."""
+        """Return the page of the fabric if the recipe lists it."""
         live = recipe.bench.live
         return [cls(fabric=fabric, pixels=live.pixels)] if fabric.name in live.fabrics else []
 
