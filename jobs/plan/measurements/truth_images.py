@@ -37,7 +37,7 @@ class _OfFabric(Measurement):
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
-        """Return the images of a fabric that a recipe asks for."""
+        """Return the images of a fabric that a recipe has."""
         raise NotImplementedError
 
 
