@@ -16,7 +16,7 @@ import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -34,14 +34,8 @@ _CONTINUES: Final = "finished work is kept, and the same command continues"
 def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) -> int:
     """Call a verb and return its exit code, after printing the sentence of an error.
 
-    Parameters
-    ----------
-    verb : callable
-        The verb with its arguments; an integer that it returns is the exit code.
-    tokens : sequence of str
-        Its command line, for the report of a crash.
-    out : Path
-        Folder of products if the command line names none.
+    An integer that the verb returns is the exit code. The report of a crash has its command line, and lies in the
+    folder `out` if that names none.
     """
     if sys.stdout is None:  # it was closed before the start
         return _end("stdout is closed; send it to a file or to /dev/null", 2)
@@ -132,12 +126,8 @@ class _Stopped(KeyboardInterrupt):
         self.code = 128 + number
 
 
-@contextmanager
-def _signals(stops: list[KeyboardInterrupt]) -> Iterator[None]:
+def _signals(stops: list[KeyboardInterrupt]) -> AbstractContextManager[None]:
     """Turn SIGTERM and SIGHUP into `_Stopped`, so that what must be closed is closed; `stops` receives those raised."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
 
     def stop(number: int, frame: object) -> None:
         stops.append(KeyboardInterrupt() if number == signal.SIGINT else _Stopped(number))
@@ -145,12 +135,21 @@ def _signals(stops: list[KeyboardInterrupt]) -> Iterator[None]:
 
     # Where Ctrl-C is ignored, as in the background of a shell, it stays so.
     interrupt = {signal.SIGINT} if signal.getsignal(signal.SIGINT) is signal.default_int_handler else set()
-    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGHUP, *interrupt)}
+    return handled(stop, signal.SIGTERM, signal.SIGHUP, *interrupt)
+
+
+@contextmanager
+def handled(handler: Callable[[int, object], None], *numbers: int) -> Iterator[None]:
+    """Handle signals within a block, which is of the main thread: others receive none."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, own in before.items():
+            signal.signal(number, own)
 
 
 def _end(sentence: str, code: int) -> int:

@@ -27,13 +27,7 @@ MOST_SENTENCES: Final = 20
 
 
 class Terminal(Console):
-    """A rich console that shows text as it is; without markup, emoji codes and highlighted words.
-
-    Parameters
-    ----------
-    stderr : bool
-        Write to stderr.
-    """
+    """A rich console that shows text as it is: without markup, emoji codes and highlighted words."""
 
     def __init__(self, *, stderr: bool = False, **options: Any) -> None:
         super().__init__(stderr=stderr, markup=False, emoji=False, highlight=False, **options)
@@ -67,20 +61,8 @@ def print_table(
 ) -> None:
     """Print a table, whose first column labels the rows.
 
-    Parameters
-    ----------
-    columns : sequence of str
-        Headings.
-    rows : iterable of sequences
-        Cells.
-    text : sequence of str
-        Columns of words; those of numbers stand on the right.
-    title, caption : str
-        Line above, lines below.
-    styles : mapping
-        Styles of single rows, by their number.
-    gap, least_width : int
-        Letters between columns, and of the terminal at least.
+    Columns in `text` hold words, others numbers, which stand on the right. `styles` are those of single rows, by their
+    number; `gap` are the letters between columns, `least_width` those of the terminal at least.
     """
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, gap, 0, 0))
     table.title, table.title_justify = title or None, "left"

@@ -97,10 +97,7 @@ def columns_of(table: str) -> list[str]:
 def metric_row(metric: str) -> MetricRow:
     """Return the row of a metric; one from outside that was not entered (`enter`) has little more than its name.
 
-    Raises
-    ------
-    KeyError
-        If there is no such metric.
+    KeyError if there is no such metric.
     """
     if metric not in METRICS and metric.startswith(ADDED):
         return MetricRow(metric, metric.removeprefix(ADDED).replace("_", " "))

@@ -36,7 +36,7 @@ COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])
 """Colours of the colour measure: one channel, (4, 1)."""
 
 
-MOST: Final = 0.99
+_MOST: Final = 0.99
 """Share of the queries that `most_error` keeps."""
 
 
@@ -115,12 +115,12 @@ def colour_error(values: npt.ArrayLike, answers: Answers, colours: Float64, resa
 
 
 def most_error(values: npt.ArrayLike, answers: Answers) -> Error:
-    """Return the error in the colour measure of the share `MOST` of all queries, those of the largest errors left out.
+    """Return the error in the colour measure of the share `_MOST` of all queries, those of the largest errors left out.
 
     Arguments as in `colour_error`; the noise of the truth is subtracted without choosing by it.
     """
     seen, truth = (_coloured(np.asarray(x, np.float64), COLOUR_WEIGHTS) for x in (values, answers.mean))
-    kept = np.argsort(np.abs(seen - truth)[:, 0], kind="stable")[: math.ceil(MOST * len(seen))]
+    kept = np.argsort(np.abs(seen - truth)[:, 0], kind="stable")[: math.ceil(_MOST * len(seen))]
     return squared_error(seen[kept], truth[kept], colour_noise(answers, COLOUR_WEIGHTS)[kept], resamples=0)
 
 

@@ -15,21 +15,14 @@ from weaves.errors import BadInput
 
 
 class Joined(NamedTuple):
-    """Records of several machines.
-
-    Attributes
-    ----------
-    records : list of Record
-        All of them.
-    shared : int
-        Numbers that several machines have alike, and that are kept once.
-    unlike : list of tuple of Record
-        Pairs of one number that two machines have differently; both are kept.
-    """
+    """Records of several machines."""
 
     records: list[Record]
+    """All of them."""
     shared: int
+    """Numbers that several machines have alike, and that are kept once."""
     unlike: list[tuple[Record, Record]]
+    """Pairs of one number that two machines have differently; both are kept."""
 
 
 def _name_of(machine: Machine) -> str:
@@ -47,10 +40,7 @@ def names_of(machines: Sequence[Machine]) -> list[str]:
 def join(parts: Mapping[str, Sequence[Record]]) -> Joined:
     """Join the Records of machines, given by the names of the machines.
 
-    Raises
-    ------
-    BadInput
-        If Records of one machine hold several machines already.
+    BadInput if Records of one machine hold several machines already.
     """
     records: list[Record] = []
     known: dict[tuple[object, ...], Record] = {}

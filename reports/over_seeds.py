@@ -89,20 +89,12 @@ def over_seeds(
 ) -> Callable[[Table], Table]:
     """Return a decorator of tables, so that they have means over trainings, their number, and ranges.
 
-    Parameters
-    ----------
-    keys : sequence of str
-        Columns that name a row, `method` and `setting` among them.
-    ranged : sequence of str, optional
-        Columns of numbers that get a range; None: all but the keys.
-    means : mapping
-        Columns that are no linear function of errors, such as a maximum over fabrics: their number is not that of the
-        mean errors, which may lie outside the range, but this mean of the numbers of the trainings.
+    The `keys` name a row, `method` and `setting` among them; `ranged` are the columns of numbers that get a range,
+    None: all but the keys. The decorated function adds the columns `seeds`, the number of trainings (0 where nothing is
+    trained), and <name>_least and <name>_most, which are NaN for less than two trainings.
 
-    Notes
-    -----
-    The decorated function adds the columns `seeds`, the number of trainings (0 where nothing is trained), and
-    <name>_least and <name>_most, which are NaN for less than two trainings.
+    Columns in `means` are no linear function of errors, such as a maximum over fabrics: their number is not that of the
+    mean errors, which may lie outside the range, but this mean of the numbers of the trainings.
     """
 
     def decorated(table: Table) -> Table:

@@ -47,7 +47,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
 
 def plan(recipe: Recipe) -> list[Task]:
     """Return the tasks of a recipe."""
-    datasets = {id(one): DataSet(one) for one in recipe.together}
+    datasets = {id(member): DataSet(member) for member in recipe.together}
     own = datasets[id(recipe)]
     rows, trained = list(own.shards), {}
     for model in (model for model in recipe.models if model.learns):
@@ -64,9 +64,9 @@ def plan(recipe: Recipe) -> list[Task]:
 
 def _once(parts: Iterable[Shard]) -> list[Shard]:
     """Return each shard once: one of two data sets is made once and lies in both folders."""
-    found: dict[str, Shard] = {}
+    shards: dict[str, Shard] = {}
     for part in parts:
-        if first := found.get(part.id):
+        if first := shards.get(part.id):
             part = first.model_copy(update={"folders": tuple(dict.fromkeys((*first.folders, *part.folders)))})
-        found[part.id] = part
-    return list(found.values())
+        shards[part.id] = part
+    return list(shards.values())

@@ -30,12 +30,7 @@ def chains(tasks: Sequence[Task], seconds: Mapping[str, float]) -> dict[str, flo
 class Ready:
     """The tasks of a run that are not done: a heap of those that can start, and the number of unmet needs of each.
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-        The tasks to do, each after those it needs.
-    finished : iterable of str
-        Ids of tasks that are done; a need that is neither here nor among `tasks` is never met.
+    They come each after those it needs; a need that is neither among them nor `finished` is never met.
     """
 
     def __init__(self, tasks: Sequence[Task], finished: Iterable[str]) -> None:
@@ -56,12 +51,7 @@ class Ready:
     def take(self, slots: int, alone: bool = True) -> list[Task]:
         """Return the tasks to start now: one for each free slot, and one that must be alone only when nothing runs.
 
-        Parameters
-        ----------
-        slots : int
-            Tasks that run at the same time.
-        alone : bool
-            False: only tasks that run beside others are returned.
+        Not `alone`: only tasks that run beside others.
         """
         taken: list[Task] = []
         if self._one_alone in self._running:

@@ -30,38 +30,19 @@ _SECONDS_BETWEEN: Final = 1.0  # two estimates
 
 
 class Schedule(NamedTuple):
-    """A simulated run.
-
-    Attributes
-    ----------
-    workers : int
-        Number of workers.
-    makespan : float
-        Seconds from the first start to the last end.
-    work : float
-        Seconds of all tasks.
-    tail : float
-        Seconds at the end in which not all workers are busy: the straggler tail.
-    """
+    """A simulated run."""
 
     workers: int
     makespan: float
+    """Seconds from the first start to the last end."""
     work: float
+    """Seconds of all tasks."""
     tail: float
+    """Seconds at the end in which not all workers are busy: the straggler tail."""
 
     @classmethod
     def of(cls, tasks: Sequence[Task], seconds: Mapping[str, float], workers: int) -> Schedule:
-        """Simulate a run.
-
-        Parameters
-        ----------
-        tasks : sequence of Task
-            The tasks to do; needs outside them count as done.
-        seconds : mapping
-            Duration of each task, by its id.
-        workers : int
-            Number of workers, each with one task at a time.
-        """
+        """Simulate a run on workers with one task at a time each; needs outside the tasks count as done."""
         own = {task.id for task in tasks}
         ready = Ready(tasks, {need for task in tasks for need in task.needs if need not in own})
         running: list[tuple[float, int, Task]] = []  # with the time of its end
@@ -86,12 +67,12 @@ class Schedule(NamedTuple):
 
 def doublings(tasks: Sequence[Task], seconds: Mapping[str, float]) -> list[Schedule]:
     """Return the schedules of 1, 2, 4, … workers, up to the first number that stops scaling."""
-    found = [Schedule.of(tasks, seconds, 1)]
-    while found[-1].makespan > 0 and found[-1].workers < len(tasks):
-        found.append(Schedule.of(tasks, seconds, 2 * found[-1].workers))
-        if found[-1].makespan > (1 - LEAST_GAIN) * found[-2].makespan:
+    schedules = [Schedule.of(tasks, seconds, 1)]
+    while schedules[-1].makespan > 0 and schedules[-1].workers < len(tasks):
+        schedules.append(Schedule.of(tasks, seconds, 2 * schedules[-1].workers))
+        if schedules[-1].makespan > (1 - LEAST_GAIN) * schedules[-2].makespan:
             break
-    return found
+    return schedules
 
 
 class Estimate:
@@ -125,14 +106,8 @@ class Estimate:
     def seconds_left(self, tasks: Sequence[Task], under_way: Mapping[str, tuple[float, float]], workers: int) -> float:
         """Return how long a run goes on, by a simulation of its schedule, which is renewed now and then.
 
-        Parameters
-        ----------
-        tasks : sequence of Task
-            The tasks that have not ended, each after those it needs.
-        under_way : mapping
-            Of those that have begun the time of the beginning, by `time.monotonic`, and the finished share; by id.
-        workers : int
-            Number of workers.
+        `tasks` have not ended, and each comes after those it needs. `under_way` has, by their ids, when tasks began (by
+        `time.monotonic`) and the finished share.
         """
         now = time.monotonic()
         if not tasks:

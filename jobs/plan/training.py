@@ -45,19 +45,14 @@ class Training(Task):
             groups = {fabric.name: [fabric.name] for fabric in (*recipe.seen, *recipe.unseen)}
         splits = {"train", "validation", *map(set_name, model.options.extra_rows)}
         parts = [part for part in dataset.shards if part.shard.split in splits]
-        rows = {
-            key: tuple(part.id for part in parts if part.shard.fabric.name in names) for key, names in groups.items()
+        read: dict[str, dict[str, Any]] = {
+            key: {"fabrics": names, "shards": [part.id for part in parts if part.shard.fabric.name in names]}
+            for key, names in groups.items()
         }
         return [
             {
-                key: cls(
-                    options=single.options,
-                    training=single.training,
-                    fabrics=tuple(names),
-                    shards=rows[key],
-                    dataset=dataset.folder,
-                )
-                for key, names in groups.items()
+                key: cls(options=single.options, training=single.training, dataset=dataset.folder, **rows)
+                for key, rows in read.items()
             }
             for single in model.single
         ]
@@ -117,10 +112,7 @@ class Training(Task):
     def run(self, out: Path, progress: Progress) -> None:
         """Train; a network from outside in a process that can be ended.
 
-        Raises
-        ------
-        MethodFailed
-            If the code of a network from outside fails.
+        MethodFailed if the code of a network from outside fails.
         """
         if isinstance(self.options, AddedMethod):
             from pipeline.models.added.apart import run_apart

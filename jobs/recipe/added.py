@@ -24,17 +24,10 @@ _BESIDE: Final = ("model", "name", "version", "limit", "training", "seeds", "run
 
 
 class Added:
-    """The methods from outside that a recipe may name.
+    """The methods from outside that a recipe may name, by the values of `--add`.
 
-    Parameters
-    ----------
-    given : sequence of str
-        Values of `--add`: ``module:name``, ``file.py:name``, or the name of an installed method.
-
-    Raises
-    ------
-    BadInput
-        If one cannot be used, is given twice, or has the name of a method of the package.
+    A value is ``module:name``, ``file.py:name``, or the name of an installed method. BadInput if one cannot be used, is
+    given twice, or has the name of a method of the package.
     """
 
     def __init__(self, given: Sequence[str] = ()) -> None:
@@ -49,7 +42,7 @@ class Added:
             method = describe(source, {}, {})
             if isinstance(method, AddedFunction):
                 metric = validated(AddedMetric, method.model_dump(), text)
-                if metric.name in [one.name for one in self.metrics]:
+                if metric.name in [known.name for known in self.metrics]:
                     raise BadInput(ADD, "", text, f"a metric {metric.name!r} is given twice")
                 self.metrics.append(metric)
                 continue
@@ -62,19 +55,8 @@ class Added:
     def entered(self, content: Mapping[str, Any], where: str, all_given: bool) -> dict[str, Any]:
         """Return a recipe's file in which entries of methods from outside have all that the code says of them.
 
-        Parameters
-        ----------
-        content : mapping
-            The file.
-        where : str
-            Its path, for error messages.
-        all_given : bool
-            Enter the methods of `--add` that it does not name.
-
-        Raises
-        ------
-        BadInput
-            If an entry names a method that is neither of the package, nor given, nor installed, or that cannot be used.
+        With `all_given` the methods of `--add` that it does not name are entered too. BadInput if an entry names a
+        method that is neither of the package, nor given, nor installed, or that cannot be used.
         """
         entries = content.get("models", [])
         if not isinstance(entries, list):
@@ -113,7 +95,7 @@ class Added:
 
 def _installed() -> dict[str, str]:
     """Return the methods of installed packages: their source by name."""
-    return {one.name: one.value.replace(" ", "") for one in entry_points(group=GROUP)}
+    return {entry.name: entry.value.replace(" ", "") for entry in entry_points(group=GROUP)}
 
 
 def _unknown(model: str, known: Iterator[str] | Sequence[str]) -> str:

@@ -22,17 +22,9 @@ class _DomainOnly:
 
 
 def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterable[tuple[Fabric, Queries]]) -> float:
-    """Return the share of queries that fall back for a model of a recipe, as a benchmark would measure it.
+    """Return the share of queries that fall back for a model, as a benchmark would measure it; `recipe` trains it.
 
-    Parameters
-    ----------
-    model : ModelRecipe
-        A model of the recipe.
-    recipe : Recipe
-        Recipe of its training data.
-    queries_by_fabric : iterable
-        Fabrics and the queries on each. All queries fall back on a fabric that a model of one material was not
-        trained on.
+    All queries fall back on a fabric that a model of one material was not trained on.
     """
     import numpy as np
 

@@ -27,19 +27,10 @@ MOST_RECIPES: Final = 32
 
 
 def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:
-    """Read a recipe.
+    """Read a recipe of the package by its name, or a TOML file by its path, which ends in ``.toml``.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        Name of a recipe of the package, or path of a TOML file (ending in ``.toml``).
-    add : sequence of str
-        Methods and metrics from outside the package (`jobs.recipe.added`).
-
-    Raises
-    ------
-    BadInput
-        If there is no such recipe, or anything in it, in its fabrics or among `add` cannot be used.
+    Methods and metrics from outside the package are in `add` (`jobs.recipe.added`). BadInput if there is no such
+    recipe, or anything in it, in its fabrics or among `add` cannot be used.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -58,16 +49,16 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
     where = str(path)
 
     def load(name: object, key: str) -> Recipe:
-        found = _beside(path, name, key)
-        if (real := found.resolve()) in read:
+        other = _beside(path, name, key)
+        if (real := other.resolve()) in read:
             return read[real]
-        named = (*chain, path, found)
-        if real in [one.resolve() for one in named[:-1]]:
-            circle = " → ".join(one.stem for one in named)
+        named = (*chain, path, other)
+        if real in [earlier.resolve() for earlier in named[:-1]]:
+            circle = " → ".join(link.stem for link in named)
             raise BadInput(where, key, name, f"recipes must not wait for one another: {circle}")
         if len(chain) + len(read) >= MOST_RECIPES:
             raise BadInput(where, key, name, f"at most {MOST_RECIPES} recipes may be named, directly or through others")
-        read[real] = _load(found, named[:-1], read, added)
+        read[real] = _load(other, named[:-1], read, added)
         return read[real]
 
     content = added.entered(read_toml(path), where, all_given=not chain)
@@ -117,16 +108,16 @@ def _fabrics(names: Sequence[str], recipe: Path, key: str) -> Iterator[Fabric]:
 
 def _with_scenes(bench: BenchOptions, recipe: Path) -> BenchOptions:
     """Return measurements whose scenes are there, paths being found from wherever the recipe is read."""
-    found = []
+    references = []
     for index, name in enumerate(bench.scenes.names):
         path = recipe.parent / name if "\0" not in name else Path()
         if name not in SHIPPED and not (path.suffix in (".toml", ".xml") and path.is_file()):
             allowed = "a scene of the package or the path of a .toml or .xml file beside the recipe is needed; "
             raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed + nearest(name, SHIPPED))
-        found.append(name if name in SHIPPED else str(path.resolve()))
-    scenes = [load_scene(name).name for name in found]
+        references.append(name if name in SHIPPED else str(path.resolve()))
+    scenes = [load_scene(name).name for name in references]
     for index, name in enumerate(scenes):
         if name in scenes[:index]:
             allowed = "names of scenes must differ, because files are called by them"
             raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed)
-    return bench.model_copy(update={"scenes": bench.scenes.model_copy(update={"names": tuple(found)})})
+    return bench.model_copy(update={"scenes": bench.scenes.model_copy(update={"names": tuple(references)})})

@@ -158,28 +158,12 @@ class RecipeFile(Frozen):
 
 @dataclass(frozen=True)
 class Recipe:
-    """A whole piece of work, validated, with its fabrics loaded.
-
-    Attributes
-    ----------
-    name, about : str
-        Names the data set and the page; a sentence for `twillight list`.
-    dataset : DatasetOptions
-        Rows, queries and truth.
-    models : tuple of ModelRecipe
-        Designs and trainings.
-    bench : BenchOptions
-        Measurements.
-    seen, population, unseen, unseen_population : tuple of Fabric
-        The fabrics in the order of the recipe.
-    trained_by : mapping
-        From the names of models that another recipe trains to that recipe.
-    metrics : tuple of AddedMetric
-        Metrics from outside (`jobs.recipe.added`).
-    """
+    """A whole piece of work, validated, with its fabrics loaded in their order."""
 
     name: str
+    """Names the data set and the page."""
     about: str
+    """A sentence for `twillight list`."""
     dataset: DatasetOptions
     models: tuple[ModelRecipe, ...]
     bench: BenchOptions
@@ -188,7 +172,9 @@ class Recipe:
     unseen: tuple[Fabric, ...]
     unseen_population: tuple[Fabric, ...]
     trained_by: Mapping[str, Recipe] = field(default_factory=dict)
+    """From the names of models that another recipe trains to that recipe."""
     metrics: tuple[AddedMetric, ...] = ()
+    """Metrics from outside (`jobs.recipe.added`)."""
 
     @property
     def by_role(self) -> dict[Role, tuple[Fabric, ...]]:

@@ -28,26 +28,9 @@ def with_trained_by(
 ) -> tuple[dict[str, Any], dict[str, Recipe]]:
     """Replace entries of models that another recipe trains by their entries there.
 
-    Parameters
-    ----------
-    content : mapping
-        A recipe's file.
-    where : str
-        Path of the recipe, for error messages.
-    load : callable
-        Returns the recipe of a name, which stands at a key of the file.
-
-    Returns
-    -------
-    dict
-        The file with those entries written out.
-    dict
-        From the name of each such model to the recipe that trains it.
-
-    Raises
-    ------
-    BadInput
-        If there is no such recipe or no such model in it, nothing to train, or another key than `_KEYS`.
+    Return the file with those entries written out, and the recipe that trains each such model, by the model's name.
+    `load` returns the recipe of a name, which stands at a key of the file. BadInput if there is no such recipe or no
+    such model in it, nothing to train, or another key than `_KEYS`.
     """
     entries = content.get("models")
     if not isinstance(entries, list):
@@ -66,10 +49,7 @@ def with_trained_by(
 def check_trained_by(recipe: Recipe, where: str) -> None:
     """Check that models which another recipe trains can be measured beside this one's.
 
-    Raises
-    ------
-    BadInput
-        If the physics or a fabric of the same name differs, or a general model's fabrics do not fit.
+    BadInput if the physics or a fabric of the same name differs, or a general model's fabrics do not fit.
     """
     named = {fabric.name: fabric for fabric in (*recipe.seen, *recipe.unseen)}
     for index, model in enumerate(recipe.models):

@@ -41,13 +41,10 @@ _LEARNT = ("frame", "normaliser", "parallax", "shadows")
 def validate_recipe(recipe: Recipe, where: str) -> None:
     """Check that the sections of a recipe fit together, so that no task is refused in the middle of a run.
 
-    Raises
-    ------
-    BadInput
-        For more shards than `MOST_SHARDS`, names given twice, an unseen draft in the population (also of random unseen
-        fabrics, unless a seen fabric has it), different physics in two tables of truth options, viewers too low for
-        parallax, models that do not know the queries or the physics of the data set, the estimator `node_table` for
-        cloth or queries that it does not know, and live pages of fabrics that it has not.
+    BadInput for more shards than `MOST_SHARDS`, names given twice, an unseen draft in the population (also of random
+    unseen fabrics, unless a seen fabric has it), different physics in two tables of truth options, viewers too low for
+    parallax, models that do not know the queries or the physics of the data set, the estimator `node_table` for cloth
+    or queries that it does not know, and live pages of fabrics that it has not.
     """
     _check_number(recipe, where)
     _check_names(recipe, where)

@@ -11,12 +11,12 @@ import logging
 import multiprocessing
 import os
 import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from jobs.exits import handled
 from pipeline.own_process import ONE_THREAD, interrupts_held
 from weaves.errors import BadInput, WorkFailed
 from weaves.reading import MIB, read_json
@@ -29,21 +29,16 @@ _SECONDS_FOR_A_WORKER: Final = 60  # a cluster that adapts starts one when there
 
 
 class Scheduler(NamedTuple):
-    """A running scheduler.
-
-    Attributes
-    ----------
-    address : str
-        Its address, or the path of the file that it was started with (``dask scheduler --scheduler-file``); empty: a
-        cluster on this machine.
-    ca, certificate, key : str
-        Files for TLS: certificate of the authority, and this client's own certificate and key; empty: none.
-    """
+    """A running scheduler, and files for TLS."""
 
     address: str = ""
+    """Or the path of its ``--scheduler-file``; empty: a cluster on this machine."""
     ca: str = ""
+    """Certificate of the authority; empty: none."""
     certificate: str = ""
+    """Certificate of this client."""
     key: str = ""
+    """Private key of this client."""
 
 
 HERE: Final = Scheduler()
@@ -54,14 +49,8 @@ HERE: Final = Scheduler()
 def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) -> Iterator[Any]:
     """Connect to a scheduler, or start a cluster of so many workers that ends with this process.
 
-    `say` receives a sentence when a scheduler has no worker yet.
-
-    Raises
-    ------
-    BadInput
-        If no scheduler answers, or it has no worker.
-    WorkFailed
-        If the processes of the cluster on this machine cannot start, or the scheduler is lost within the block.
+    `say` receives a sentence when a scheduler has no worker yet. BadInput if no scheduler answers, or it has no worker;
+    WorkFailed if the processes of the cluster on this machine cannot start, or the scheduler is lost within the block.
     """
     # Before dask is imported, and inherited by workers: it reports every shutdown as a warning.
     os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "critical")
@@ -128,17 +117,11 @@ async def _answer(address: str, security: Any) -> None:
 @contextmanager
 def _ends_deferred() -> Iterator[None]:
     """Defer SIGTERM and SIGHUP to the end of the block, in this process alone: processes that start within are free."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
     received: list[int] = []
-    numbers = signal.SIGTERM, signal.SIGHUP
-    before = {number: signal.signal(number, lambda number, frame: received.append(number)) for number in numbers}
     try:
-        yield
+        with handled(lambda number, frame: received.append(number), signal.SIGTERM, signal.SIGHUP):
+            yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         if received:
             signal.raise_signal(received[0])
 

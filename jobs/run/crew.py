@@ -41,15 +41,9 @@ _SECONDS_OF_SILENCE: Final = 5.0  # between two looks while kernels are compiled
 class Crew:
     """The workers that may get tasks.
 
-    Parameters
-    ----------
-    client : distributed.Client
-        Client of the scheduler.
-    external : bool
-        True for a scheduler of somebody else: its workers are checked. Those of this run have the driver's software.
-    hear : callable
-        Receives the messages of workers: a dictionary with ``task`` and ``share``, ``sentence``, or ``kernel``. Calls
-        come from a thread of dask's.
+    Those of a scheduler of somebody else (`external`) are checked; those of this run have the driver's software. `hear`
+    receives the messages of workers, a dictionary with ``task`` and ``share``, ``sentence``, or ``kernel``, from a
+    thread of dask's.
     """
 
     def __init__(self, client: Any, external: bool, hear: Callable[[Mapping[str, Any]], None]) -> None:
@@ -72,10 +66,7 @@ class Crew:
     def look(self, now: bool = False) -> None:
         """Ask the scheduler for its workers, once a second at most or `now`, and check those that are new.
 
-        Raises
-        ------
-        WorkFailed
-            If every worker is refused.
+        WorkFailed if every worker is refused.
         """
         if not now and time.monotonic() - self._looked < _SECONDS_BETWEEN_LOOKS:
             return
@@ -84,7 +75,7 @@ class Crew:
         self._checked = {address: why for address, why in self._checked.items() if address in self._threads}
         if new := [address for address in self._threads if address not in self._checked] if self._external else []:
             self._check(new)
-        self.accepted = [one for one in self._threads if not self._external or self._checked.get(one) == ""]
+        self.accepted = [address for address in self._threads if not self._external or self._checked.get(address) == ""]
 
     @property
     def slots(self) -> int:
@@ -135,18 +126,10 @@ class Crew:
             show(len(groups), ())
 
     def start(self, task: Task, out: str, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
-        """Give a task to a worker.
+        """Give a task to a worker, not to one of `avoided` if there is a choice.
 
-        Parameters
-        ----------
-        task : Task
-            The task.
-        out : str
-            Output folder, as every worker must see it.
-        inputs : mapping
-            Hashes of the products that it needs, by path.
-        avoided : collection of str
-            Addresses of workers that do not get it if there is a choice.
+        Every worker must see the output folder as `out`; `inputs` are the hashes of the products that the task needs,
+        by path.
         """
         self._number += 1  # a second try must not get the first one's result
         key = f"{task.stage}-{task.id}-{self._topic}-{self._number}"

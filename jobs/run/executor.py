@@ -61,35 +61,13 @@ def execute(
     console: Console | None = None,
     progress: ProgressForm = "auto",
 ) -> RunSummary:
-    """Run the unfinished tasks of some stages.
+    """Run the unfinished tasks of some stages; what they need of other stages must be done.
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-        The whole plan.
-    ledger : Ledger
-        Ledger of the output folder; every worker must see this folder under its name.
-    stages : sequence of str
-        Stages to work on; what they need of others must be done.
-    scheduler : Scheduler
-        A running dask scheduler; by default a cluster on this machine, which ends with this process.
-    workers : int
-        Worker processes of the local cluster, one thread each; 0: one a core.
-    manifests : sequence of ManifestFile
-        Manifests that list the shards that are made, or taken from another data set. They are whole when a task
-        starts that needs others, and at the end.
-    console : Console, optional
-        Terminal that shows progress.
-    progress : str
-        How it is shown.
-
-    Raises
-    ------
-    BadInput
-        If the number of workers or the scheduler cannot be used.
-    WorkFailed
-        If a needed task of another stage is not done, the workers cannot start or have other software, or the
-        scheduler is lost.
+    Workers of a scheduler must see the ledger's folder under its name; by default a cluster on this machine of so many
+    workers with one thread each, 0: one a core, ends with this process. Manifests list the shards that are made, or
+    taken from another data set; they are whole when a task starts that needs others, and at the end. BadInput if the
+    number of workers or the scheduler cannot be used; WorkFailed if a needed task of another stage is not done, the
+    workers cannot start or have other software, or the scheduler is lost.
     """
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput("--workers", "", workers, f"must be from 0 (one a core) to {MOST_WORKERS}")

@@ -50,28 +50,19 @@ def faults(
 ) -> list[Fault]:
     """Return all faults of a recipe: of its tasks in the order of the plan, then of manifests, then foreign files.
 
-    Parameters
-    ----------
-    recipe : Recipe
-        The recipe.
-    tasks : sequence of Task
-        Its plan.
-    ledger : Ledger
-        Ledger of the output folder.
-    seen : callable
-        Called with the share of the tasks whose products were read.
+    `seen` is called with the share of the tasks whose products were read.
     """
-    found: list[Fault] = []
+    every: list[Fault] = []
     with ThreadPoolExecutor(cores()) as pool:
         for index, of_task in enumerate(pool.map(partial(task_faults, ledger=ledger), tasks)):
-            found += of_task
+            every += of_task
             seen((index + 1) / len(tasks))
-    found = _explained(found, tasks, ledger)
-    unknown = [fault.task for fault in found if fault.task and not ledger.done(fault.task)]
+    every = _explained(every, tasks, ledger)
+    unknown = [fault.task for fault in every if fault.task and not ledger.done(fault.task)]
     bad = {Path(path).name for task in unknown for path in task.products}
-    for one in recipe.together:
-        found += _manifest_faults(ManifestFile(DataSet(one), ledger), ledger.out, bad)
-    return _by_stage(found, tasks) + _foreign(recipe, tasks, ledger, {fault.path for fault in found})
+    for member in recipe.together:
+        every += _manifest_faults(ManifestFile(DataSet(member), ledger), ledger.out, bad)
+    return _by_stage(every, tasks) + _foreign(recipe, tasks, ledger, {fault.path for fault in every})
 
 
 def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
@@ -87,8 +78,8 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
         if isinstance(task, Page):
             return [Fault("outdated", task.products[0], "it was written from other measurements or options", task)]
         return [Fault("missing", note, f"it does not exist, but products of {name} do", task)]
-    found = [_product_fault(ledger, path, receipt.files.get(Path(path).name), task) for path in task.products]
-    wrong = [fault for fault in found if fault]
+    judged = (_product_fault(ledger, path, receipt.files.get(Path(path).name), task) for path in task.products)
+    wrong = [fault for fault in judged if fault]
     if isinstance(task, Page) and task.products[1] not in {fault.path for fault in wrong}:
         wrong += _page_faults(task, ledger)
     if wrong:
@@ -154,13 +145,13 @@ def _manifest_faults(file: ManifestFile, out: Path, bad: set[str]) -> Iterator[F
             yield Fault("missing", where, "it does not exist, although shards of its data set do")
         return
     try:
-        found = Manifest.load(file.folder)
-        whole = path.read_bytes() == found.encoded()
+        manifest = Manifest.load(file.folder)
+        whole = path.read_bytes() == manifest.encoded()
     except BadInput:
         yield Fault("damaged", where, "it is no manifest")
         return
-    listed, done = found.without(bad), expected.without(bad)
-    if not whole or found.model_copy(update={"shards": expected.shards}).encoded() != expected.encoded():
+    listed, done = manifest.without(bad), expected.without(bad)
+    if not whole or manifest.model_copy(update={"shards": expected.shards}).encoded() != expected.encoded():
         yield Fault("damaged", where, "it does not say what the plan says")
     elif not set(listed.shards) <= set(done.shards):
         yield Fault("damaged", where, "it does not say what the receipts say")

@@ -153,13 +153,8 @@ class Ledger:
     def damaged(self, tasks: Sequence[Task], *, anew: bool = False) -> list[Task]:
         """Return those done tasks whose products are damaged, and remove these products.
 
-        Parameters
-        ----------
-        tasks : sequence of Task
-            What a task needs that is about to start, or that has failed.
-        anew : bool
-            Read also products that this process has read or made before. In object storage only then: who fetches a
-            file compares it.
+        With `anew` products are read too that this process has read or made before. In object storage only then: who
+        fetches a file compares it.
         """
         unread = [task for task in tasks if anew or (self.store.is_local and task.id not in self._sound)]
         with ThreadPoolExecutor() as pool:

@@ -55,19 +55,8 @@ def work(
 ) -> Outcome:
     """Do a task, in a process of its own if it measures time, or must not share one with other tasks.
 
-    Parameters
-    ----------
-    task : Task
-        The task.
-    out : Path
-        Place of all products.
-    progress : callable
-        Receives the finished share.
-    inputs : mapping
-        Hashes of the products that it needs, by path; empty if the hash is not known. Read only for object
-        storage.
-    threads : int
-        Tasks that this process may do at the same time.
+    `inputs` are the hashes of the products that it needs, by path, as far as they are known; they are read only for
+    object storage. This process may do as many tasks at the same time as it has `threads`.
     """
     own = task.slots == "all" or (threads > 1 and not task.shares_process)
     start = time.perf_counter()

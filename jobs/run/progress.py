@@ -40,16 +40,9 @@ class Event(NamedTuple):
 class Board:
     """The tasks of a run as they begin, advance and end, in numbers; a context manager that ends what is shown.
 
-    Work is measured by what each task is expected to cost, in seconds on one core.
-
-    Parameters
-    ----------
-    tasks : sequence of Task
-        The tasks to do.
-    estimate : Estimate
-        Knows how long they take, and learns it.
-    show : callable
-        Shows an event, with the numbers after it. Calls come from the driver's thread and from that of its dask client.
+    Work is measured by what each task is expected to cost, in seconds on one core; the estimate learns how long tasks
+    take. `show` receives each event with the numbers after it, from the driver's thread and from that of its dask
+    client.
     """
 
     def __init__(self, tasks: Sequence[Task], estimate: Estimate, show: Callable[[Event, Board], None]) -> None:

@@ -91,12 +91,7 @@ class Store:
     def held(self) -> Iterator[None]:
         """Keep other runs out for as long as this process lives: in object storage, those of this machine and user.
 
-        Raises
-        ------
-        BadInput
-            If the folder cannot be created or written.
-        WorkFailed
-            If another run is at work there.
+        BadInput if the folder cannot be created or written; WorkFailed if another run is at work there.
         """
         try:
             folder = self._lock_folder()

@@ -27,7 +27,7 @@ from weaves.validation import read_toml
 if TYPE_CHECKING:
     from pipeline.truth.invariants import CheckResult
 
-WHERE = "check"
+_WHERE = "check"
 
 
 def check(
@@ -39,17 +39,17 @@ def check(
     on: On = ON,
 ) -> int:
     """Check the files of a recipe, the shards of a data set, or a fabric's ground truth; return the exit code."""
-    found = resolve(subject, add)
-    if isinstance(found, Recipe):
+    meant = resolve(subject, add)
+    if isinstance(meant, Recipe):
         from jobs.verbs import check_recipe
 
         return check_recipe.repair(subject, out, on, add) if repair else check_recipe.check_recipe(subject, out, add)
     if repair:
-        raise BadInput(WHERE, "--repair", subject, "only the files of a recipe can be made again; name a recipe")
-    if isinstance(found, Fabric):
-        _check_fabric(found)
+        raise BadInput(_WHERE, "--repair", subject, "only the files of a recipe can be made again; name a recipe")
+    if isinstance(meant, Fabric):
+        _check_fabric(meant)
         return 0
-    faults = _check_dataset(found)
+    faults = _check_dataset(meant)
     for fault in faults:
         print_error(fault)
     return BadInput.exit_code if faults else 0
@@ -63,14 +63,16 @@ def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:
     file cannot be used.
     """
     presets, recipes = preset_names(), recipe_names()
-    folder = place(subject, WHERE)
+    folder = place(subject, _WHERE)
     if not is_local(folder):
         return folder
     kinds = [("preset", subject in presets), ("recipe", subject in recipes), ("folder", folder.is_dir())]
-    if len(meant := [kind for kind, found in kinds if found]) > 1:
+    if len(meant := [kind for kind, exists in kinds if exists]) > 1:
         # A path with a slash is never the name of a preset or a recipe.
         where = f"{'the folder ./' + subject if 'folder' in meant else 'the path of a .toml file'}"
-        raise BadInput(WHERE, "name", subject, f"is both {' and '.join(meant)}; name {where} by its path, or rename it")
+        raise BadInput(
+            _WHERE, "name", subject, f"is both {' and '.join(meant)}; name {where} by its path, or rename it"
+        )
     match meant:
         case ["folder"]:
             return folder
@@ -80,11 +82,11 @@ def resolve(subject: str, add: Sequence[str] = ()) -> Path | Recipe | Fabric:
             return load_recipe(subject, add)
     if not subject.endswith(".toml"):
         allowed = "a recipe, a folder of a data set or a fabric is needed"
-        raise BadInput(WHERE, "name", subject, f"{allowed}; {nearest(subject, [*recipes, *presets])}")
+        raise BadInput(_WHERE, "name", subject, f"{allowed}; {nearest(subject, [*recipes, *presets])}")
     tables = read_toml(Path(subject)).keys() & {"dataset", "draft"}
     if len(tables) != 1:
-        found = "has both [dataset] and [draft]" if tables else "has neither [dataset] nor [draft]"
-        raise BadInput(subject, "", found, "a recipe has the one, a fabric the other")
+        which = "has both [dataset] and [draft]" if tables else "has neither [dataset] nor [draft]"
+        raise BadInput(subject, "", which, "a recipe has the one, a fabric the other")
     return load_fabric(subject) if "draft" in tables else load_recipe(subject, add)
 
 
@@ -113,7 +115,7 @@ def _check_fabric(fabric: Fabric) -> None:
         value = f"{result.measured:.4g}" + (f" ± {result.standard_error:.1g}" if result.standard_error else "")
         wanted = "–" if result.relation == "reported" else f"{result.relation} {result.expected:g}"
         rows.append((result.name, value, wanted, _holds(result), result.note))
-    broken = {index: "bold red" for index, one in enumerate(results) if one.status == "broken"}
+    broken = {index: "bold red" for index, result in enumerate(results) if result.status == "broken"}
     columns = ("invariant", "value", "should be", "holds", "")
     print_table(columns, rows, text=("should be", "holds", ""), title=fabric.name, styles=broken)
     if broken:

@@ -27,15 +27,15 @@ _HARMLESS: Final = ("missing", "outdated")
 
 def check_recipe(name: str, out: Path, add: Sequence[str] = ()) -> int:
     """Compare the files of a recipe with what its plan needs, print a sentence a fault, and return the exit code."""
-    tasks, found = _found(name, out, add)
-    _print(found, out)
-    if not found:
+    tasks, wrong = _faults_of(name, out, add)
+    _print(wrong, out)
+    if not wrong:
         _print_sound(name, tasks)
-    elif any(fault.kind in ("cut", "damaged") for fault in found):
+    elif any(fault.kind in ("cut", "damaged") for fault in wrong):
         print_lines(f"`twillight check {name} --repair` makes exactly these files again", stderr=True)
-    elif any(fault.kind in _HARMLESS for fault in found):
+    elif any(fault.kind in _HARMLESS for fault in wrong):
         print_lines(f"`twillight run {name}` makes what is missing", stderr=True)
-    return exit_code(found)
+    return exit_code(wrong)
 
 
 def repair(name: str, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> int:
@@ -49,34 +49,34 @@ def repair(name: str, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> in
     if not ledger.exists():
         raise BadInput(str(out), "", "holds no products", f"`twillight run {name}` makes them")
     with ledger.store.held():
-        tasks, found = _found(name, out, add)
-        _print(found, out)
-        for fault in found:
+        tasks, wrong = _faults_of(name, out, add)
+        _print(wrong, out)
+        for fault in wrong:
             _remove(fault, ledger)
     planned, never_run = Counter(task.stage for task in tasks), Counter[str]()
-    for fault in found:
+    for fault in wrong:
         if fault.never_run and fault.task:
             never_run[fault.task.stage] += fault.tasks
-    if any(fault.kind != "foreign" for fault in found):
+    if any(fault.kind != "foreign" for fault in wrong):
         if stages := [stage for stage in STAGES if not 0 < never_run[stage] == planned[stage]]:
             work(name, stages, out, on, add)
-        found = _found(name, out, add)[1]
-        if found:
+        wrong = _faults_of(name, out, add)[1]
+        if wrong:
             print_lines("what is left:", stderr=True)
-            _print(found, out)
-    if not found:
+            _print(wrong, out)
+    if not wrong:
         _print_sound(name, tasks)
-    return exit_code(found)
+    return exit_code(wrong)
 
 
-def exit_code(found: Sequence[Fault]) -> int:
+def exit_code(wrong: Sequence[Fault]) -> int:
     """Return the exit code of faults."""
-    if any(fault.kind not in _HARMLESS for fault in found):
+    if any(fault.kind not in _HARMLESS for fault in wrong):
         return BadInput.exit_code
-    return WorkFailed.exit_code if found else 0
+    return WorkFailed.exit_code if wrong else 0
 
 
-def _found(name: str, out: Path, add: Sequence[str]) -> tuple[list[Task], list[Fault]]:
+def _faults_of(name: str, out: Path, add: Sequence[str]) -> tuple[list[Task], list[Fault]]:
     """Return the plan of a recipe and the faults of its files."""
     recipe = load_recipe(name, add)
     tasks = plan(recipe)
@@ -95,12 +95,12 @@ def _remove(fault: Fault, ledger: Ledger) -> None:
         ledger.store.remove(fault.task.products[0])
 
 
-def _print(found: Sequence[Fault], out: Path) -> None:
+def _print(wrong: Sequence[Fault], out: Path) -> None:
     """Print a sentence a fault, those of damage first, and count the others beyond a number."""
     order = ["damaged", "cut", "odd", "foreign", "outdated", "missing"]
-    found = sorted(found, key=lambda fault: order.index(fault.kind))
-    print_lines(*(f"{out / one.path}: {one.kind}: {one.why}" for one in found[:MOST_SENTENCES]), stderr=True)
-    if more := Counter(fault.kind for fault in found[MOST_SENTENCES:]):
+    ordered = sorted(wrong, key=lambda fault: order.index(fault.kind))
+    print_lines(*(f"{out / fault.path}: {fault.kind}: {fault.why}" for fault in ordered[:MOST_SENTENCES]), stderr=True)
+    if more := Counter(fault.kind for fault in ordered[MOST_SENTENCES:]):
         print_lines(f"and {', '.join(f'{count:,} {kind}' for kind, count in more.items())} more", stderr=True)
 
 

@@ -22,7 +22,7 @@ from weaves.fabric import Fabric, load_fabric
 from weaves.reading import MIB, read_text
 from weaves.validation import validated
 
-WHERE = "evaluate"
+_WHERE = "evaluate"
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ class TruthFlags:
 def _truth_options(chosen: dict[str, Any]) -> TruthOptions:
     """Return the options of the truth; BadInput if one cannot be used, named as it is spelt on the command line."""
     if "estimator" in chosen and chosen["estimator"] not in ESTIMATORS:
-        raise BadInput(WHERE, "--estimator", chosen["estimator"], nearest(chosen["estimator"], ESTIMATORS))
+        raise BadInput(_WHERE, "--estimator", chosen["estimator"], nearest(chosen["estimator"], ESTIMATORS))
     try:
-        return validated(TruthOptions, chosen, WHERE)
+        return validated(TruthOptions, chosen, _WHERE)
     except BadInput as error:
         if not error.key:
             raise
-        raise BadInput(WHERE, _flag(error.key), error.value, error.allowed) from error
+        raise BadInput(_WHERE, _flag(error.key), error.value, error.allowed) from error
 
 
 def evaluate(
@@ -83,12 +83,12 @@ def evaluate(
         threads = one_thread()
         for name, value in (chosen | ({"seed": seed} if seed else {})).items():
             allowed = "leave it out with --model: it is an option of the ground truth"
-            raise BadInput(WHERE, _flag(name), value, allowed)
+            raise BadInput(_WHERE, _flag(name), value, allowed)
         answerer = _model_answerer(model, cloth, extrapolate)
     if not 0 <= workers <= MOST_WORKERS:
-        raise BadInput(WHERE, "--workers", workers, f"must be from 0 (one per core) to {MOST_WORKERS}")
+        raise BadInput(_WHERE, "--workers", workers, f"must be from 0 (one per core) to {MOST_WORKERS}")
     if not 0 <= seed < 2**64:
-        raise BadInput(WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
+        raise BadInput(_WHERE, "--seed", seed, "must be from 0 to 2^64 - 1")
     with progress("evaluating") as advance, threads:
         try:
             summary = evaluate_file(
@@ -122,9 +122,9 @@ def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
     from pipeline.models.named import loaded
     from pipeline.storage import place
 
-    method, kinds = loaded(model, WHERE, "--model")
+    method, kinds = loaded(model, _WHERE, "--model")
     if not method.covers(fabric):
-        raise BadInput(WHERE, "--model", model, f"this model was not trained on {fabric.name}")
+        raise BadInput(_WHERE, "--model", model, f"this model was not trained on {fabric.name}")
     domain = getattr(method, "domain", None)
     if domain is not None and not extrapolate:
         domain.refuse_fabric(fabric, method.name)

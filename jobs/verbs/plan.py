@@ -19,7 +19,7 @@ from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName, Whole
 from pipeline.cores import cores
 from weaves.errors import BadInput
 
-MOST_WORKERS: Final = 100_000
+_MOST_WORKERS: Final = 100_000
 """Workers of a simulated schedule, at most."""
 
 
@@ -59,8 +59,8 @@ def print_plan(
     workers: Annotated[Whole, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
 ) -> None:
     """Print the plan of a recipe; nothing is computed. BadInput if the recipe or the workers cannot be used."""
-    if not 0 <= workers <= MOST_WORKERS:
-        raise BadInput("--workers", "", workers, f"must be from 1 to {MOST_WORKERS}")
+    if not 0 <= workers <= _MOST_WORKERS:
+        raise BadInput("--workers", "", workers, f"must be from 1 to {_MOST_WORKERS}")
     tasks = plan(load_recipe(recipe, add))
     facts = facts_of(tasks, Ledger(out))
     _print_plan(tasks, facts)
@@ -120,13 +120,14 @@ def _print_schedule(tasks: Sequence[Task], facts: Facts, workers: int) -> None:
     Notes below say the time without work for all at the end (tail), where it stops scaling, and what was measured.
     """
     left = facts.left(tasks)
-    schedules = {one.workers: one for one in doublings(tasks, facts.seconds)}
+    schedules = {schedule.workers: schedule for schedule in doublings(tasks, facts.seconds)}
     last = max(schedules)
     chosen = schedules[workers] = Schedule.of(tasks, facts.seconds, workers)
     rows = []
-    for count, one in sorted(schedules.items()):
+    for count, schedule in sorted(schedules.items()):
         rest = duration(Schedule.of(left, facts.seconds, count).makespan)
-        rows.append((f"{count:,}", duration(one.makespan), rest, f"{one.efficiency:.0%}", duration(one.tail)))
+        whole, tail = duration(schedule.makespan), duration(schedule.tail)
+        rows.append((f"{count:,}", whole, rest, f"{schedule.efficiency:.0%}", tail))
     notes = (
         f"{workers:,} workers: {duration(chosen.makespan)}, of which the last {duration(chosen.tail)} with idle "
         "workers (tail)",

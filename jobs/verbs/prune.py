@@ -93,7 +93,7 @@ def _needed(recipes: Sequence[str], add: Sequence[str], out: Path, every: Iterab
         recipe = load_recipe(name, add)
         tasks = plan(recipe)
         needed.update(own_files(recipe, tasks, out))
-        ids = {task.id for task in tasks} | {part.id for one in recipe.together for part in DataSet(one).shards}
+        ids = {task.id for task in tasks} | {part.id for member in recipe.together for part in DataSet(member).shards}
         needed.update(f"ledger/{id}{ending}" for id in ids for ending in (".json", ".failed.json"))
         # What a stopped training goes on from.
         folders = {task.folder for task in tasks if hasattr(task, "folder")}

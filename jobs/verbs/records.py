@@ -146,13 +146,13 @@ def merge_records(
     _print_times(joined.records, names)
     for index, (name, machine) in enumerate(zip(names, machines, strict=True)):
         print_lines(f"{_letter(index)}: {name}, {machine.date}")
-    said = f"{len(joined.records):,} Records of {len(names)} machines; {joined.shared:,} are alike and kept once"
-    print_lines(f"{out}: {said}")
+    alike = f"{joined.shared:,} are alike and kept once"
+    print_lines(f"{out}: {len(joined.records):,} Records of {len(names)} machines; {alike}")
     if joined.unlike:
         a, b = joined.unlike[0]
         what = " ".join(filter(None, (a.metric, "of", a.method, a.setting, a.fabric or a.scene)))
-        said = f"{len(joined.unlike):,} numbers differ and both are kept, such as {what}"
-        print_lines(f"{said}: {a.value:g} and {b.value:g}")
+        unlike = f"{len(joined.unlike):,} numbers differ and both are kept"
+        print_lines(f"{unlike}, such as {what}: {a.value:g} and {b.value:g}")
 
 
 def _print_times(records: Sequence[Record], names: Sequence[str]) -> None:

@@ -33,7 +33,7 @@ from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 from weaves.validation import validated
 
-WHERE: Final = "render"
+_WHERE: Final = "render"
 
 MOST_FRAMES: Final = 100_000
 """Most frames of a film."""
@@ -64,14 +64,14 @@ def look(
 ) -> RenderLook:
     """Return how a picture is made, from the command line; BadInput if a value cannot be used."""
     if samples not in (squares := [side**2 for side in range(1, MOST_SAMPLES + 1)]):
-        raise BadInput(WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")
+        raise BadInput(_WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")
     try:
-        options = validated(SceneOptions, {"environment_directions": directions, "bounces": bounces}, WHERE)
+        options = validated(SceneOptions, {"environment_directions": directions, "bounces": bounces}, _WHERE)
     except BadInput as error:
-        raise BadInput(WHERE, "--directions", directions, error.allowed) from error
+        raise BadInput(_WHERE, "--directions", directions, error.allowed) from error
     if not -STOPS <= exposure <= STOPS:
-        raise BadInput(WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
-    film = size_of(size, WHERE) if size else None
+        raise BadInput(_WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
+    film = size_of(size, _WHERE) if size else None
     return RenderLook(film, round(samples**0.5), options, tone, exposure)
 
 
@@ -104,9 +104,9 @@ def render(
     suffice.
     """
     how = look(size, samples, directions, tone, exposure, bounces)
-    found = dressed(load_scene(scene), fabric)
+    dressed_scene = dressed(load_scene(scene), fabric)
     start = time.monotonic()
-    maker = make(found, method, _frames(frames, found, out), how, out)
+    maker = make(dressed_scene, method, _frames(frames, dressed_scene, out), how, out)
     width, height = maker.size
     share = "" if method == "truth" else f"; {maker.share:.0%} of the queries by the fallback"
     print_lines(f"{out}: {width} x {height}, {duration(time.monotonic() - start)}{share}")
@@ -118,16 +118,16 @@ def make(scene: Scene, method: str, frames: int, how: RenderLook, out: Path) -> 
     from pipeline.models.fallback import Fallback
     from pipeline.models.named import TRUTH, named_method
 
-    answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, WHERE, "--method")
+    answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, _WHERE, "--method")
     loaded = load(scene, how.options)
     if isinstance(answerer, Fallback):
         for _, fabric in loaded.cloths.values():
             if not answerer.covers(fabric):
-                raise BadInput(WHERE, "--method", method, f"this model was not trained on {fabric.name}")
+                raise BadInput(_WHERE, "--method", method, f"this model was not trained on {fabric.name}")
             answerer.prepare(fabric)
     size = how.size or loaded.camera.size
     if out.suffix == ".mp4" and (size[0] % 2 or size[1] % 2):
-        raise BadInput(WHERE, "--size", f"{size[0]}x{size[1]}", "both sides of a film must be even")
+        raise BadInput(_WHERE, "--size", f"{size[0]}x{size[1]}", "both sides of a film must be even")
     refuse_unwritable(out if out.suffix else out / "frame")
     maker = FilmMaker(loaded, answerer, size, how, frames)
     try:
@@ -146,7 +146,7 @@ def dressed(scene: Scene, fabrics: Sequence[str]) -> Scene:
     keys = list(worn(scene))
     if len(fabrics) > len(keys):
         allowed = f"the scene {scene.name} has {len(keys)}: {', '.join(keys) or 'none'}"
-        raise BadInput(WHERE, "--fabric", fabrics[len(keys)], f"is one fabric more than cloths; {allowed}")
+        raise BadInput(_WHERE, "--fabric", fabrics[len(keys)], f"is one fabric more than cloths; {allowed}")
     cloths = dict(scene.cloths)
     for key, name in zip(keys, fabrics, strict=False):
         load_fabric(name)
@@ -157,14 +157,14 @@ def dressed(scene: Scene, fabrics: Sequence[str]) -> Scene:
 def _frames(frames: int | None, scene: Scene, out: Path) -> int:
     """Return the number of frames; BadInput if it does not go with the file."""
     if out.suffix not in (".png", ".exr", ".mp4", ""):
-        raise BadInput(WHERE, "--out", str(out), "must end in .png, .exr or .mp4, or be a folder without a suffix")
+        raise BadInput(_WHERE, "--out", str(out), "must end in .png, .exr or .mp4, or be a folder without a suffix")
     if frames is not None and not 1 <= frames <= MOST_FRAMES:
-        raise BadInput(WHERE, "--frames", frames, f"must be from 1 to {MOST_FRAMES}")
+        raise BadInput(_WHERE, "--frames", frames, f"must be from 1 to {MOST_FRAMES}")
     if out.suffix == ".mp4":
-        refuse_missing(WHERE, "--out", out)
+        refuse_missing(_WHERE, "--out", out)
     if out.suffix in (".png", ".exr"):
         if frames is not None and frames > 1:
-            raise BadInput(WHERE, "--frames", frames, f"{out.suffix} holds one frame; name an .mp4 file or a folder")
+            raise BadInput(_WHERE, "--frames", frames, f"{out.suffix} holds one frame; name an .mp4 file or a folder")
         return 1
     return scene.frames if frames is None else frames
 

@@ -159,13 +159,13 @@ def _queries_of(
 
 def _options(changes: Iterable[str]) -> dict[str, Any]:
     """Return options from ``key = value`` in TOML."""
-    found: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     for change in changes:
         try:
-            found |= parse_toml(change[:MOST_TEXT], "require")
+            options |= parse_toml(change[:MOST_TEXT], "require")
         except BadInput as error:
             raise BadInput("require", "--set", change, "must be KEY=VALUE as in TOML, such as hidden=64") from error
-    return found
+    return options
 
 
 def _fallback_share(model: ModelRecipe, by_fabric: Iterable[tuple[Fabric, Queries]], general: Recipe) -> float | None:

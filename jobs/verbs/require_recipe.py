@@ -55,31 +55,11 @@ def write_recipe(
 ) -> None:
     """Write the recipe of one method in the scene's domain, and load it to check it.
 
-    Parameters
-    ----------
-    path : Path
-        File to write.
-    requirement : Requirement
-        Requirements of the scene.
-    general : Recipe
-        Recipe that has the method, truth and training.
-    method, setting : str
-        The method, by its name there, and its setting; empty for all of its settings.
-    scene : str
-        Name of a scene of the package, or path of one, from the current folder.
-    fabrics : mapping
-        For each fabric's name its reference, a preset or a path from the current folder, and the fabric.
-    effort : float
-        Share of the training rows a fabric and of the steps, > 0; 1: all of them.
-    options : mapping
-        Options of the model that are other than in the general recipe, such as a smaller width.
-    add : sequence of str
-        Methods from outside the package that the general recipe was loaded with.
-
-    Raises
-    ------
-    BadInput
-        If the model has no such options, or the recipe cannot be used.
+    `general` has the method, truth and training, and was loaded with the methods `add` from outside; `setting` is empty
+    for all settings of the method. A scene, and the reference beside each fabric by the fabric's name, is a name or a
+    path from the current folder. `effort` is the share of the training rows a fabric and of the steps, > 0; `options`
+    are those of the model that are other than in the general recipe. BadInput if the model has no such options, or the
+    recipe cannot be used.
     """
     model = next(model for model in general.models if model.options.name == method)
     named = Added(add).model_of(model.options) if isinstance(model.options, AddedMethod) else model.options.model
@@ -130,10 +110,10 @@ def savings(path: Path, general: Recipe, add: Sequence[str] = ()) -> str:
     own = load_recipe(path, add)
     same = alone(general, {model.options.name for model in own.models})
     (rows, learnt), (rows_general, learnt_general) = effort_of(own), effort_of(same)
-    said = f"{rows:,} rows to generate in place of {rows_general:,} ({rows_general / rows:.1f} times fewer)"
+    generated = f"{rows:,} rows to generate in place of {rows_general:,} ({rows_general / rows:.1f} times fewer)"
     times = learnt_general / learnt if learnt else 0.0
     training = f"{learnt:,} queries to learn from in place of {learnt_general:,} ({times:.1f} times)"
-    return f"Against {general.name} with this method alone: {said}, {training if learnt else 'nothing to train'}."
+    return f"Against {general.name} with this method alone: {generated}, {training if learnt else 'nothing to train'}."
 
 
 def _rows(general: Recipe, effort: float) -> dict[str, int]:
@@ -174,8 +154,8 @@ def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:
 
 def _baseline(general: Recipe, method: str) -> list[dict[str, Any]]:
     """Return point sampling with 2 points, the baseline, if the general recipe has it."""
-    found = [model for model in general.models if model.options.name == _BASELINE != method]
-    return [{"model": _BASELINE} | _model(model, [2], 1.0) for model in found]
+    baselines = [model for model in general.models if model.options.name == _BASELINE != method]
+    return [{"model": _BASELINE} | _model(model, [2], 1.0) for model in baselines]
 
 
 def _model(
@@ -202,8 +182,8 @@ def _model(
 def _bench(general: Recipe, scene: str) -> dict[str, Any]:
     """Return the general recipe's measurements, of this scene and of the method as it is."""
     bench = general.bench.model_copy(update={"bounds": False, "runtimes": ()})
-    found = bench.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
-    return found | {"scenes": found.get("scenes", {}) | {"names": [scene]}}
+    measurements = bench.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    return measurements | {"scenes": measurements.get("scenes", {}) | {"names": [scene]}}
 
 
 def _beside(path: Path, reference: str) -> str:

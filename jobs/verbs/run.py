@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from jobs.plan.dataset import DataSet
@@ -18,29 +18,17 @@ from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out, RecipeName, Wo
 from weaves.errors import WorkFailed
 
 
-def generate(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
-    """Compute the ground truth: the shards of a recipe's data set."""
-    work(recipe, ["generate"], out, on, add)
+def _verb(*stages: Stage) -> Callable[..., None]:
+    """Return the function of the verb that runs some stages of a recipe."""
+
+    def verb(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+        work(recipe, stages, out, on, add)
+
+    return verb
 
 
-def train(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
-    """Train the models of a recipe on its data set."""
-    work(recipe, ["train"], out, on, add)
-
-
-def bench(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
-    """Measure error, aliasing and time of every method."""
-    work(recipe, ["bench"], out, on, add)
-
-
-def report(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
-    """Write the page: pictures, tables and plots of all measurements."""
-    work(recipe, ["report"], out, on, add)
-
-
-def run(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
-    """Generate, train, bench and report; finished tasks are skipped."""
-    work(recipe, STAGES, out, on, add)
+generate, train, bench, report = map(_verb, STAGES)
+run = _verb(*STAGES)
 
 
 def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
@@ -54,7 +42,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
     page = next(task for task in tasks if isinstance(task, Page))
     ledger = Ledger(out)
     with ledger.store.held():
-        manifests = [ManifestFile(DataSet(one), ledger) for one in recipe.together]
+        manifests = [ManifestFile(DataSet(member), ledger) for member in recipe.together]
         for manifest in manifests:
             manifest.save()  # whatever its file holds now
         if "bench" in stages:
@@ -79,7 +67,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
         print_lines("", f"the page: {(out / page.products[0]).resolve()}")
     if summary.failed:
         first, *others = summary.failed
-        flags = "".join(f" --add {one}" for one in add)
+        flags = "".join(f" --add {source}" for source in add)
         more = f"; {len(others)} more failed" if others else ""
         waiting = f"; {len(summary.waiting)} tasks wait for what failed" if summary.waiting else ""
         raise WorkFailed(

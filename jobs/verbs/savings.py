@@ -39,7 +39,7 @@ from weaves.errors import BadInput
 ENOUGH: Final = 3.0
 """Least factor by which a scene's recipe should reduce rows and training."""
 
-MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")
+_MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")
 """Records of a method on a scene that are held side by side."""
 
 DIFFERENCE: Final = "mse, own less general"
@@ -103,7 +103,7 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[s
     own = load_recipe(path, add)
     model = own.models[0]
     name, worn = model.options.name, {fabric.name for fabric in own.seen}
-    same = next((one for one in general.models if one.options.name == name), None)
+    same = next((model_there for model_there in general.models if model_there.options.name == name), None)
     if same is None:
         raise BadInput(str(path), "models.0.name", name, f"{general.name} has no such method; require the scene again")
     both = []
@@ -130,7 +130,7 @@ def conclusion(rows: Sequence[SceneSaving]) -> str:
         low, high = by[DIFFERENCE].narrow[1:]
         proven = "less" if (high or 0.0) < 0.0 else "more" if (low or 0.0) > 0.0 else "no difference shown"
         ratio += f", paired: {proven}"
-    most = max(one.ratio for one in (generated, learnt) if not math.isnan(one.ratio))
+    most = max(saving.ratio for saving in (generated, learnt) if not math.isnan(saving.ratio))
     short = "" if most >= ENOUGH else f"; less than {ENOUGH:g} times"
     return f"{rows[0].scene}, {rows[0].method}: {', '.join(fewer)}; {ratio}{short}."
 
@@ -171,14 +171,14 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
         raise BadInput("savings", "recipe", page, f"it has no page in {out / 'report'}; `twillight run {run}` first")
     records = mean_over_seeds(read_records([path]))
     here = [record for record in records if record.scene == scene and not record.fabric]
-    found = {record.metric: record for record in here if (record.method, record.setting) == (method, setting)}
-    if lacking := [metric for metric in MEASURED if metric not in found]:
+    by_metric = {record.metric: record for record in here if (record.method, record.setting) == (method, setting)}
+    if lacking := [metric for metric in _MEASURED if metric not in by_metric]:
         allowed = f"the page of {page} has no {lacking[0]} of {method} there; `twillight run {run}`"
         raise BadInput("savings", "scene", scene, allowed)
-    measured = [found[metric] for metric in MEASURED]
+    measured = [by_metric[metric] for metric in _MEASURED]
     values = {(record.metric, record.unit): Value(record.value, record.low, record.high) for record in measured}
-    base = [one.value for one in here if (one.method, one.setting) == BASELINE and one.metric == "frame_time"]
-    relative = found["frame_time"].value / base[0] if base else math.nan
+    base = [r.value for r in here if (r.method, r.setting) == BASELINE and r.metric == "frame_time"]
+    relative = by_metric["frame_time"].value / base[0] if base else math.nan
     return values | {("frame_time over 2 points", "1"): Value(relative)}
 
 

@@ -26,12 +26,8 @@ def write_bsdf(fabric: Fabric, path: Path, solar: str = "", points: int = PAIR_P
     """Write the Klems matrices of a fabric, and return a sentence on them; the sun meets its front, z > 0.
 
     `solar` names the same cloth in the colours of the solar band; the file has the visible band there without it.
-    `points` are those of a pair of patches, a power of two up to `MOST_PAIR_POINTS`.
-
-    Raises
-    ------
-    BadInput
-        If a number, the path or the other fabric cannot be used.
+    `points` are those of a pair of patches, a power of two up to `MOST_PAIR_POINTS`. BadInput if a number, the path or
+    the other fabric cannot be used.
     """
     if points not in {2**k for k in range(MOST_PAIR_POINTS.bit_length())}:
         raise BadInput("export", "points", points, f"a power of two from 1 to {MOST_PAIR_POINTS} is needed")

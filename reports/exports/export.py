@@ -37,12 +37,8 @@ EXPORTS: Final = {
 def export(fabric: Fabric, kind: str, path: Path, /, **options: Any) -> str:
     """Write a fabric as one of `EXPORTS` to a file or folder, and return a sentence on what was written.
 
-    Options that are left out have the defaults of the kind.
-
-    Raises
-    ------
-    BadInput
-        If an option, the path or the fabric cannot be used; `where` is ``export`` and `key` the option or the kind.
+    Options that are left out have the defaults of the kind. BadInput if an option, the path or the fabric cannot be
+    used; `where` is ``export`` and `key` the option or the kind.
     """
     module, name = EXPORTS[kind].writer.split(":")
     write = getattr(import_module(module), name)
@@ -57,10 +53,7 @@ def export(fabric: Fabric, kind: str, path: Path, /, **options: Any) -> str:
 def write_draft(fabric: Fabric, path: Path) -> str:
     """Write a fabric as a draft that weaving programs read, and return a sentence on it.
 
-    Raises
-    ------
-    BadInput
-        If the fabric needs more ends or picks than a file may have.
+    BadInput if the fabric needs more ends or picks than a file may have.
     """
     atomic_write(path, wif_text(fabric).encode())
     content = "structure and colours" if fabric.yarns_per_cm is None else "structure, colours, spacing and thickness"

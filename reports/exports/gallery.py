@@ -47,12 +47,7 @@ def write_fabric(fabric: Fabric, site: Path, size: int, languages: Sequence[str]
     """Write the files of a fabric into the folder of its name, and return its card.
 
     `size` counts the texels of the longer side of maps, `languages` are those of the shader beside Slang; the live page
-    has no tiles.
-
-    Raises
-    ------
-    BadInput
-        If a number, a language or the fabric cannot be used; as `reports.exports.export.export`.
+    has no tiles. BadInput if a number, a language or the fabric cannot be used; as `reports.exports.export.export`.
     """
     name = fabric.name
     home = site / name

@@ -115,12 +115,8 @@ YARN_ID: Final[tuple[Kind, str]] = (
 def write_maps(fabric: Fabric, folder: Path, size: int = 2048) -> str:
     """Write the maps of a fabric, whole or not at all, and return a sentence on them.
 
-    Maps of before are replaced (`pipeline.folders`); `size` counts the texels of the longer side.
-
-    Raises
-    ------
-    BadInput
-        If the size, the folder or a missing library allows no maps.
+    Maps of before are replaced (`pipeline.folders`); `size` counts the texels of the longer side. BadInput if the size,
+    the folder or a missing library allows no maps.
     """
     for library in ("MaterialX", "pygltflib"):
         if find_spec(library) is None:

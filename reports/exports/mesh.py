@@ -26,13 +26,9 @@ MOST_TRIANGLES: Final = 50_000_000
 def write_mesh(fabric: Fabric, path: Path, vertices: int = 64, repeats: int = 1) -> str:
     """Write a cloth as one PLY file, whole or not at all, and return a sentence on it.
 
-    Every yarn has `vertices` steps across it, and along it in every cell of the draft, >= 2; there are `repeats`
-    copies of the repeat along x and along y, >= 1.
-
-    Raises
-    ------
-    BadInput
-        If a number or the path cannot be used, or more than `MOST_TRIANGLES` would be needed.
+    Every yarn has `vertices` steps across it, and along it in every cell of the draft, >= 2; there are `repeats` copies
+    of the repeat along x and along y, >= 1. BadInput if a number or the path cannot be used, or more than
+    `MOST_TRIANGLES` would be needed.
     """
     for key, value, least in (("vertices", vertices, 2), ("repeats", repeats, 1)):
         if value < least:

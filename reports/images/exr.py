@@ -47,20 +47,11 @@ def write_exr(
     half: Collection[str] = (),
     durable: bool = True,
 ) -> None:
-    """Write a picture whole or not at all.
+    """Write a picture, ending in ``.exr``, whole or not at all.
 
-    Parameters
-    ----------
-    path : Path
-        Ends in ``.exr``.
-    channels : mapping of array_like (H, W)
-        Planes by name, such as ``R``, ``G``, ``B``, ``A``; ``layer.R`` belongs to a layer.
-    attributes : mapping, optional
-        Metadata; names may not be those that OpenEXR itself uses.
-    half : collection of str
-        Channels that are stored as float16; the others are float32.
-    durable : bool
-        As for `pipeline.atomic.atomic_path`.
+    Channels are planes (H, W) by name, such as ``R``, ``G``, ``B``, ``A``; ``layer.R`` belongs to a layer. Those in
+    `half` are stored as float16. Names of attributes may not be those that OpenEXR itself uses. `durable` is as for
+    `pipeline.atomic.atomic_path`.
     """
     kinds = {name: np.float16 if name in half else np.float32 for name in channels}
     planes = {name: np.ascontiguousarray(plane, dtype=kinds[name]) for name, plane in channels.items()}

@@ -30,18 +30,10 @@ _HALF: Final = ("colour", "direction", "share")
 
 
 def write_texture(path: Path, plane: npt.NDArray[Any], kind: Kind, span: tuple[float, float] = (0.0, 1.0)) -> None:
-    """Write a map as `path`.exr and `path`.png.
+    """Write a map as `path`.exr and `path`.png, in a folder that exists.
 
-    Parameters
-    ----------
-    path : Path
-        Without a suffix; its folder exists.
-    plane : (H, W) or (H, W, 3); shares also (H, W, 4)
-        Values; directions as unit vectors.
-    kind : str
-        What the values are.
-    span : two floats
-        Of heights: the lowest and the highest.
+    The plane is (H, W) or (H, W, 3), shares also (H, W, 4); directions are unit vectors. `span` is the lowest and the
+    highest of heights.
     """
     values = 0.5 + 0.5 * plane if kind == "direction" else plane
     shown = values[::-1]

@@ -148,16 +148,6 @@ STOPS: Final = 20.0
 
 
 def displayed(linear: npt.NDArray[np.floating], tone: Tone = "srgb", exposure: float = 0.0) -> Bytes8:
-    """Return linear RGB (…, 3) as sRGB codes.
-
-    Parameters
-    ----------
-    linear : float (…, 3)
-        Linear RGB, at least 0.
-    tone : str
-        Name of the curve.
-    exposure : float
-        Stops above the exposure of the page.
-    """
+    """Return linear RGB (…, 3), at least 0, as sRGB codes; `exposure` counts stops above that of the page."""
     rgb = EXPOSURE * 2.0**exposure * np.asarray(linear, np.float64)
     return encoded(rgb if tone == "srgb" else rgb / (1.0 + (rgb @ np.array(LUMINANCE))[..., None]))

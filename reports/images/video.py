@@ -23,18 +23,9 @@ def refuse_missing(where: str, key: str, path: Path) -> None:
 
 
 def write_film(path: Path, frames: Iterable[Bytes8], size: tuple[int, int], rate: int) -> None:
-    """Write a film whole or not at all.
+    """Write a film, ending in ``.mp4``, whole or not at all.
 
-    Parameters
-    ----------
-    path : Path
-        Ends in ``.mp4``.
-    frames : iterable of uint8 (H, W, 3)
-        sRGB codes.
-    size : (int, int)
-        Width and height; both even.
-    rate : int
-        Frames a second.
+    Frames are sRGB codes (H, W, 3) of the `size` width and height, both even; `rate` counts frames a second.
     """
     import av
     from av.video.reformatter import ColorRange, Colorspace

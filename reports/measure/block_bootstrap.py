@@ -37,7 +37,7 @@ def block_interval(rows: Float64, mask: Mask, options: ImageOptions) -> tuple[fl
     """
     block = blocks(mask, options.block)
     sums, counts = np.bincount(block, rows), np.bincount(block).astype(np.float64)
-    found = stats.bootstrap(
+    bootstrap = stats.bootstrap(
         (sums, counts),
         lambda a, b, axis: a.sum(axis=axis) / b.sum(axis=axis),
         paired=True,
@@ -47,7 +47,8 @@ def block_interval(rows: Float64, mask: Mask, options: ImageOptions) -> tuple[fl
         method="percentile",
         rng=np.random.default_rng(options.seed),
     )
-    return float(found.standard_error), float(found.confidence_interval.low), float(found.confidence_interval.high)
+    ends = bootstrap.confidence_interval
+    return float(bootstrap.standard_error), float(ends.low), float(ends.high)
 
 
 def blocks(mask: Mask, side: int) -> npt.NDArray[np.intp]:

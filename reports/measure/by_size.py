@@ -42,10 +42,10 @@ MEASURES: Final[dict[str, tuple[Metric, Float64]]] = {
 }
 """Measured quantities: the Record's metric and the colour of each component."""
 
-LONGEST: Final = 0.02
+_LONGEST: Final = 0.02
 """Seconds that a timed call of one class, over its fabrics, should not exceed by much."""
 
-FEWEST: Final = 512
+_FEWEST: Final = 512
 """Least queries a fabric in such a call: the fixed cost of a call must not count as the cost of queries."""
 
 
@@ -58,23 +58,22 @@ def measure_by_size(
     """Measure errors and times of methods on held-out queries, one class of footprints after the other.
 
     Errors are of all queries of a class. Timed are calls on one thread about every fabric that the method covers, of as
-    many queries as `LONGEST` allows. The time over all classes weighs them as they occur. A Record's curve holds (lower
-    edge of the class, value); its value is that over all classes. `progress` receives the finished share.
+    many queries as `_LONGEST` allows. The time over all classes weighs them as they occur. The curve of a Record has
+    (lower edge of the class, value); its value is that over all classes. `progress` receives the finished share.
     """
     classes, shares = _classes(fabrics)
-    methods = [
-        one for one in methods if any(one.covers(cloth) for members in classes.values() for cloth, _, _ in members)
-    ]
+    cloths = [cloth for members in classes.values() for cloth, _, _ in members]
+    methods = [method for method in methods if any(map(method.covers, cloths))]
     times: dict[int, list[tuple[float, float]]] = {index: [] for index in range(len(methods))}
     for done, (low, members) in enumerate(classes.items()):
         progress(done / len(classes))
         contenders = []
         for method in methods:
-            own = [one for one in members if method.covers(one[0])]
+            own = [member for member in members if method.covers(member[0])]
             for cloth, _, _ in own:
                 method.prepare(cloth)
             drawn = [(cloth, queries) for cloth, queries, _ in own]
-            contenders.append(affordable(Contender(method.predict, drawn), LONGEST, FEWEST))
+            contenders.append(affordable(Contender(method.predict, drawn), _LONGEST, _FEWEST))
         timings = time_side_by_side(
             contenders,
             options.timing_repeats,
@@ -119,7 +118,7 @@ def _errors(
     curves: dict[str, list[tuple[float, float]]] = {name: [] for name in MEASURES}
     count = 0
     for low, members in classes.items():
-        own = [one for one in members if method.covers(one[0])]
+        own = [member for member in members if method.covers(member[0])]
         count += sum(len(queries.u) for _, queries, _ in own)
         for cloth, _, _ in own:
             method.prepare(cloth)
@@ -128,8 +127,8 @@ def _errors(
             for cloth, queries, _ in own
         ]
         for name, (_, weights) in MEASURES.items():
-            found = [colour_error(v, truth, weights, resamples=0) for v, (_, _, truth) in zip(values, own, strict=True)]
-            curves[name].append((low, float(np.mean([e.relative_rmse for e in found if e.mean > 0] or [0.0]))))
+            errors = [colour_error(v, part.truth, weights, resamples=0) for v, part in zip(values, own, strict=True)]
+            curves[name].append((low, float(np.mean([e.relative_rmse for e in errors if e.mean > 0] or [0.0]))))
     # Squared errors add up: over all classes they weigh as their queries occur.
     wholes = {name: math.sqrt(sum(shares[low] * error**2 for low, error in curve)) for name, curve in curves.items()}
     subject = Record(method=method.name, setting=method.setting)

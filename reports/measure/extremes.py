@@ -34,7 +34,7 @@ from weaves.fabric import Fabric
 FOOTPRINTS: Final = (1e-4, 1e-2, 1.0, 1e2, 1e4)
 """Standard deviations, in repeats: the square root of their area."""
 
-ANGLES: Final = (0.0, 60.0, 89.9)
+_ANGLES: Final = (0.0, 60.0, 89.9)
 """Angles of light and viewer to the normal, in degrees."""
 
 GRAZING: Final = 89.9
@@ -78,7 +78,7 @@ def extremes(repeat: tuple[int, int]) -> ExtremeInputs:
     random = np.random.default_rng(0)
     # Sixteenths of a yarn: what single precision holds far away too.
     places = random.integers(0, np.array(repeat) * _SIXTEENTH, (_PLACES, 2)) / _SIXTEENTH
-    rows = list(itertools.product(FOOTPRINTS, ANGLES, ANGLES, places.tolist()))
+    rows = list(itertools.product(FOOTPRINTS, _ANGLES, _ANGLES, places.tolist()))
     size, light, viewer = (np.array([row[k] for row in rows], np.float64) for k in range(3))
     centre, period = np.array([row[3] for row in rows]).T, np.array(repeat)[:, None]
     near, away = centre.astype(np.float32), (centre + period * (FAR // period - 1)).astype(np.float32)
@@ -94,12 +94,9 @@ def measure_extremes(
 ) -> list[Record]:
     """Measure methods, each followed by its lower precisions, at their extremes on the cloths that they cover.
 
-    Returns
-    -------
-    list of Record
-        For each method and fabric `extreme_error`, the worst over footprints with all of them as its curve, and
-        `extreme_grazing`; `extreme_rounding` for lower precisions; `extreme_far`, `extreme_large`,
-        `extreme_not_finite`, `extreme_negative`. A number is left out if no answer is finite.
+    Records of each method and fabric are `extreme_error`, the worst over footprints with all of them as its curve, and
+    `extreme_grazing`; `extreme_rounding` for lower precisions; `extreme_far`, `extreme_large`, `extreme_not_finite`,
+    `extreme_negative`. A number is left out if no answer is finite.
     """
     records = []
     for fabric, role in fabrics:
@@ -113,8 +110,8 @@ def measure_extremes(
             for method in family:
                 subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, role=role)
                 method.prepare(fabric)
-                answers, found = _measured(subject, method, fabric, inputs, true)
-                records += found
+                answers, measured = _measured(subject, method, fabric, inputs, true)
+                records += measured
                 if own is not None:
                     records += _of(subject, "extreme_rounding", _relative(answers, own), len(own))
                 own = answers if own is None else own

@@ -57,14 +57,9 @@ def render_frames(fabric: Fabric, options: FrameOptions, path: Path) -> None:
 
 
 def measure_aliasing(method: Method, fabric: Fabric, options: FrameOptions, frames: Path) -> list[Record]:
-    """Measure flicker and excess energy of a method on the moving plane.
+    """Measure flicker and excess energy of a method, which must cover the fabric, on the moving plane.
 
-    Parameters
-    ----------
-    method : Method
-        Must cover the fabric.
-    frames : Path
-        The truth's frames that `render_frames` wrote with the same options.
+    `frames` are the truth's, which `render_frames` wrote with the same options.
     """
     reference = _read(frames, options)
     method.prepare(fabric)
@@ -120,6 +115,6 @@ def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Float64:
 
 def _spectrum(subject: Record, frames: Float64, noise: Float64, mean: float) -> Record:
     """Return the radially averaged spectrum, relative to the squared mean of the truth."""
-    found = spectrum(frames, noise)
-    curve = tuple((float(k), float(p) / mean**2) for k, p in zip(found.frequency, found.power, strict=True))
-    return subject.of("spectrum", found.high / mean**2, len(frames), curve=curve)
+    rings = spectrum(frames, noise)
+    curve = tuple((float(k), float(p) / mean**2) for k, p in zip(rings.frequency, rings.power, strict=True))
+    return subject.of("spectrum", rings.high / mean**2, len(frames), curve=curve)

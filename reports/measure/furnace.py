@@ -25,10 +25,10 @@ from reports.record import Metric, Record
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-ANGLES: Final = (0.0, 30.0, 60.0, 80.0, 88.0)
+_ANGLES: Final = (0.0, 30.0, 60.0, 80.0, 88.0)
 """Angles of the viewer to the normal, degrees."""
 
-FOOTPRINTS: Final = (0.06, 0.3, 1.5, 8.0)
+_FOOTPRINTS: Final = (0.06, 0.3, 1.5, 8.0)
 """Standard deviations, yarn spacings."""
 
 DIRECTIONS: Final = 256
@@ -47,7 +47,7 @@ def furnace_queries(repeat: tuple[int, int]) -> Queries:
     sine, turn = np.sqrt(1.0 - z * z), 2.0 * math.pi * turn
     wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1)
     places = np.random.default_rng(0).random((_PLACES, 2)) * repeat
-    patches = list(itertools.product(places.tolist(), FOOTPRINTS, ANGLES, _AZIMUTHS))
+    patches = list(itertools.product(places.tolist(), _FOOTPRINTS, _ANGLES, _AZIMUTHS))
     centre = np.array([[*place, sigma] for place, sigma, _, _ in patches])
     theta, phi = np.radians([p[2] for p in patches]), np.array([p[3] for p in patches])
     wo = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)

@@ -88,10 +88,7 @@ def measure_errors(method: Method, rows: HeldOutFabric, seed: int) -> list[Recor
 def measure_added(method: Method, metric: AddedMetric, rows: HeldOutFabric, seed: int) -> Record:
     """Measure a metric from outside; arguments as for `measure_errors`.
 
-    Raises
-    ------
-    MethodFailed
-        If the metric's code fails, or returns no finite number.
+    MethodFailed if the metric's code fails, or returns no finite number.
     """
     enter(metric.row)
     measured = load_function(metric)
@@ -123,14 +120,10 @@ def measure_timing(
 
     The truth is timed with the options it was made by; `progress` receives the finished share.
 
-    Returns
-    -------
-    list of Record
-        For each method `bytes_stored`, the mean over fabrics; `peak_memory` of a call of `timing_rows` queries, on one
-        thread, where the system reports it (`reports.measure.memory`); `prepare_time`, the time until a fabric never
-        seen before can be evaluated, where any fabric can be. Then `time` for each method and number of threads, the
-        truth last, with every reading as `samples` and the queries a fabric as `note`
-        (`reports.measure.timing.affordable`).
+    Records of each method are `bytes_stored`, the mean over fabrics; `peak_memory` of a call of `timing_rows` queries,
+    on one thread, where the system reports it (`reports.measure.memory`); `prepare_time`, the time until a fabric never
+    seen before can be evaluated, where any fabric can be. Then `time` for each method and number of threads, the truth
+    last, with every reading as `samples` and the queries a fabric as `note` (`reports.measure.timing.affordable`).
     """
     sample = [(cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))) for cloth, queries, _ in fabrics]
     _prepare(methods, [cloth for cloth, _ in sample])

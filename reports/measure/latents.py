@@ -35,10 +35,10 @@ from weaves.yarn import Yarn
 SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Positions between the first fabric (0) and the second (1) at which errors are measured."""
 
-ROWS: Final = 1024
+_ROWS: Final = 1024
 """Queries at each of them."""
 
-EDITS: Final = 25
+_EDITS: Final = 25
 """Edits that are timed, of each kind."""
 
 _SEED = 31
@@ -71,8 +71,8 @@ class Blends(Protocol):
 def pairs() -> list[Pair]:
     """Return the pairs: three drafts, each with the yarns of another preset, and two drafts of the same yarns."""
     result = []
-    for one, other, differs in LATENT_PAIRS:
-        first, second = load_fabric(one), load_fabric(other)
+    for name, other, differs in LATENT_PAIRS:
+        first, second = load_fabric(name), load_fabric(other)
         update = {"draft": second.draft} if differs == "draft" else {"warp": second.warp, "weft": second.weft}
         result.append(Pair(first, first.model_copy(update={"name": other} | update), differs))
     return result
@@ -85,36 +85,28 @@ def between(pair: Pair, share: float) -> Fabric:
 
 
 def measure_paths(
-    method: Method, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = ROWS
+    method: Method, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = _ROWS
 ) -> list[Record]:
     """Return the errors of blending and of encoding anew along the path between two fabrics.
 
-    Parameters
-    ----------
-    method : Method
-        Must be one that `Blends`.
-    distribution : QueryOptions
-        Distribution of the `rows` queries, the same ones at every share.
-
-    Returns
-    -------
-    list of Record
-        `path_error` and, for yarns, `reencode_error`: the value is the error in the middle, the curve that at `SHARES`.
+    The method must be one that `Blends`. The `rows` queries of the distribution are the same ones at every share.
+    Records are `path_error` and, for yarns, `reencode_error`: the value is the error in the middle, the curve that at
+    `SHARES`.
     """
     queries, records = draw_queries(distribution, pair.first.weave.repeat, _SEED, 0, rows), []
     answers = _truths(pair, queries, truth)
     subject = Record(method=method.name, setting=method.setting, fabric=pair.first.name, note=pair.about)
     for metric, values in _along(method, pair, queries):
         errors = [
-            colour_error(found, answer, COLOUR_WEIGHTS, resamples=0).relative_rmse
-            for found, answer in zip(values, answers, strict=True)
+            colour_error(blended, answer, COLOUR_WEIGHTS, resamples=0).relative_rmse
+            for blended, answer in zip(values, answers, strict=True)
         ]
         curve = tuple(zip(SHARES, errors, strict=True))
         records.append(subject.of(metric, dict(curve)[0.5], rows, curve=curve))
     return records
 
 
-def measure_edits(method: Method, fabric: Fabric, repeats: int = EDITS) -> list[Record]:
+def measure_edits(method: Method, fabric: Fabric, repeats: int = _EDITS) -> list[Record]:
     """Return the time until answers can follow an edit of a yarn, and one of a colour: medians, in milliseconds.
 
     Edits change the warp's relief, or its diffuse colour, a little each time: no two fabrics are the same.
@@ -128,7 +120,7 @@ def measure_edits(method: Method, fabric: Fabric, repeats: int = EDITS) -> list[
     for about, edits in (("a yarn", yarns), ("a colour", colours)):
         edited = [fabric.model_copy(update={"warp": fabric.warp.model_copy(update=edit)}) for edit in edits]
         # The first call warms up.
-        times = [milliseconds(partial(method.prepare, one)) for one in edited][1:]
+        times = [milliseconds(partial(method.prepare, cloth)) for cloth in edited][1:]
         records.append(timed(subject.model_copy(update={"note": about}), "encode_time", times))
     return records
 

@@ -48,16 +48,9 @@ def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Pat
 def render_method(
     method: Method, fabric: Fabric, scene: View, options: PictureOptions, truth: Path, path: Path
 ) -> list[Record]:
-    """Write a method's picture of a scene and measure its MSE over the lit pixels.
+    """Write a method's picture of a scene to `path` and measure its MSE over the lit pixels.
 
-    Parameters
-    ----------
-    method : Method
-        Must cover the fabric.
-    truth : Path
-        The picture that `render_truth` wrote with the same options.
-    path : Path
-        Path of the method's picture.
+    The method must cover the fabric; `truth` is the picture that `render_truth` wrote with the same options.
     """
     gbuffer = view(scene, *options.size(scene), options=options.view)
     seed = int(fingerprint(["picture", fabric.name, scene, options.seed]), 16)

@@ -110,22 +110,18 @@ def read_edge(path: Path) -> Edge:
 
 
 def measure_silhouette(method: Method, fabric: Fabric, options: EdgeOptions, truth: Path) -> list[Record]:
-    """Measure a method's edge against the truth's.
+    """Measure a method's edge against the truth's, the pictures that `render_edge` wrote with the same options.
 
-    Returns
-    -------
-    list of Record
-        Root mean squared errors of the coverage, and of the light over pixels and channels; between them the distance
-        of the method's edge outside the true one, the mean over the rows, in yarn spacings. `truth` are the pictures
-        that `render_edge` wrote with the same options.
+    Records are root mean squared errors of the coverage, and of the light over pixels and channels; between them the
+    distance of the method's edge outside the true one, the mean over the rows, in yarn spacings.
     """
-    reference, found = read_edge(truth), edge_of(method, fabric, options)
-    covered, pixels = found.coverage - reference.coverage, reference.coverage.size
+    reference, edge = read_edge(truth), edge_of(method, fabric, options)
+    covered, pixels = edge.coverage - reference.coverage, reference.coverage.size
     subject = Record(method=method.name, setting=method.setting, fabric=fabric.name)
     return [
         subject.of("silhouette_coverage", float(np.sqrt(np.square(covered).mean())), pixels),
         subject.of("silhouette_displacement", float(covered.sum(axis=1).mean() * options.pixel), options.rows),
-        subject.of("silhouette_light", float(np.sqrt(np.square(found.light - reference.light).mean())), pixels),
+        subject.of("silhouette_light", float(np.sqrt(np.square(edge.light - reference.light).mean())), pixels),
     ]
 
 

@@ -57,10 +57,7 @@ def contrast(first: str, second: str) -> float:
 def readable(colour: str, ground: str, ink: str) -> str:
     """Return the colour nearest to `colour`, on the way to `ink`, in which text on `ground` can be read.
 
-    Parameters
-    ----------
-    colour, ground, ink : str
-        ``#rrggbb``; the contrast of `ink` on `ground` is at least `OF_TEXT`.
+    All are ``#rrggbb``; the contrast of `ink` on `ground` is at least `OF_TEXT`.
     """
     start, end = (np.array([int(code[i : i + 2], 16) for i in (1, 3, 5)], np.float64) for code in (colour, ink))
     for step in range(STEPS + 1):

@@ -82,14 +82,8 @@ def _parameters(scheme: Scheme) -> dict[Any, Any]:
 def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure:
     """Draw the MSE of every method: each fabric as a faint dot, the mean of a role with its 95 % interval.
 
-    A broad bar is the range of that mean over trainings.
-
-    Parameters
-    ----------
-    table : DataFrame
-        From `summary.error_table`.
-    fabrics : DataFrame
-        From `summary.fabric_table`.
+    A broad bar is the range of that mean over trainings. The frames are from `summary.error_table` and
+    `summary.fabric_table`.
     """
     roles = [role for role in _ROLES if role in set(table["role"])]
     places = _places(table)

@@ -57,10 +57,7 @@ def error_against_bytes(scheme: Scheme, table: pd.DataFrame) -> Figure:
 def error_by_size(scheme: Scheme, table: pd.DataFrame) -> Figure:
     """Draw error against time for each size of footprints: colour above, its specular part below.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `equal_time.size_table`.
+    The frame is from `equal_time.size_table`.
     """
     table = table.rename(columns={"ns": "time", "size": "panel"})
     panels = {size: f"sigma {size}" for size in SIZES if size in set(table["panel"])}
@@ -71,10 +68,7 @@ def error_by_size(scheme: Scheme, table: pd.DataFrame) -> Figure:
 def scenes(scheme: Scheme, table: pd.DataFrame) -> Figure:
     """Draw MSE, HDR-FLIP and the flicker's distance from the truth's against the time of a frame, a column a scene.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `summary.scene_table`.
+    The frame is from `summary.scene_table`.
     """
     table = table.rename(columns={"frame_time": "time", "scene": "panel"}).assign(distance=table["flicker"].abs())
     panels = {name: name for name in dict.fromkeys(table["panel"])}

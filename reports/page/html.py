@@ -48,14 +48,8 @@ _MOST_CHIPS: Final = 8  # different colours shown of a yarn's threads
 def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], sizes: Mapping[str, tuple[int, int]]) -> str:
     """Return the HTML of a page.
 
-    Parameters
-    ----------
-    page : PageInput
-        Its content.
-    frames : mapping
-        From `reports.tables.page_tables.page_frames`; those of `ranged_frames` are shown.
-    sizes : mapping
-        Width and height, in pixels, of every picture and plot in ``figures``.
+    Its `frames` are from `reports.tables.page_tables.page_frames`; those of `ranged_frames` are shown. `sizes` are
+    width and height, in pixels, of every picture and plot in ``figures``.
     """
     per_material = [note.name for note in page.models if note.per_material]
     every = sections(page.records, frames, _options(page), per_material)

@@ -50,14 +50,8 @@ class Label:
 def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: float = 8.0) -> list[Annotation]:
     """Write labels into a figure whose curves and legend are complete, and return them.
 
-    Parameters
-    ----------
-    figure : Figure
-        Its lines are curves with a mark at every point.
-    labels : sequence of Label
-        Those that come first choose first. One that finds no free place at all takes the place that covers the least.
-    size : float
-        Of the text, in points.
+    The figure's lines are curves with a mark at every point. Labels that come first choose first; one that finds no
+    free place at all takes the place that covers the least. `size` is that of the text, in points.
     """
     figure.draw_without_rendering()  # the layout moves the axes
     make: Any = RendererAgg  # has no types

@@ -30,21 +30,9 @@ from reports.tables.page_tables import page_frames, ranged_frames
 
 
 def write_page(folder: Path, page: PageInput, progress: Callable[[float], None] = lambda fraction: None) -> Path:
-    """Write a page into `folder` and return the path of ``index.html``.
+    """Write a page into `folder`, which is created if need be, and return the path of ``index.html``.
 
-    Parameters
-    ----------
-    folder : Path
-        Created if need be.
-    page : PageInput
-        Its content.
-    progress : callable
-        Called with the share that is done.
-
-    Raises
-    ------
-    BadInput
-        If a picture is missing, or the folder cannot be written.
+    `progress` receives the share that is done. BadInput if a picture is missing, or the folder cannot be written.
     """
     frames = page_frames(page.records)
     written = [OF_A_PAGE, machine_path(Path(OF_A_PAGE)).name]

@@ -59,19 +59,8 @@ def strips(
     """Return the views of the fabrics, then the scenes.
 
     In each the truth stands first, then the methods from outside, the first picture of each other kind, and the rest.
-
-    Parameters
-    ----------
-    pictures : sequence of PictureFile
-        What there is to show.
-    order : sequence of str
-        The fabrics in their order.
-    scenes : sequence of str
-        Views and scenes in their order.
-    errors : sequence of DataFrame
-        From `summary.picture_table` and `summary.scene_table`: the MSE that stands beside a picture.
-    methods : sequence of ModelNote
-        Kinds of the methods.
+    Fabrics come in their `order`, then `scenes` (views too) in theirs. The MSE beside a picture is from `errors`:
+    `summary.picture_table` and `summary.scene_table`. The notes tell the kinds of the methods.
     """
     kinds = {note.name: note.kind or note.name for note in methods}
     mse = {
@@ -134,11 +123,9 @@ class Crop(NamedTuple):
 def filmstrip(films: Mapping[str, npt.NDArray[np.floating]]) -> bytes:
     """Return frames side by side as PNG bytes, without words.
 
-    Parameters
-    ----------
-    films : mapping of array (F, H, W, 3)
-        Linear RGB of the truth and of methods, all of one size, in the order of the strip's rows. Of every frame the
-        rectangle is shown in which most changes (`liveliest`); of more than `SHOWN` frames the first.
+    `films` hold frames (F, H, W, 3), linear RGB of the truth and of methods, all of one size, in the order of the
+    strip's rows. Of every frame the rectangle is shown in which most changes (`liveliest`); of more than `SHOWN` frames
+    the first.
     """
     crop = liveliest(films)
     strips = [_strip(frames[:SHOWN], crop) for frames in films.values()]

@@ -92,10 +92,7 @@ class Comparison:
 def refuse_other_machine(a: Machine, b: Machine, allow: bool = False) -> list[str]:
     """Refuse measurements of different machines, or say in a sentence what differs if they are allowed.
 
-    Raises
-    ------
-    BadInput
-        Naming the first thing that differs.
+    BadInput names the first thing that differs.
     """
     for name in ("cpu", "cores", "threads"):
         first, second = getattr(a, name), getattr(b, name)
@@ -108,18 +105,10 @@ def refuse_other_machine(a: Machine, b: Machine, allow: bool = False) -> list[st
 
 
 def compare(a: Sequence[Record], b: Sequence[Record]) -> Comparison:
-    """Compare two benchmarks, measurement by measurement.
+    """Compare two benchmarks, measurement by measurement; BadInput if they share none.
 
-    Parameters
-    ----------
-    a, b : sequence of Record
-        Measurements of the same metric, method, setting, fabric, number of threads and edit are compared: times
-        (`TIMES`) and the MSE on held-out queries, the mean over trainings. Of several that are alike the last counts.
-
-    Raises
-    ------
-    BadInput
-        If they share none.
+    Measurements of the same metric, method, setting, fabric, number of threads and edit are compared: times (`TIMES`)
+    and the MSE on held-out queries, the mean over trainings. Of several that are alike the last counts.
     """
     first, second = (_comparable(mean_over_seeds(records)) for records in (a, b))
     extents = _extents(a, b)

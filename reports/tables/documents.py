@@ -52,21 +52,8 @@ _README_COLUMNS: Final = ("method", "MSE", "× lower", "× lower, unseen", "flic
 def readme_block(records: Sequence[Record], machine: Machine, old: str, where: str) -> str:
     """Return the block: table, headline of `woven`, and where it was measured.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        Of one page.
-    machine : Machine
-        Where its times were taken.
-    old : str
-        The block as it is now; its times are kept where they still hold.
-    where : str
-        File of the Records, for the error.
-
-    Raises
-    ------
-    BadInput
-        If the Records hold no errors and times of two random points.
+    Records and machine are those of one page, from the file `where`. Of the `old` block the times are kept where they
+    still hold. BadInput if the Records hold no errors and times of two random points.
     """
     condensed, errors = summary_table(records), error_table(records)
     needed = {"MSE seen", "× lower, seen", "MSE unseen", "× lower, unseen", "flicker", "× time"}
@@ -157,10 +144,7 @@ def _printed_times(old: str) -> dict[str, str]:
 def results_page(records: Sequence[Record], machine: Machine, where: str) -> str:
     """Return all tables of a page as one Markdown file; arguments as in `readme_block`.
 
-    Raises
-    ------
-    BadInput
-        If no Record names its recipe.
+    BadInput if no Record names its recipe.
     """
     named = [record.provenance for record in records if record.provenance.recipe]
     if not named:
@@ -196,10 +180,7 @@ def markers(name: str) -> tuple[str, str]:
 def block(text: str, name: str, where: str) -> str:
     """Return the generated block of a text, without its markers.
 
-    Raises
-    ------
-    BadInput
-        If the text does not hold both markers, the first one first; `where` names the file.
+    BadInput if the text does not hold both markers, the first one first; `where` names the file.
     """
     first, last = markers(name)
     _, opened, after = text.partition(f"{first}\n")

@@ -46,16 +46,8 @@ def size_table(records: Sequence[Record]) -> pd.DataFrame:
 def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
     """Return every method without settings, and each of `OWN_CURVE`, beside every method with them, at its time.
 
-    Parameters
-    ----------
-    sizes : DataFrame
-        From `size_table`.
-
-    Returns
-    -------
-    DataFrame
-        Columns: measure, method, setting, size; ns and error of the method; rival, rival_error (NaN where the rival has
-        no setting as fast), ratio = rival_error / error.
+    `sizes` is from `size_table`. Columns: measure, method, setting, size; ns and error of the method; rival,
+    rival_error (NaN where the rival has no setting as fast), ratio = rival_error / error.
     """
     curves: dict[tuple[str, str], pd.DataFrame] = {}
     single: list[pd.DataFrame] = []

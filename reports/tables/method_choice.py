@@ -37,24 +37,11 @@ def predictions(
 ) -> pd.DataFrame:
     """Return the predicted error and time of every method in a scene.
 
-    Parameters
-    ----------
-    sizes : DataFrame
-        From `equal_time.size_table`.
-    shares : mapping
-        Share of the scene's queries in each class of footprints.
-    queries : int
-        Queries of a frame.
-    fallback_shares : mapping
-        Fallback share of each method; methods without an entry are left out.
-    fallback_cost : (float, float)
-        Error of the fallback and its nanoseconds a query.
+    `sizes` is from `equal_time.size_table`, `shares` are those of the scene's queries in each class of footprints,
+    `queries` those of a frame. `fallback_cost` is the error of the fallback and its nanoseconds a query. Left out are
+    methods without a fallback share, and those that were not measured in a class that occurs.
 
-    Returns
-    -------
-    DataFrame
-        Columns: method, setting; error (relative RMSE of the colour), ms (a frame on one thread), fallback, known,
-        front. Methods that were not measured in a class that occurs are left out.
+    Columns: method, setting; error (relative RMSE of the colour), ms (a frame on one thread), fallback, known, front.
     """
     present = {size: share for size, share in shares.items() if share > 0}
     lines = []

@@ -107,14 +107,8 @@ def sections(
 ) -> dict[str, Section]:
     """Return all sections by name, in their order, with what there is to show.
 
-    Parameters
-    ----------
-    frames : mapping
-        From `page_frames`; those of `ranged_frames` are shown.
-    options : mapping, optional
-        Values of words that the options of a page tell.
-    per_material : collection of str
-        Methods that are trained on every fabric by itself.
+    Of the frames of `page_frames` those of `ranged_frames` are shown; `options` are values of words that the options of
+    a page tell, `per_material` methods that are trained on every fabric by itself.
     """
     values = {**facts(records, frames["errors"], per_material), **_truth_facts(records), **(options or {})}
     ranged = ranged_frames(frames)
@@ -172,8 +166,8 @@ def _without_repeats(tables: Iterable[ResultTable]) -> list[ResultTable]:
 
 def _ratio(column: Column) -> Column:
     """Return the column of × lower; the baseline's is 1."""
-    one = TableCell("1")
-    return Column(column.title, lambda row: one if (row.method, row.setting) == BASELINE else column.cell(row))
+    unity = TableCell("1")
+    return Column(column.title, lambda row: unity if (row.method, row.setting) == BASELINE else column.cell(row))
 
 
 def _fronts(tradeoff: pd.DataFrame, values: Values) -> list[ResultTable]:

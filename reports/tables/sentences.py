@@ -145,10 +145,7 @@ def cheapest_sentences(table: pd.DataFrame, fault: Fault = "error") -> list[str]
 def scene_sentences(table: pd.DataFrame) -> dict[str, list[str]]:
     """Return for each scene the cheapest methods within errors of the colour and of flicker, and errors in the noise.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `summary.scene_table`.
+    The frame is from `summary.scene_table`.
     """
     result: dict[str, list[str]] = {}
     # An error in the noise may be as large as the upper end of its interval.
@@ -228,12 +225,7 @@ def section_sentences(frames: Mapping[str, pd.DataFrame]) -> dict[str, list[str]
 def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Collection[str] = ()) -> dict[str, object]:
     """Return the values of words (`tables.toml`) that Records tell; what was not measured is not among them.
 
-    Parameters
-    ----------
-    errors : DataFrame
-        From `summary.error_table`.
-    per_material : collection of str
-        Methods that are trained on every fabric by itself.
+    `errors` is from `summary.error_table`; methods `per_material` are trained on every fabric by itself.
     """
     metrics = {record.metric for record in records}
     counts: dict[str, int] = {}

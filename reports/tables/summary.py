@@ -28,7 +28,7 @@ from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.error import ratio
 from reports.measure.extremes import FOOTPRINTS, SHINY, error_name
-from reports.over_seeds import Statistic, first_training, mean, over_seeds, statistic_over_seeds
+from reports.over_seeds import Statistic, Table, first_training, mean, over_seeds, statistic_over_seeds
 from reports.record import TRUTH, Metric, Record, to_table
 
 BASELINE: Final = ("point_sampled", "k = 2")
@@ -52,8 +52,6 @@ ERRORS: Final[tuple[Metric, ...]] = ("mse", "colour_rrmse", *(f"rrmse_{name}" fo
 _OVER_FABRICS: Final = tuple(f"{name}_fabrics" for name in ("ratio", *ERRORS))
 _KEYS: Final = ["method", "setting"]
 _MEANS: Final = [name for name in (*columns_of("errors"), "zero_answers") if name != "mse"]  # of `error_table`
-
-_ALBEDOS: Final = columns_of("energy")
 
 
 def of_baseline(table: pd.DataFrame) -> pd.Series[bool]:
@@ -118,35 +116,26 @@ def picture_table(records: Sequence[Record]) -> pd.DataFrame:
     return pd.concat([part[part["mse"].notna()] for part in parts], ignore_index=True).reindex(columns=columns)
 
 
-@over_seeds([*_KEYS, "role"], columns_of("aliasing"))
-def aliasing_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the metrics of aliasing, means over fabrics, one row a method and role."""
-    return _over_fabrics(records, columns_of("aliasing"), [*_KEYS, "role"], "mean")
+def _over_fabrics(name: str, keys: Sequence[str], statistic: Literal["mean", "max"]) -> Table:
+    """Return a table, one row a key: the number of fabrics, and a statistic over them of each metric of a name."""
+    metrics = columns_of(name)
+
+    @over_seeds(keys, metrics, {} if statistic == "mean" else dict.fromkeys(metrics, mean))
+    def condensed(records: Sequence[Record]) -> pd.DataFrame:
+        table = to_table(records)
+        table = table[table["metric"].isin(metrics) & (table["method"] != TRUTH) & (table["fabric"] != "")]
+        if table.empty:
+            return pd.DataFrame(columns=[*keys, "fabrics", *metrics])
+        fabrics = table.groupby([*keys], sort=False)["fabric"].nunique().rename("fabrics").to_frame()
+        wide = table.pivot_table("value", [*keys], "metric", statistic, sort=False).reindex(columns=metrics)
+        return fabrics.join(wide).reset_index()
+
+    return condensed
 
 
-@over_seeds(_KEYS, _ALBEDOS, dict.fromkeys(_ALBEDOS, mean))
-def energy_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return the largest albedos of all fabrics, one row a method."""
-    return _over_fabrics(records, _ALBEDOS, _KEYS, "max")
-
-
-@over_seeds(_KEYS, columns_of("silhouettes"))
-def silhouette_table(records: Sequence[Record]) -> pd.DataFrame:
-    """Return errors at silhouettes, means over fabrics, one row a method."""
-    return _over_fabrics(records, columns_of("silhouettes"), _KEYS, "mean")
-
-
-def _over_fabrics(
-    records: Sequence[Record], metrics: list[str], keys: list[str], statistic: Literal["mean", "max"]
-) -> pd.DataFrame:
-    """Return the number of fabrics and a statistic of each metric over them."""
-    table = to_table(records)
-    table = table[table["metric"].isin(metrics) & (table["method"] != TRUTH) & (table["fabric"] != "")]
-    if table.empty:
-        return pd.DataFrame(columns=[*keys, "fabrics", *metrics])
-    fabrics = table.groupby(keys, sort=False)["fabric"].nunique().rename("fabrics").to_frame()
-    wide = table.pivot_table("value", keys, "metric", statistic, sort=False).reindex(columns=metrics)
-    return fabrics.join(wide).reset_index()
+aliasing_table = _over_fabrics("aliasing", [*_KEYS, "role"], "mean")
+energy_table = _over_fabrics("energy", _KEYS, "max")
+silhouette_table = _over_fabrics("silhouettes", _KEYS, "mean")
 
 
 _SCENE: Final = [*columns_of("scenes"), "mse", "mse_relative", "colour_rrmse", "flicker", "excess_energy"]
@@ -363,19 +352,9 @@ def unranged(errors: pd.DataFrame) -> set[tuple[str, str, str]]:
 def over_fabrics(values: npt.ArrayLike) -> tuple[float, float, float]:
     """Return the geometric mean of errors or ratios, one a fabric, and its 95 % interval over fabrics.
 
-    Parameters
-    ----------
-    values : array_like (fabrics,)
-        Figures of one method.
+    The mean is NaN if there is no figure, or one is not above 0, as an error that is lost in the noise of the truth;
+    the interval of a single fabric is NaN too.
 
-    Returns
-    -------
-    mean, low, high : float
-        NaN if there is no figure, or one is not above 0, as an error that is lost in the noise of the truth. The
-        interval of a single fabric is NaN.
-
-    Notes
-    -----
     Student's t interval of the mean of the logarithms: exp(m ± t_{.975, n-1} s / sqrt(n)), with n fabrics, and mean m
     and standard deviation s of the logarithms. It holds if the fabrics are drawn at random and the logarithms are
     normal.
@@ -397,20 +376,10 @@ def over_unseen(row: Any) -> bool:
 
 
 def columns_over_fabrics(errors: pd.DataFrame, base: pd.DataFrame) -> dict[str, float]:
-    """Return the columns of a method that are means over fabrics.
+    """Return the columns of a method that are means over fabrics; `base` has the rows of 2 points, or none.
 
-    Parameters
-    ----------
-    errors : DataFrame
-        One row a fabric, with the columns `fabric` and `ERRORS`.
-    base : DataFrame
-        The same of point sampling at 2 points, or no rows.
-
-    Returns
-    -------
-    dict
-        For `ratio` (MSE of 2 points over the method's on the same fabric) and each of `ERRORS` the geometric mean
-        <name>_fabrics and the ends of its 95 % interval, <name>_fabrics_low and <name>_fabrics_high.
+    For `ratio` (MSE of 2 points over the method's on the same fabric) and each of `ERRORS` the geometric mean
+    <name>_fabrics and the ends of its 95 % interval, <name>_fabrics_low and <name>_fabrics_high.
     """
     other = base.set_index("fabric")["mse"].reindex(errors["fabric"])
     figures = {"ratio": other.to_numpy() / errors["mse"].to_numpy()}

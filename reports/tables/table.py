@@ -96,18 +96,9 @@ def number(
 ) -> Column:
     """Return the column of a number of a frame, with its interval and its range over trainings where it has them.
 
-    Parameters
-    ----------
-    name : str
-        Column of the frame.
-    title, format : str
-        Heading, and key of `FORMATS`; those of the metric by default.
-    metric : str
-        A metric of the catalogue, if it is not `name`.
-    ends : sequence of str
-        Columns of the interval's ends; <name>_low and <name>_high by default.
-    above_noise : bool
-        Whether a number that is not above 0 is lost in the noise of the truth.
+    Title and format, a key of `FORMATS`, are by default those of the metric: `metric`, or that of the column's name.
+    The columns of the interval's `ends` are by default <name>_low and <name>_high. With `above_noise` a number that is
+    not above 0 is lost in the noise of the truth.
     """
     if about := METRICS.get(metric or name):
         title = title or about.title + (f", {about.unit}" if about.unit in ("dB", "JOD") else "")

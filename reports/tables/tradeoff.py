@@ -29,18 +29,12 @@ _FRONTS: Final = {
 def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.DataFrame | None = None) -> pd.DataFrame:
     """Return cost and faults of every method that answers for all fabrics of a role, and which fronts it is on.
 
-    Parameters
-    ----------
-    errors, timing, aliasing : DataFrame
-        From `summary.error_table`, `summary.timing_table` and `summary.aliasing_table`.
+    The frames are from `summary.error_table`, `summary.timing_table` and `summary.aliasing_table`.
 
-    Returns
-    -------
-    DataFrame
-        Columns: role, method, setting, fabrics; ns (median, a query), error (relative RMSE of the colour, mean over
-        fabrics; NaN where it is lost in the noise of the truth), error_least and error_most (range over trainings),
-        bytes_stored, flicker (distance from the truth's); front (of error and time), front_flicker (of flicker and
-        time), front_bytes (of error and bytes).
+    Columns: role, method, setting, fabrics; ns (median, a query), error (relative RMSE of the colour, mean over
+    fabrics; NaN where it is lost in the noise of the truth), error_least and error_most (range over trainings),
+    bytes_stored, flicker (distance from the truth's); front (of error and time), front_flicker (of flicker and time),
+    front_bytes (of error and bytes).
     """
     columns = [*_KEYS, *_COSTS, *_FRONTS]
     if errors.empty or timing.empty:

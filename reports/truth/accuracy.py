@@ -1,7 +1,7 @@
 """Accuracy of the estimators: true errors beside stated errors and cost.
 
 Errors are of the four components as a vector, |mean - reference| / |reference|, over patches that return light; the
-reference is `owen` with `REFERENCE` points and another seed. Plain Monte Carlo's error falls as N^-1/2: with its own
+reference is `owen` with `_REFERENCE` points and another seed. Plain Monte Carlo's error falls as N^-1/2: with its own
 median true errors e_N at N points, c is the geometric mean of e_N sqrt(N), and (c / e)^2 points of it have the median
 true error e. "Points saved" is that number over the points used.
 """
@@ -26,7 +26,7 @@ from weaves.fabric import Fabric, load_fabric
 FABRICS: Final = ("polyester_lining", "denim", "silk_charmeuse", "satin_8", "twill_4_4", "basket")
 """One of each family, and the largest repeats."""
 
-REFERENCE: Final = 1 << 16
+_REFERENCE: Final = 1 << 16
 """Points of a converged answer."""
 
 COUNTS: Final = (64, 256, 1024)
@@ -89,15 +89,15 @@ SETTINGS: Final[dict[str, TruthOptions]] = {
 """Settings that are measured, by their names in tables."""
 
 
-def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = REFERENCE) -> Iterator[Accuracy]:
+def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = _REFERENCE) -> Iterator[Accuracy]:
     """Measure every setting on so many default queries of every preset; `reference` is a power of two."""
     for fabric, queries in default_queries(fabrics, rows, _SEED):
         truth = estimate(fabric, queries, fixed("owen", reference), _SEED + 1)
-        found = [_compare(fabric, queries, truth, setting, options) for setting, options in SETTINGS.items()]
+        rows_of_fabric = [_compare(fabric, queries, truth, setting, options) for setting, options in SETTINGS.items()]
         # c of the law e = c N^-1/2: the geometric mean of plain Monte Carlo's median errors times sqrt(N).
-        random = [row for row in found if row.setting.startswith("mc,")]
+        random = [row for row in rows_of_fabric if row.setting.startswith("mc,")]
         spread = float(np.exp(np.mean([np.log(row.true_error * np.sqrt(row.points)) for row in random])))
-        for row in found:
+        for row in rows_of_fabric:
             needed = (spread / max(row.true_error, 1e-12)) ** 2
             yield replace(row, saved=needed / row.points)
 

@@ -68,9 +68,9 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             lit = queries._replace(wi=queries.wi * np.array([1.0, 1.0, sign], np.float32))
             truth = estimate(fabric, lit, fixed("owen", reference), _SEED + 1).mean.astype(np.float64)
-            found = estimate(fabric, lit, _TABLE, _SEED).mean.astype(np.float64)
-            for component, one, other in zip(COMPONENTS, found.T, truth.T, strict=True):
-                value, error = bias_of(one, other)
+            answers = estimate(fabric, lit, _TABLE, _SEED).mean.astype(np.float64)
+            for component, own, other in zip(COMPONENTS, answers.T, truth.T, strict=True):
+                value, error = bias_of(own, other)
                 yield Bias(fabric.name, side, component, value, error, len(lit.u))
 
 

@@ -9,7 +9,7 @@ allowed beyond a bound. Over the queries and the four components of a class,
 
 Errors have heavy tails: of a thousand queries, ten may hold half the square of the errors. So a ratio has an interval,
 by the bootstrap over queries, and is wrong only if this lies outside `RATIOS`; a share is wrong only if a binomial test
-says that it is above `EXCEEDED`. Both at `LEVEL`.
+says that it is above `EXCEEDED`. Both at `_LEVEL`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from weaves.population import Population, Ranges, population_fabrics
 RATIOS: Final = (0.8, 1.25)
 """Ratios of calibrated errors."""
 
-LEVEL: Final = 0.99
+_LEVEL: Final = 0.99
 """Level of the intervals of ratios."""
 
 EXCEEDED: Final = 0.003
@@ -90,7 +90,7 @@ class Calibration:
     exceeded: Annotated[float, "bound_exceeded"]
     """Share of errors beyond their bound."""
     low: float | None
-    """Lower end of the ratio's interval, at `LEVEL`; None in Records of before intervals."""
+    """Lower end of the ratio's interval, at `_LEVEL`; None in Records of before intervals."""
     high: float | None
     """Upper end."""
     ratio_through: Annotated[float, "error_ratio_through"]
@@ -106,7 +106,7 @@ class Calibration:
         values = 4 * self.count
         beyond = stats.binomtest(round(self.exceeded * values), values, EXCEEDED, alternative="greater")
         low, high = (self.ratio if end is None else end for end in (self.low, self.high))
-        return low <= RATIOS[1] and high >= RATIOS[0] and float(beyond.pvalue) > 1.0 - LEVEL
+        return low <= RATIOS[1] and high >= RATIOS[0] and float(beyond.pvalue) > 1.0 - _LEVEL
 
 
 def measure(
@@ -118,10 +118,10 @@ def measure(
     kinds: Sequence[str] = tuple(CLASSES),
 ) -> Iterator[Calibration]:
     """Measure the calibration of estimators with their default options; parameters as for `samples`."""
-    for kind, name, behind, found, exact in samples(fabrics, rows, estimators, reference, seed, kinds):
-        error, bound = calibrate(found, behind)
+    for kind, name, behind, answers, exact in samples(fabrics, rows, estimators, reference, seed, kinds):
+        error, bound = calibrate(answers, behind)
         doubt, _ = calibrate(exact, behind)
-        wrong = found.mean - exact.mean
+        wrong = answers.mean - exact.mean
         columns = [(part[:, :4], part[:, 4:]) for part in (wrong, error, bound, doubt)]
         if len(wrong) < 2:
             continue
@@ -166,8 +166,8 @@ def samples(
                     own = physics.model_copy(update={"estimator": name})
                     answers = uncalibrated(fabric, queries.take(known), own, seed)
                     parts.setdefault(name, []).append((queries.behind[known], answers, exact.take(known)))
-        for name, found in parts.items():
-            behind, answered, truths = zip(*found, strict=True)
+        for name, of_estimator in parts.items():
+            behind, answered, truths = zip(*of_estimator, strict=True)
             yield kind, name, np.concatenate(behind), _joined(answered), _joined(truths)
 
 
@@ -183,7 +183,7 @@ def compared(wrong: Float64, error: Float64, bound: Float64, doubt: Float64) -> 
 
 
 def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, float]:
-    """Return the interval of the ratio of the components' errors at `LEVEL`; rows are queries.
+    """Return the interval of the ratio of the components' errors at `_LEVEL`; rows are queries.
 
     Of the logarithm of the squared ratio, with the standard error by the bootstrap over queries.
     """
@@ -194,12 +194,12 @@ def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, flo
         # The reference's own variance may exceed errors that are far smaller than stated.
         return np.asarray(np.log(np.maximum(true.mean(axis=axis), _LEAST * whole) / whole))
 
-    found = stats.bootstrap(
+    bootstrap = stats.bootstrap(
         squares, logarithm, paired=True, vectorized=True, n_resamples=999, batch=99, method="percentile",
         rng=np.random.default_rng(0),
     )  # fmt: skip
     middle = float(logarithm(*squares, axis=0))
-    reach = float(stats.norm.ppf(0.5 + 0.5 * LEVEL)) * float(found.standard_error)
+    reach = float(stats.norm.ppf(0.5 + 0.5 * _LEVEL)) * float(bootstrap.standard_error)
     return math.exp(0.5 * (middle - reach)), math.exp(0.5 * (middle + reach))
 
 

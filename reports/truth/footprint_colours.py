@@ -31,8 +31,8 @@ from reports.measure.timing import set_threads
 from reports.truth.row_records import RowRecords
 from weaves.fabric import load_fabric
 
-FABRICS: Final = ("gingham", "houndstooth")
-SIZES: Final = (0.15, 0.5, 1.0, 2.0, 4.0, 16.0, 64.0)
+_FABRICS: Final = ("gingham", "houndstooth")
+_SIZES: Final = (0.15, 0.5, 1.0, 2.0, 4.0, 16.0, 64.0)
 """Standard deviations of footprints, in yarn spacings."""
 
 _ROWS = 400
@@ -58,7 +58,7 @@ class ColourLoss:
 
 
 def measure(
-    rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, sizes: Sequence[float] = SIZES
+    rows: int = _ROWS, fabrics: Sequence[str] = _FABRICS, sizes: Sequence[float] = _SIZES
 ) -> Iterator[ColourLoss]:
     """Measure the loss on every fabric by every size, single-threaded, with `rows` queries each."""
     set_threads(1)
@@ -74,10 +74,10 @@ def measure(
             half = time.perf_counter()
             exact = component_colours(fabric, queries, _PRECISE, _SEED)
             end = time.perf_counter()
-            found, truth = coloured(components, mean), coloured(components, exact.mean)
-            square = float(np.mean((found - truth) ** 2) - np.mean(exact.standard_error**2))
+            approximate, truth = coloured(components, mean), coloured(components, exact.mean)
+            square = float(np.mean((approximate - truth) ** 2) - np.mean(exact.standard_error**2))
             loss = math.sqrt(max(square, 0.0) / float(np.mean(truth**2)))
-            bias = float(found.mean() / truth.mean() - 1.0)
+            bias = float(approximate.mean() / truth.mean() - 1.0)
             yield ColourLoss(name, f"{size:g}", loss, bias, (half - begun) / rows, (end - half) / rows, rows)
 
 

@@ -26,7 +26,7 @@ from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from reports.truth.row_records import RowRecords
 
-SCENES: Final = ("plane", "sphere", "drape")
+_SCENES: Final = ("plane", "sphere", "drape")
 """Scenes of which frames are rendered."""
 
 OURS: Final = "soft_nodes:2"
@@ -35,7 +35,7 @@ OURS: Final = "soft_nodes:2"
 OTHER: Final = "point_sampled:1"
 """One random point a sample."""
 
-REFERENCE: Final = "truth"
+_REFERENCE: Final = "truth"
 """The method that renders the reference frames."""
 
 SAMPLES: Final[dict[str, tuple[int, ...]]] = {OURS: (1, 4, 16), OTHER: (1, 2, 4, 8, 16, 32, 64)}
@@ -69,27 +69,21 @@ RECORDS: Final = RowRecords(Traced, setting=("samples",), method_field="method")
 
 
 def measure(
-    scenes: Sequence[str] = SCENES,
+    scenes: Sequence[str] = _SCENES,
     size: int = _SIZE,
     samples: Mapping[str, Sequence[int]] = SAMPLES,
-    reference: tuple[str, int] = (REFERENCE, _REFERENCE_SAMPLES),
+    reference: tuple[str, int] = (_REFERENCE, _REFERENCE_SAMPLES),
     frames: int = _FRAMES,
 ) -> Iterator[Traced]:
     """Measure every method in every scene; error and time are means over frames with different random numbers.
 
-    Parameters
-    ----------
-    size : int
-        Side of a frame in pixels.
-    samples : mapping
-        Numbers of samples a pixel, by method; the last method is `OTHER`.
-    reference : (str, int)
-        The method of the reference frames, and its samples.
+    `size` is the side of a frame in pixels. `samples` has numbers of samples a pixel by method, the last one `OTHER`;
+    `reference` is the method of the reference frames, and its samples.
     """
     for name in scenes:
         truths = [_frames(name, reference[0], size)(reference[1], 1000 + k)[0] for k in range(2)]
         scale = float(np.mean(truths)) ** 2
-        found: list[Traced] = []
+        rows: list[Traced] = []
         for method, counts in reversed(list(samples.items())):
             frame_of = _frames(name, method, size)
             frame_of(1, 0)  # loads and tabulates
@@ -97,10 +91,10 @@ def measure(
                 made = [frame_of(count, seed) for seed in range(1, frames + 1)]
                 errors = [float(np.mean((frame - truths[0]) * (frame - truths[1]))) / scale for frame, _ in made]
                 error, seconds = float(np.mean(errors)), float(np.median([seconds for _, seconds in made]))
-                others = [one for one in found if one.method == OTHER]
+                others = [row for row in rows if row.method == OTHER]
                 gain = _error_in(seconds, others) / error if method != OTHER and error > 0 else math.nan
-                found.append(Traced(method, name, str(count), error, seconds, frames, gain))
-        yield from found
+                rows.append(Traced(method, name, str(count), error, seconds, frames, gain))
+        yield from rows
 
 
 def _frames(name: str, method: str, size: int) -> Callable[[int, int], tuple[Float64, float]]:
@@ -129,6 +123,6 @@ def _error_in(seconds: float, found: Sequence[Traced]) -> float:
 
     In less time than the fewest samples take, it is the error of these; in more than the most take, NaN: it is unknown.
     """
-    known = sorted((one.seconds, one.error) for one in found if one.error > 0)
+    known = sorted((row.seconds, row.error) for row in found if row.error > 0)
     times, errors = np.log(np.array(known)).T
     return float(np.exp(np.interp(math.log(seconds), times, errors, right=math.nan)))

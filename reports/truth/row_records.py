@@ -53,18 +53,18 @@ class RowRecords(Generic[Row]):
         """
         names = {metric: name for name, metric in self.metrics.items()}
         first = next(iter(names))
-        found: dict[tuple[str, str, str], dict[str, Any]] = {}
+        rows: dict[tuple[str, str, str], dict[str, Any]] = {}
         for record in records:
             if record.metric in names and record.setting.count(self.joint) >= len(self.setting) - 1:
-                row = found.setdefault((record.method, record.setting, record.fabric), self._named(record))
+                row = rows.setdefault((record.method, record.setting, record.fabric), self._named(record))
                 row[names[record.metric]] = record.value
                 if record.metric == first:
                     row |= {name: getattr(record, attribute) for attribute, name in self.once.items()}
-        needed = {one.name for one in fields(self.row) if one.default is MISSING}  # type: ignore[arg-type]
+        needed = {part.name for part in fields(self.row) if part.default is MISSING}  # type: ignore[arg-type]
         types = get_type_hints(self.row)
         return [
             self.row(**{name: int(value) if types[name] is int else value for name, value in row.items()})
-            for row in found.values()
+            for row in rows.values()
             if needed <= row.keys()
         ]
 
@@ -83,7 +83,7 @@ class RowRecords(Generic[Row]):
 
     def _named(self, record: Record) -> dict[str, Any]:
         """Return the fields that name a Record's row."""
-        known = {one.name for one in fields(self.row)}  # type: ignore[arg-type]
+        known = {part.name for part in fields(self.row)}  # type: ignore[arg-type]
         named: dict[str, Any] = dict(
             zip(self.setting, record.setting.split(self.joint, len(self.setting) - 1), strict=True)
         )

@@ -43,10 +43,10 @@ from reports.truth.row_records import RowRecords
 from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric, load_fabric
 
-FABRICS: Final = ("silk_charmeuse", "polyester_lining", "organza", "denim")
+_FABRICS: Final = ("silk_charmeuse", "polyester_lining", "organza", "denim")
 """Lustrous cloth first."""
 
-SCENES: Final = tuple(SHIPPED)
+_SCENES: Final = tuple(SHIPPED)
 """Scenes whose looks are measured."""
 
 SETTINGS: Final = ("cosine", "cosine by sides", "one point", "lobes")
@@ -84,7 +84,7 @@ class Subject(NamedTuple):
 
 
 def measure(
-    looks: int = _LOOKS, fabrics: Sequence[str] = FABRICS, scenes: Sequence[str] = SCENES
+    looks: int = _LOOKS, fabrics: Sequence[str] = _FABRICS, scenes: Sequence[str] = _SCENES
 ) -> Iterator[VarianceSaving]:
     """Measure every sampler on every fabric, with all its light and with the specular part alone, and in scenes."""
     for name in fabrics:
@@ -105,17 +105,17 @@ def scene_subjects(name: str, looks: int) -> list[Subject]:
     loaded = load(load_scene(name))
     # Which lights reach a place takes most of the time of a frame, and matters not here.
     frame = render(replace(loaded, lights=loaded.lights[:1]))
-    found = [
+    subjects = [
         Subject(loaded.cloths[key][1], gbuffer.looks(loaded.cloths[key][1].weave.repeat))
         for key, gbuffer in frame.gbuffers.items()
         if len(gbuffer.pixel)
     ]
-    stops = np.cumsum([len(subject.looks.u) for subject in found])
+    stops = np.cumsum([len(subject.looks.u) for subject in subjects])
     chosen = np.sort(np.random.default_rng(5).choice(stops[-1], min(looks, int(stops[-1])), replace=False))
     parts = np.split(chosen, np.searchsorted(chosen, stops[:-1]))
     return [
         Subject(fabric, own.take(part - (stop - len(own.u))))
-        for (fabric, own), part, stop in zip(found, parts, stops.tolist(), strict=True)
+        for (fabric, own), part, stop in zip(subjects, parts, stops.tolist(), strict=True)
         if part.size
     ]
 
@@ -131,13 +131,13 @@ class _Estimate(NamedTuple):
 def _savings(subjects: Sequence[Subject], name: str) -> Iterator[VarianceSaving]:
     """Yield the savings of all samplers over the looks of some cloths together."""
     parts = list(map(_estimates, subjects))
-    found = {sampler: [part[sampler] for part in parts] for sampler in SETTINGS}
+    estimates = {sampler: [part[sampler] for part in parts] for sampler in SETTINGS}
     base, base_time = math.nan, math.nan
     for sampler in SETTINGS:
-        values = np.concatenate([one.values for one in found[sampler]])
+        values = np.concatenate([estimate.values for estimate in estimates[sampler]])
         variance = float(values.var(axis=1, ddof=1).mean())
-        draw_time = 1e9 * sum(one.draw_seconds for one in found[sampler]) / values.size
-        whole = 1e9 * sum(one.seconds for one in found[sampler]) / values.size
+        draw_time = 1e9 * sum(estimate.draw_seconds for estimate in estimates[sampler]) / values.size
+        whole = 1e9 * sum(estimate.seconds for estimate in estimates[sampler]) / values.size
         if sampler == "cosine":
             base, base_time = variance, whole
         saved = base / variance
@@ -186,11 +186,11 @@ class _Directions(NamedTuple):
 def _weights(bsdf: PatchBSDF, looks: Queries, drawn: _Directions) -> Float64:
     """Return the luminance of f_P over the density, and of transparency over its probability."""
     queries, straight = looks._replace(wi=drawn.wi), drawn.straight
-    found = np.empty(len(straight))
-    found[~straight] = bsdf.eval(queries.take(~straight)) @ LUMINANCE
+    values = np.empty(len(straight))
+    values[~straight] = bsdf.eval(queries.take(~straight)) @ LUMINANCE
     if straight.any():
-        found[straight] = bsdf.method.transparency(bsdf.fabric, queries.take(straight), 0)
-    return np.asarray(found / drawn.pdf)
+        values[straight] = bsdf.method.transparency(bsdf.fabric, queries.take(straight), 0)
+    return np.asarray(values / drawn.pdf)
 
 
 def _cosine(looks: Queries, random: Float64, far: Float64, straight: Float64) -> _Directions:
@@ -209,13 +209,13 @@ def _cosine(looks: Queries, random: Float64, far: Float64, straight: Float64) ->
 def _one_point(bsdf: PatchBSDF, places: Queries, random: Float64, straight: Float64) -> _Directions:
     """Draw directions by the lobe of one point each, or straight through with the footprint's probability."""
     through = random[:, 3] < straight
-    found = bsdf.lobes(places)
+    lobes = bsdf.lobes(places)
     # Of its own light straight through nothing is drawn.
-    rest = 1.0 / np.maximum(1.0 - found.rest[:, STRAIGHT], 1e-6)
-    found.flakes[:, [SHARE, HEIGHT]] *= rest[:, None, None]
-    found.rest[:] *= rest[:, None]
-    found.rest[:, STRAIGHT] = 0.0
-    wi, pdf, _ = bsdf.draw(places, random[:, :3], found)
+    rest = 1.0 / np.maximum(1.0 - lobes.rest[:, STRAIGHT], 1e-6)
+    lobes.flakes[:, [SHARE, HEIGHT]] *= rest[:, None, None]
+    lobes.rest[:] *= rest[:, None]
+    lobes.rest[:, STRAIGHT] = 0.0
+    wi, pdf, _ = bsdf.draw(places, random[:, :3], lobes)
     wi[through] = -places.wo[through]
     return _Directions(wi, np.where(through, straight, (1.0 - straight) * pdf), through)
 

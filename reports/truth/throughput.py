@@ -212,10 +212,10 @@ def _threads_compared(what: str, fabric: Fabric, answer: Callable[[Queries], obj
         return 2 * rows / (time.perf_counter() - start)
 
     with ThreadPoolExecutor(2) as pool:
-        found = [(both(map), both(pool.map)) for _ in range(1 + _TURNS)][1:]
-    one, two = zip(*found, strict=True)
-    low, middle, high = quartiles(two)
-    note = f"{max(two) / max(one):.2f} x one thread"
+        rates = [(both(map), both(pool.map)) for _ in range(1 + _TURNS)][1:]
+    alone, both_at_once = zip(*rates, strict=True)
+    low, middle, high = quartiles(both_at_once)
+    note = f"{max(both_at_once) / max(alone):.2f} x one thread"
     return Rate(f"{what}, two threads", fabric.name, middle, low, high, "queries/s", note, _TURNS)
 
 

@@ -92,12 +92,8 @@ def write_page(
     """Write the viewer of a fabric, whole or not at all, and return a sentence on it.
 
     `truth` counts the pixels along each side of tiles, pictures of the truth and other methods, from LEAST_TILE to
-    MOST_TILE; 0: there are none. `progress` takes the share that is done, from 0 to 1.
-
-    Raises
-    ------
-    BadInput
-        If the number cannot be used, or the repeat is too large for the shader.
+    MOST_TILE; 0: there are none. `progress` takes the share that is done, from 0 to 1. BadInput if the number cannot be
+    used, or the repeat is too large for the shader.
     """
     if truth and not LEAST_TILE <= truth <= MOST_TILE:
         raise BadInput("export", "truth", truth, f"must be from {LEAST_TILE} to {MOST_TILE}, or 0 for none")

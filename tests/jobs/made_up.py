@@ -6,7 +6,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import tomli_w
 
 from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.page import Page
@@ -25,6 +24,7 @@ from pipeline.shards.queries import draw_queries
 from pipeline.shards.store import columns_of, write_columns
 from pipeline.truth.query import Answers
 from reports.page.files import write_files
+from tests.jobs.small_recipes import write_toml
 
 
 def write_recipe(folder, name, *models, bench=None, **dataset):
@@ -32,9 +32,7 @@ def write_recipe(folder, name, *models, bench=None, **dataset):
     dataset = {"seen": ["denim"], "shard_rows": 64, "rows": {"train": 128, "validation": 32, "test": 64}} | dataset
     models = [{"model": model} if isinstance(model, str) else model for model in models]
     content = {"name": name, "dataset": dataset, "models": models, "bench": bench or {"views": ["plane"]}}
-    path = folder / f"{name}.toml"
-    path.write_text(tomli_w.dumps(content), encoding="utf-8")
-    return path
+    return write_toml(folder, content)
 
 
 def flip(path, chance=random.Random(0)):  # noqa: B008, any byte will do

@@ -19,7 +19,6 @@ MOST_MEMBERS = 32
 MOST_UNSEEN = 4
 MOST_SEEDS = 2
 
-
 SMALLEST = """
 [dataset]
 seen = ["polyester_lining"]
@@ -63,7 +62,12 @@ def write_smallest(folder, name, dataset=None, model=None, variant=None, bench=N
             table[key] = table.get(key, {}) | value if isinstance(value, dict) else value
     if variant:
         content["models"][1] = network | variant
-    path = folder / f"{name}.toml"
+    return write_toml(folder, content)
+
+
+def write_toml(folder, content):
+    """Write a recipe into a folder, under its name; return its path."""
+    path = folder / f"{content['name']}.toml"
     path.write_text(tomli_w.dumps(content), encoding="utf-8")
     return path
 
@@ -81,9 +85,7 @@ def write_small(name, folder):
     dataset["shard_rows"] = 4096  # each shard is a task
     content["models"] = [_model(entry, folder) for entry in content.get("models", [])]
     content["bench"] = _bench(content.get("bench", {}))
-    path = folder / f"{name}.toml"
-    path.write_text(tomli_w.dumps(content), encoding="utf-8")
-    return path
+    return write_toml(folder, content)
 
 
 def _scaled(values, least):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
@@ -15,59 +15,65 @@ from pipeline.scenes.options import View
 from reports.catalogue import AddedMetric
 from reports.options import EdgeOptions, ErrorOptions, FrameOptions, PictureOptions, Role, RunOptions, select
 from reports.page.content import PictureFile
+from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
+    from reports.measure.held_out import HeldOutFabric
     from reports.record import Record
 
 
-class TruthNoise(Measurement):
-    """The truth's noise on a fabric's held-out queries, and the motion in its frames."""
+class _OnHeldOut(Measurement):
+    """A measurement on the held-out queries of a fabric."""
 
-    kind: Literal["truth noise"] = "truth noise"
     fabric: Coloured
     role: Role
     dataset: HeldOutRows
     """Held-out queries of the fabric."""
     errors: ErrorOptions
     """Number of these queries."""
+
+    @classmethod
+    def of(cls, subjects: Subjects, fabric: Fabric, role: Role, **more: Any) -> Self:
+        """Return the measurement of a fabric; `more` are the other fields."""
+        rows, errors = subjects.held_out(fabric), select(ErrorOptions, subjects.recipe.bench)
+        return cls(fabric=fabric, role=role, dataset=rows, errors=errors, **more)
+
+    def held_out(self, out: Path) -> HeldOutFabric:
+        """Read the queries."""
+        (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
+        return rows
+
+
+class TruthNoise(_OnHeldOut):
+    """The truth's noise on a fabric's held-out queries, and the motion in its frames."""
+
+    kind: Literal["truth noise"] = "truth noise"
     frames: Made
     frame_options: FrameOptions
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a fabric."""
-        bench = subjects.recipe.bench
+        options = select(FrameOptions, subjects.recipe.bench)
         for fabric, role in subjects.fabrics:
-            yield cls(
-                fabric=fabric,
-                role=role,
-                dataset=subjects.held_out(fabric),
-                errors=select(ErrorOptions, bench),
-                frames=TruthFrames.of(fabric, subjects.recipe).made,
-                frame_options=select(FrameOptions, bench),
-            )
+            (frames,) = TruthFrames.of(fabric, subjects.recipe)
+            yield cls.of(subjects, fabric, role, frames=frames.made, frame_options=options)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure it."""
         from reports.measure.frames import measure_truth_frames
         from reports.measure.held_out import measure_truth
 
-        (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
-        return [measure_truth(rows), *measure_truth_frames(self.fabric, self.frame_options, out / self.frames.path)]
+        frames = measure_truth_frames(self.fabric, self.frame_options, out / self.frames.path)
+        return [measure_truth(self.held_out(out)), *frames]
 
 
-class OnFabric(Measurement):
+class OnFabric(_OnHeldOut):
     """All methods of a model, one a setting, on one fabric: errors, white furnace, aliasing, silhouettes, pictures."""
 
     kind: Literal["errors"] = "errors"
     model: Trained
     ways: RunOptions
-    fabric: Coloured
-    role: Role
-    dataset: HeldOutRows
-    """Held-out queries of the fabric."""
-    errors: ErrorOptions
-    """Number of these queries."""
     frames: Made
     frame_options: FrameOptions
     views: dict[View, Made]
@@ -83,23 +89,22 @@ class OnFabric(Measurement):
         """Yield one a fabric, model that answers for it, and seed; pictures are made of the first seed alone."""
         recipe, bench = subjects.recipe, subjects.recipe.bench
         for fabric, role in subjects.fabrics:
-            frames, edge = TruthFrames.of(fabric, recipe), TruthEdge.of(fabric, recipe)
-            views = {view: picture.made for view, picture in TruthPicture.of(fabric, bench).items()}
+            (frames,), edges = TruthFrames.of(fabric, recipe), TruthEdge.of(fabric, recipe)
+            views = {picture.scene: picture.made for picture in TruthPicture.of(fabric, recipe)}
             for model, trained in subjects.answering([fabric.name]):
-                yield cls(
+                yield cls.of(
+                    subjects,
+                    fabric,
+                    role,
                     model=trained,
                     ways=model.ways(bench),
-                    fabric=fabric,
-                    role=role,
-                    dataset=subjects.held_out(fabric),
-                    errors=select(ErrorOptions, bench),
                     frames=frames.made,
                     frame_options=select(FrameOptions, bench),
                     views=views if model.is_first else {},
                     picture_options=select(PictureOptions, bench),
                     shown=trained.shown(bench.picture_counts) if model.is_first else (),
-                    edge=edge.made if edge else None,
-                    edge_options=bench.edge if edge else None,
+                    edge=edges[0].made if edges else None,
+                    edge_options=bench.edge if edges else None,
                 )
 
     @property
@@ -126,8 +131,7 @@ class OnFabric(Measurement):
         from reports.measure.pictures import render_method
         from reports.measure.silhouette import measure_silhouette
 
-        (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
-        methods, records = self.model.methods(out), []
+        rows, methods, records = self.held_out(out), self.model.methods(out), []
         methods += self.model.variants(methods, self.ways)
         for index, method in enumerate(methods, start=1):
             records += measure_errors(method, rows, self.errors.seed)
@@ -224,18 +228,12 @@ class ErrorsBySize(Measurement):
         return measure_errors_by_size(self.model.methods(out), self.dataset.read(out), self.seed)
 
 
-class OfAddedMetric(Measurement):
+class OfAddedMetric(_OnHeldOut):
     """A metric from outside, of all methods of a model, on the held-out queries of a fabric."""
 
     kind: Literal["added metric"] = "added metric"
     metric: AddedMetric
     model: Trained
-    fabric: Coloured
-    role: Role
-    dataset: HeldOutRows
-    """Held-out queries of the fabric."""
-    errors: ErrorOptions
-    """Number of these queries."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -243,18 +241,11 @@ class OfAddedMetric(Measurement):
         for metric in subjects.recipe.metrics:
             for fabric, role in (*subjects.fabrics, *subjects.unseen_population):
                 for _, trained in subjects.answering([fabric.name]):
-                    yield cls(
-                        metric=metric,
-                        model=trained,
-                        fabric=fabric,
-                        role=role,
-                        dataset=subjects.held_out(fabric),
-                        errors=select(ErrorOptions, subjects.recipe.bench),
-                    )
+                    yield cls.of(subjects, fabric, role, metric=metric, model=trained)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""
         from reports.measure.held_out import measure_added
 
-        (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
-        return [measure_added(one, self.metric, rows, self.errors.seed) for one in self.model.methods(out)]
+        rows = self.held_out(out)
+        return [measure_added(method, self.metric, rows, self.errors.seed) for method in self.model.methods(out)]

@@ -116,10 +116,10 @@ class Measurement(Task):
     def versions(self) -> dict[str, int]:
         """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
         code, ways = {*self.code}, list(held(self, RunOptions))
-        code |= {"bound"} if any(one.bounds for one in ways) else set()
+        code |= {"bound"} if any(way.bounds for way in ways) else set()
         options = [model.options for model in held(self, Trained)]
-        code |= {"fallback"} if any(one.model == "selvage" for one in options) else set()
-        models = {one.name: one.version for one in options}
+        code |= {"fallback"} if any(model.model == "selvage" for model in options) else set()
+        models = {model.name: model.version for model in options}
         numbers = {**vars(versions), "BENCH": catalogue.BENCH}
         return {name: numbers[name.upper()] for name in code} | models
 
@@ -132,14 +132,10 @@ class Measurement(Task):
     def run(self, out: Path, progress: Progress) -> None:
         """Measure, and write the Records; with code from outside, in a process that can be ended.
 
-        A method that fails ends a measurement of it alone. One of several methods starts again without it.
-
-        Raises
-        ------
-        MethodFailed
-            If the only method fails.
+        A method that fails ends a measurement of it alone. One of several methods starts again without it. MethodFailed
+        if the only method fails.
         """
-        added = [one for one in held(self, Trained) if isinstance(one.options, AddedMethod)]
+        added = [model for model in held(self, Trained) if isinstance(model.options, AddedMethod)]
         if not added and not list(held(self, AddedMetric)):
             self.write(out, {}, progress)
             return
@@ -156,17 +152,7 @@ class Measurement(Task):
                 left_out[failure.name] = failure.reason
 
     def write(self, out: Path, left_out: Mapping[str, str], progress: Progress) -> None:
-        """Measure, and write the Records.
-
-        Parameters
-        ----------
-        out : Path
-            Output folder.
-        left_out : mapping
-            Methods from outside that failed in this measurement, each with the reason.
-        progress : callable
-            Receives the finished share.
-        """
+        """Measure, and write the Records; `left_out` has the methods from outside that failed here, with reasons."""
         from reports.record import Record, this_machine, write_records
 
         measured = self.without(list(left_out)) if left_out else self
@@ -178,7 +164,7 @@ class Measurement(Task):
         ]
         models = [model.options for model in held(self, Trained)]
         origins = {options.name: options.origin for options in models if isinstance(options, AddedMethod)}
-        records = [one.made_by(origins[one.method]) if one.method in origins else one for one in records]
+        records = [record.made_by(origins[record.method]) if record.method in origins else record for record in records]
         write_records(out / self.records, records, this_machine(self.threads))
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
@@ -188,8 +174,7 @@ class Measurement(Task):
     def _stamped(self, record: Record) -> Record:
         """Return a Record with the provenance, and the role of the fabric where all have the same."""
         about = self.provenance.model_copy(update={"origin": record.provenance.origin})
-        role = getattr(self, "role", record.role)
-        return record.model_copy(update={"provenance": about, "role": role})
+        return record.model_copy(update={"provenance": about, "role": getattr(self, "role", record.role)})
 
 
 def _label(subject: object) -> str:

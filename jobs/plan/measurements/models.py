@@ -61,7 +61,7 @@ class AtExtremes(Measurement):
         if not self.model.options.of_one_material:
             fabrics.append((lustrous(fabrics[0][0]), "unseen"))
         precisions = EXTREME_PRECISIONS if self.model.networks else ()
-        families = [[unchecked(one), *runs(one, precisions)] for one in self.model.methods(out)]
+        families = [[unchecked(method), *runs(method, precisions)] for method in self.model.methods(out)]
         return measure_extremes(families, fabrics, self.truth)
 
 

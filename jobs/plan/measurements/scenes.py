@@ -163,13 +163,13 @@ class _OnShot(Measurement):
         for shot in cls.shots.all(bench.scenes):
             for model, trained in subjects.answering(shot.fabrics):
                 for options in trained.options.single():
-                    one = trained.model_copy(update={"options": options})
-                    shown = one.shown(bench.picture_counts) if model.is_first else ()
+                    single = trained.model_copy(update={"options": options})
+                    shown = single.shown(bench.picture_counts) if model.is_first else ()
                     if shown or not shot.larger:
                         yield cls(
                             scene=shot.scene,
                             shot=shot.made,
-                            model=one,
+                            model=single,
                             options=select(SceneErrorOptions, bench.scenes),
                             shown=shown,
                             extent=shot.options.size,
@@ -256,5 +256,5 @@ class FrameTime(Measurement):
         from reports.measure.scene.scene_errors import time_scene
         from reports.measure.scene.shot import read_shot
 
-        methods = [one for model in self.models for one in model.with_fallback(out, self.footprint)]
+        methods = [method for model in self.models for method in model.with_fallback(out, self.footprint)]
         return time_scene(methods, read_shot(out / self.shot.path), self.options, self.seed)

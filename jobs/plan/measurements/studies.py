@@ -41,12 +41,7 @@ class Study(Measurement):
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure it.
 
-        Raises
-        ------
-        BadInput
-            If Mitsuba is not installed.
-        WorkFailed
-            If an expression of `stability` exceeds its limit.
+        BadInput if Mitsuba is not installed; WorkFailed if an expression of `stability` exceeds its limit.
         """
         module = import_module(f"reports.truth.{self.study}")
         records: list[Record] = module.RECORDS.to_records(module.measure())

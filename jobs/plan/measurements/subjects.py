@@ -89,7 +89,7 @@ class Trained(TaskPart):
         """Load its methods so that they answer any query."""
         from pipeline.models.fallback import Fallback
 
-        return [Fallback(one, self.options.kinds, footprint) for one in self.methods(out)]
+        return [Fallback(method, self.options.kinds, footprint) for method in self.methods(out)]
 
     def variants(self, methods: Sequence[Method], ways: RunOptions) -> list[Method]:
         """Return trained methods with or without an energy bound, and in other runtimes."""
@@ -98,8 +98,8 @@ class Trained(TaskPart):
         from pipeline.models.bounded import Bounded
         from pipeline.models.runtimes import runs
 
-        others: list[Method] = [Bounded(one) for one in methods if ways.bounds]
-        return others + [run for one in methods for run in runs(one, ways.runtimes)]
+        others: list[Method] = [Bounded(method) for method in methods if ways.bounds]
+        return others + [run for method in methods for run in runs(method, ways.runtimes)]
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class Subjects:
     @property
     def fabrics(self) -> list[tuple[Fabric, Role]]:
         """The named fabrics with their roles: the seen ones, then the unseen ones."""
-        return [(one, "seen") for one in self.recipe.seen] + [(one, "unseen") for one in self.recipe.unseen]
+        return [(fabric, "seen") for fabric in self.recipe.seen] + [(fabric, "unseen") for fabric in self.recipe.unseen]
 
     @property
     def unseen_population(self) -> list[tuple[Fabric, Role]]:

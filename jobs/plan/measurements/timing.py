@@ -31,9 +31,9 @@ class TimedModel(Trained):
         from reports.record import Record
 
         return [
-            Record(method=one.name, setting=name, metric="not_run", value=1.0, note=reason)
-            for one in methods
-            for name, reason in not_run(one, self.ways.runtimes).items()
+            Record(method=method.name, setting=name, metric="not_run", value=1.0, note=reason)
+            for method in methods
+            for name, reason in not_run(method, self.ways.runtimes).items()
         ]
 
 
@@ -54,7 +54,7 @@ class TimeOfMethods(Measurement):
         """Yield the one of the recipe, of models trained with their first seed: times do not depend on the weights."""
         bench = subjects.recipe.bench
         yield cls(
-            models=tuple(TimedModel(ways=one.ways(bench), **dict(one.whole)) for one in subjects.first_models),
+            models=tuple(TimedModel(ways=model.ways(bench), **dict(model.whole)) for model in subjects.first_models),
             dataset=subjects.held_out(*(fabric for fabric, _ in subjects.fabrics)),
             options=select(TimingOptions, bench),
         )

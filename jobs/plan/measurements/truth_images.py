@@ -22,13 +22,29 @@ _START = 0.3  # seconds of any image
 _LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 37.0, 512, 5
 
 
-class TruthPicture(Measurement):
-    """The truth's picture of a fabric in one view."""
+class _OfFabric(Measurement):
+    """Images of one measured fabric, as one file."""
 
-    kind: Literal["truth picture"] = "truth picture"
     code: ClassVar = ("truth", "bench")
     endings: ClassVar = (".exr",)
     fabric: Coloured
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield the images of all named fabrics."""
+        for fabric, _ in subjects.fabrics:
+            yield from cls.of(fabric, subjects.recipe)
+
+    @classmethod
+    def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
+        """Return the images of a fabric that a recipe has."""
+        raise NotImplementedError
+
+
+class TruthPicture(_OfFabric):
+    """The truth's picture of a fabric in one view."""
+
+    kind: Literal["truth picture"] = "truth picture"
     scene: View
     extent: tuple[int, int]
     """Width and height in pixels."""
@@ -39,16 +55,11 @@ class TruthPicture(Measurement):
     """Seed of the truth's points."""
 
     @classmethod
-    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a fabric and view."""
-        for fabric, _ in subjects.fabrics:
-            yield from cls.of(fabric, subjects.recipe.bench).values()
-
-    @classmethod
-    def of(cls, fabric: Fabric, bench: PictureOptions) -> dict[View, Self]:
-        """Return the pictures of a fabric by view."""
+    def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
+        """Return a picture for each view."""
+        bench = recipe.bench
         same = {"fabric": fabric, "view": bench.view, "truth": bench.truth, "seed": bench.seed}
-        return {view: cls(scene=view, extent=bench.size(view), **same) for view in bench.views}
+        return [cls(scene=view, extent=bench.size(view), **same) for view in bench.views]
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
@@ -76,26 +87,17 @@ class TruthPicture(Measurement):
         render_truth(self.fabric, self.scene, options, out / self.products[0])
 
 
-class TruthFrames(Measurement):
+class TruthFrames(_OfFabric):
     """The truth's frames of a fabric on the moving plane, for aliasing."""
 
     kind: Literal["truth frames"] = "truth frames"
-    code: ClassVar = ("truth", "bench")
-    endings: ClassVar = (".exr",)
-    fabric: Coloured
     options: FrameOptions
     """Options of the frames and of the truth."""
 
     @classmethod
-    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a fabric."""
-        for fabric, _ in subjects.fabrics:
-            yield cls.of(fabric, subjects.recipe)
-
-    @classmethod
-    def of(cls, fabric: Fabric, recipe: Recipe) -> Self:
-        """Return the frames of a fabric."""
-        return cls(fabric=fabric, options=select(FrameOptions, recipe.bench))
+    def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
+        """Return the frames of the fabric, as a list of one."""
+        return [cls(fabric=fabric, options=select(FrameOptions, recipe.bench))]
 
     @property
     def cost(self) -> float:
@@ -111,27 +113,17 @@ class TruthFrames(Measurement):
         render_frames(self.fabric, self.options, out / self.products[0])
 
 
-class TruthEdge(Measurement):
+class TruthEdge(_OfFabric):
     """The truth's edge of a cloth cylinder, for silhouettes."""
 
     kind: Literal["truth edge"] = "truth edge"
-    code: ClassVar = ("truth", "bench")
-    endings: ClassVar = (".exr",)
-    fabric: Coloured
     options: EdgeOptions
     """Cylinder, camera, light and truth."""
 
     @classmethod
-    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a fabric, where the recipe's queries are of curved cloth."""
-        for fabric, _ in subjects.fabrics:
-            if edge := cls.of(fabric, subjects.recipe):
-                yield edge
-
-    @classmethod
-    def of(cls, fabric: Fabric, recipe: Recipe) -> Self | None:
-        """Return the edge of a fabric; None where no query of the recipe is of curved cloth."""
-        return cls(fabric=fabric, options=recipe.bench.edge) if recipe.dataset.queries.curvature[1] > 0 else None
+    def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
+        """Return the edge of the fabric if queries of the recipe are of curved cloth."""
+        return [cls(fabric=fabric, options=recipe.bench.edge)] if recipe.dataset.queries.curvature[1] > 0 else []
 
     @property
     def cost(self) -> float:
@@ -146,22 +138,19 @@ class TruthEdge(Measurement):
         render_edge(self.fabric, self.options, out / self.products[0])
 
 
-class LivePage(Measurement):
+class LivePage(_OfFabric):
     """The live page of a fabric: cloth that the reader turns, in the browser, beside pictures of the truth."""
 
     kind: Literal["live page"] = "live page"
     endings: ClassVar = (".html",)
-    fabric: Coloured
     pixels: int
     """Along each side of the pictures of the truth and of other methods."""
 
     @classmethod
-    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one for each fabric that the recipe lists."""
-        chosen = subjects.recipe.bench.live
-        for fabric, _ in subjects.fabrics:
-            if fabric.name in chosen.fabrics:
-                yield cls(fabric=fabric, pixels=chosen.pixels)
+    def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
+        """Return the page of the fabric if the recipe lists it."""
+        live = recipe.bench.live
+        return [cls(fabric=fabric, pixels=live.pixels)] if fabric.name in live.fabrics else []
 
     @property
     def cost(self) -> float:

@@ -17,7 +17,7 @@ MOST_FILES: Final = 90
 ROLES: Final[tuple[Role, ...]] = ("seen", "population", "unseen", "unseen_population")
 POPULATIONS: Final[tuple[Role, ...]] = ("population", "unseen_population")
 """Roles of random fabrics."""
-SPLITS: Final = ("train", "validation", "test")
+_SPLITS: Final = ("train", "validation", "test")
 
 
 class PublishedPart(NamedTuple):
@@ -55,7 +55,7 @@ def parts_of(manifest: Manifest) -> list[PublishedPart]:
         shards.setdefault((shard.fabric, shard.split), []).append(shard)
     parts = []
     for role in ROLES:
-        for split in SPLITS:
+        for split in _SPLITS:
             names = [name for name in manifest.names(role) if (name, split) in shards]
             files = min(len(names), max(1, MOST_FILES * len(names) // len(shards)))
             for number in range(files):

@@ -17,7 +17,7 @@ from pipeline.shards.generate import ShardTask
 from pipeline.shards.manifest import Manifest
 from weaves.errors import BadInput, brief
 
-FILE: Final = "recipe.toml"
+_FILE: Final = "recipe.toml"
 
 _MODELS: Final = ((), ("neumip",), ("curved",), ("point_sampled",))
 """Models whose presence decides which splits a recipe has: those of one material need rows of unseen fabrics."""
@@ -35,9 +35,9 @@ def recipe_files(manifest: Manifest, folder: Path) -> dict[str, str]:
             atomic_write(Path(name) / path, text.encode(), durable=False)
         for models in _MODELS:
             text = _recipe(manifest, models)
-            atomic_write(Path(name) / FILE, text.encode(), durable=False)
+            atomic_write(Path(name) / _FILE, text.encode(), durable=False)
             try:
-                planned = DataSet(load_recipe(Path(name) / FILE)).shards
+                planned = DataSet(load_recipe(Path(name) / _FILE)).shards
             except BadInput as error:
                 if models:  # which do not know these queries
                     continue
@@ -45,7 +45,7 @@ def recipe_files(manifest: Manifest, folder: Path) -> dict[str, str]:
                 raise BadInput(str(folder), "", f"is of another version ({key})", "generate it again") from error
             parts = [part.shard for part in planned if isinstance(part.shard, ShardTask)]
             if {(part.fabric.name, part.split, part.start, part.rows) for part in parts} == present:
-                return {**fabrics, FILE: text}
+                return {**fabrics, _FILE: text}
     raise BadInput(str(folder), "", "its rows are not those of a recipe of this version", "generate it again")
 
 

@@ -88,19 +88,19 @@ class ImageErrors:
     def records(self, subject: Record) -> list[Record]:
         """Return every number as a Record of `subject`; numbers that are infinite (equal pictures) are left out."""
         r = self.mse_relative
-        found = subject.of_error(self.mse)
-        found.append(
+        records = subject.of_error(self.mse)
+        records.append(
             subject.of("mse_relative", r.value, r.count, standard_error=r.standard_error, low=r.low, high=r.high)
         )
-        found.append(subject.of("mse_relative_floor", r.noise, r.count))
+        records.append(subject.of("mse_relative_floor", r.noise, r.count))
         for metric in PERCEIVED:
             m = self.perceived[metric]
             low, high = (bound if math.isfinite(bound) else None for bound in (m.low, m.high))
             if math.isfinite(m.value):
-                found.append(subject.of(metric, m.value, m.pixels, low=low, high=high))
+                records.append(subject.of(metric, m.value, m.pixels, low=low, high=high))
             if math.isfinite(m.floor):
-                found.append(subject.of(f"{metric}_floor", m.floor, m.pixels))
-        return found
+                records.append(subject.of(f"{metric}_floor", m.floor, m.pixels))
+        return records
 
 
 def image_errors(
@@ -114,12 +114,8 @@ def image_errors(
     """Measure a picture against the truth's, linear RGB (H, W, 3), with the latter's standard error.
 
     The mask (H, W) is True where there is lit cloth; what other pixels hold does not matter. `floor` is the result of
-    `noise_floor` for this truth; it takes half of the time if it is not given.
-
-    Raises
-    ------
-    BadInput
-        If a value that counts is not finite, the truth is dark, or fewer than two blocks of pixels count.
+    `noise_floor` for this truth; it takes half of the time if it is not given. BadInput if a value that counts is not
+    finite, the truth is dark, or fewer than two blocks of pixels count.
     """
     m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
     mse, relative = _light_errors(m[lit], t[lit], s[lit], lit, options)

@@ -40,10 +40,10 @@ from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
 from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
 
-LONGEST: Final = 0.01
+_LONGEST: Final = 0.01
 """Seconds of a timed call."""
 
-FEWEST: Final = 128
+_FEWEST: Final = 128
 """Least queries about a cloth in such a call: the fixed cost of a call must not count as the cost of queries."""
 
 # The display and the place from which FovVideoVDP looks at it.
@@ -65,23 +65,15 @@ def write_truth(shot: Shot, path: Path) -> None:
 def measure_scene(
     methods: Sequence[Fallback], shot: Shot, options: SceneErrorOptions, pictures: Mapping[str, Path]
 ) -> list[Record]:
-    """Measure the settings of a method on a scene.
+    """Measure the settings of a method on a scene; those that do not cover every cloth are left out.
 
-    Parameters
-    ----------
-    methods : sequence of Fallback
-        One a setting; those that do not cover every cloth are left out.
-    shot : Shot
-        The scene's frames.
-    options : SceneErrorOptions
-        Options of the comparison, and the seed of random methods.
-    pictures : mapping
-        Where the frames of which setting are written, as an OpenEXR: the first as the picture, the others and the maps
-        of its differences from the truth as layers (`reports.images.exr`, `reports.measure.scene.scene_errors`).
+    The options are those of the comparison, and the seed of random methods. `pictures` says where the frames of which
+    setting are written, as an OpenEXR: the first as the picture, the others and the maps of its differences from the
+    truth as layers (`reports.images.exr`).
     """
     image, truths, noises, lit = options.image, shot.pictures(), shot.noise(), shot.lit
     floor, records = noise_floor(truths[0], noises[0], lit[0], image), []
-    for method in (one for one in methods if shot.covered_by(one)):
+    for method in filter(shot.covered_by, methods):
         answers = shot.answers(method, options.seed)
         shown = shot.pictures(answers)
         errors = image_errors(shown[0], truths[0], noises[0], lit[0], image, floor)
@@ -124,7 +116,7 @@ def _over_time(
 def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, seed: int) -> list[Record]:
     """Time the first frame by all methods that cover its cloths, in turns on one thread, in milliseconds.
 
-    Each cloth is timed on as many of its queries as one call can answer in `LONGEST`, at least `FEWEST`. The time of
+    Each cloth is timed on as many of its queries as one call can answer in `_LONGEST`, at least `_FEWEST`. The time of
     all its queries is in proportion, so that a small cloth with slow queries gets its true weight.
     """
     if not (able := [method for method in methods if shot.covered_by(method)]):
@@ -140,7 +132,7 @@ def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, 
             # Quadrature's own preparation must not look like the time of a query: rare ones come late in a call.
             rare = np.flatnonzero(method.out_of_domain(fabric, queries))[:1]
             method.predict(fabric, queries.take(rare))
-            contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), LONGEST, FEWEST))
+            contenders.append(affordable(Contender(method.predict, [(fabric, queries)]), _LONGEST, _FEWEST))
     timings = time_side_by_side(contenders, options.timing_repeats, options.warm_up)
     readings = np.array([timing.samples for timing in timings]).reshape(len(able), len(subjects), -1)
     counts = np.array([len(queries.u) for _, queries in subjects])
@@ -199,11 +191,7 @@ def relative_differences(
 def fovvideovdp(subject: Record, film: Float64, truth: Float64) -> list[Record]:
     """Return the quality of a film in JOD as a Record; nothing where pyfvvdp is not installed.
 
-    Parameters
-    ----------
-    film, truth : float64 (F, H, W)
-        Linear luminance of the method's frames and of the truth's, irradiance included (as in
-        `reports.measure.pictures`).
+    Film and truth are linear luminance (F, H, W), irradiance included (as in `reports.measure.pictures`).
     """
     try:
         library: Any = import_module("pyfvvdp")

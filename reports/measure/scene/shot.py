@@ -142,7 +142,7 @@ class Shot:
 
         Queries that fall back because light or viewer is behind the cloth were answered once for all methods.
         """
-        found = []
+        components = []
         for cloth in self.cloths:
             method.prepare(cloth.fabric)
             values = cloth.fallback_values.copy()
@@ -152,8 +152,8 @@ class Shot:
                 if rows.size:
                     own = int(fingerprint([self.name, cloth.fabric.name, frame, seed]), 16)
                     values[rows] = method.predict(cloth.fabric, cloth.queries.take(rows), own)
-            found.append(values)
-        return found
+            components.append(values)
+        return components
 
     def rim_errors(self, method: Fallback, seed: int) -> Float64:
         """Return the errors of a method's coverage at the silhouettes of all cloths and frames, (R,)."""
@@ -164,18 +164,15 @@ class Shot:
 def shoot(name: str, options: ShotOptions, path: Path, progress: Callable[[float], None] = lambda share: None) -> None:
     """Work out a scene's frames with the truth's answers and write them to `path`; `progress` receives their share.
 
-    Raises
-    ------
-    BadInput
-        If the scene cannot be used (`pipeline.scenes`), or shows no cloth.
+    BadInput if the scene cannot be used (`pipeline.scenes`), or shows no cloth.
     """
     loaded = load(load_scene(name), options.options)
     bases: list[npt.NDArray[np.floating]] = []
     parts: dict[str, list[dict[str, npt.NDArray[Any]]]] = {key: [] for key in loaded.cloths}
     for frame in range(options.frames):
-        found = render(loaded, float(frame), options.size)
-        base: npt.NDArray[np.floating] = found.backdrop
-        for key, gbuffer in found.gbuffers.items():
+        seen = render(loaded, float(frame), options.size)
+        base: npt.NDArray[np.floating] = seen.backdrop
+        for key, gbuffer in seen.gbuffers.items():
             fabric = loaded.cloths[key][1]
             truth = options.frame_truth if frame else options.truth
             seed = int(fingerprint(["scene", loaded.scene.name, key, frame, options.seed]), 16)
@@ -202,7 +199,7 @@ def shoot(name: str, options: ShotOptions, path: Path, progress: Callable[[float
         bases.append(base)
         progress((frame + 1) / (options.frames + 1))
     arrays = {"base": np.array(bases, np.float32)}
-    keys = [key for key, found in parts.items() if sum(len(part["frame"]) for part in found)]
+    keys = [key for key, frames_of in parts.items() if sum(len(part["frame"]) for part in frames_of)]
     if not keys:
         raise BadInput(name, "frames", options.frames, "no cloth that is lit is in sight of the camera")
     for key in keys:

@@ -7,26 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jobs.plan.ready import Ready, chains
-from jobs.plan.task import Task
+from tests.jobs.fake_stages import Fake
 
 
-class Step(Task):
-    stage: ClassVar = "generate"
-
-    name: int
+class Step(Fake):
     seconds: float = 1.0
-    after: tuple[str, ...] = ()
-
-    @property
-    def needs(self):
-        return self.after
 
     @property
     def cost(self):
         return self.seconds
-
-    def versions(self):
-        return {}
 
 
 class Alone(Step):
@@ -40,7 +29,7 @@ def plans(draw):
     for name in range(draw(st.integers(1, 8))):
         kind = draw(st.sampled_from([Step, Step, Alone]))
         needs = draw(st.sets(st.sampled_from([task.id for task in tasks]), max_size=3)) if tasks else ()
-        tasks.append(kind(name=name, seconds=draw(st.integers(1, 5)), after=tuple(needs)))
+        tasks.append(kind(name=str(name), seconds=draw(st.integers(1, 5)), after=tuple(needs)))
     return tasks, {task.id for task in tasks if draw(st.integers(0, 3)) == 3}
 
 
@@ -98,7 +87,7 @@ def test_tasks_start_as_if_all_were_sorted_at_every_end(drawn, slots, random):
 
 
 def test_the_longest_chain_is_the_most_urgent():
-    short, long = Step(name=1), Step(name=2)
-    after = Step(name=3, after=(long.id, "done before"))
+    short, long = Step(name="short"), Step(name="long")
+    after = Step(name="after", after=(long.id, "done before"))
     seconds = {short.id: 5, long.id: 1, after.id: 30}
     assert chains([short, long, after], seconds) == {short.id: 5, long.id: 31, after.id: 30}

@@ -5,7 +5,7 @@ import pytest
 
 from jobs.plan.ready import chains
 from jobs.plan.schedule import Estimate, Schedule, doublings
-from tests.jobs.fake_stages import FakeTraining, task
+from tests.jobs.fake_stages import task
 from tests.jobs.plan.test_ready import Alone, Step
 
 
@@ -17,7 +17,7 @@ def of(tasks, seconds):
     ("workers", "makespan", "tail"), [(1, 12.0, 0.0), (3, 4.0, 0.0), (5, 3.0, 1.0), (24, 1.0, 1.0)]
 )
 def test_equal_tasks_take_the_rounded_number_of_turns(workers, makespan, tail):
-    tasks = [Step(name=index) for index in range(12)]
+    tasks = [Step(name=str(index)) for index in range(12)]
     found = Schedule.of(tasks, of(tasks, [1.0] * 12), workers)
     assert (found.makespan, found.tail, found.work) == (makespan, tail, 12.0)
     assert found.efficiency == pytest.approx(12 / (workers * makespan))
@@ -25,8 +25,8 @@ def test_equal_tasks_take_the_rounded_number_of_turns(workers, makespan, tail):
 
 def shards_and_net(count, length):
     """Return so many shards of a second, what needs them, and their seconds."""
-    shards = [Step(name=index) for index in range(count)]
-    tasks = [*shards, Step(name=99, after=tuple(shard.id for shard in shards))]
+    shards = [Step(name=str(index)) for index in range(count)]
+    tasks = [*shards, Step(name="net", after=tuple(shard.id for shard in shards))]
     return tasks, of(tasks, [1.0] * count + [length])
 
 
@@ -35,7 +35,7 @@ def test_a_long_task_at_the_end_is_the_tail_and_tasks_that_measure_time_run_one_
     found = Schedule.of(tasks, seconds, 4)
     assert (found.makespan, found.tail) == (12.0, 10.0) and max(chains(tasks, seconds).values()) == 11.0
     assert Schedule.of(tasks[-1:], seconds, 4).makespan == 10.0  # what it needs is done
-    tasks = [Step(name=0), Step(name=1), Alone(name=2), Alone(name=3)]
+    tasks = [Step(name="a"), Step(name="b"), Alone(name="c"), Alone(name="d")]
     assert Schedule.of(tasks, of(tasks, [1.0, 1.0, 5.0, 5.0]), 8).makespan == 11.0
 
 
@@ -47,12 +47,9 @@ def test_doubling_ends_where_it_saves_little():
     assert nothing.makespan == nothing.tail == 0.0 and nothing.efficiency == 1.0
 
 
-class Costly(FakeTraining):
+class Costly(Step):
+    stage: ClassVar = "train"
     kind: ClassVar = "costly"
-
-    @property
-    def cost(self):
-        return self.seconds
 
     @property
     def group(self):
