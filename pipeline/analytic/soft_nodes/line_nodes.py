@@ -17,20 +17,20 @@ from pipeline.analytic.soft_horizons import Bend, above, ramp
 from pipeline.analytic.soft_nodes.nodes import LEVELS, UPPER
 from pipeline.analytic.soft_nodes.scratch import DRAFT_ROWS
 from pipeline.analytic.soft_nodes.shade import (
-    Five,
+    Behind,
     GridHorizons,
     NodeFrame,
     Six,
     YarnDirections,
-    add_node,
-    node_behind,
+    added,
+    shade_node,
     yarn_layer,
 )
 from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
 from pipeline.compiled.float32 import arcsine, remaining
-from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WARP
+from pipeline.truth.geometry.heightfield import BETA, COS_TWIST, RADIUS, SIN_TWIST, WARP
 
 AT, LENGTH, ACROSS, BY_ACROSS, ALONG_FROM, BY_ALONG, DENSITY, APART = range(8)
 """Angle across the yarn, or place along the line; length, negative of the latter and 0 at a rim; place across and along
@@ -168,55 +168,21 @@ def shade_lines(
     yarn: Float32,
     family: int,
     thickness: np.float32,
+    behind: Behind,
 ) -> Six:
     """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids of `size` cells.
 
     `falls` and `fall` are those of the horizons over curved cloth (soft_horizons); None on flat cloth, which has a loop
-    of its own.
+    of its own. With the light behind, `light` has the horizons of the back.
     """
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
+    layer = yarn_layer(yarn, thickness)
     step_a, step_b = (1, size) if family == WARP else (size, 1)
-    level, sharp = d.iz * _LEVELS, sharpness / _LEVELS
+    level, sharp = (d.iz if behind is None else -d.iz) * _LEVELS, sharpness / _LEVELS
     total = (_0, _0, _0, _0, _0, _0)
     for k in range(len(firsts)):
         at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
         cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
-        total = add_node(
-            total, d, at.frame, at.along, at.across, _1, _lit(light, falls, fall, cell, level, sharp), at.weight, layer
-        )
-    return total
-
-
-@fast_kernel
-def shade_lines_behind(
-    draft: Float32,
-    firsts: npt.NDArray[np.uint32],
-    rays: LineRays,
-    light: GridHorizons,
-    falls: Falls,
-    fall: Bend,
-    size: int,
-    sharpness: np.float32,
-    d: YarnDirections,
-    yarn: Float32,
-    family: int,
-    thickness: np.float32,
-) -> Five:
-    """Return the same with the light behind, whose horizons are those of the back."""
-    radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
-    step_a, step_b = (1, size) if family == WARP else (size, 1)
-    level, sharp = -d.iz * _LEVELS, sharpness / _LEVELS
-    a, c, s, a0, through = _0, _0, _0, _0, _0
-    for k in range(len(firsts)):
-        at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
-        cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
         lit = _lit(light, falls, fall, cell, level, sharp)
-        of_node = node_behind(d, at.frame, at.along, at.across, _1, lit, at.weight, layer)
-        a += of_node[0]
-        c += of_node[1]
-        s += of_node[2]
-        a0 += of_node[3]
-        through += of_node[4]
-    return a, c, s, a0, through
+        total = added(total, shade_node(d, at.frame, at.along, at.across, _1, lit, at.weight, layer, behind))
+    return total

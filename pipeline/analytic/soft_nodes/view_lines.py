@@ -34,7 +34,6 @@ from pipeline.analytic.soft_nodes.line_nodes import (
     STEEPEST_SINE,
     LineRays,
     shade_lines,
-    shade_lines_behind,
 )
 from pipeline.analytic.soft_nodes.nodes import (
     BLOCK,
@@ -437,14 +436,10 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
         draft, firsts, yarn, own = scratch.drafts[kind], scratch.firsts[kind, :count], table.yarn[family], result[kind]
         if back:
-            sums = shade_lines_behind(draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness)
-            write_sums(sums, own)
+            sums = shade_lines(draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness, True)
         elif look.bend_i > _0:
-            write_sums(
-                shade_lines(draft, firsts, rays, light, falls, fall, size, sharp, d, yarn, family, thickness), own
-            )
+            sums = shade_lines(draft, firsts, rays, light, falls, fall, size, sharp, d, yarn, family, thickness, None)
         else:
-            write_sums(
-                shade_lines(draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness), own
-            )
+            sums = shade_lines(draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness, None)
+        write_sums(sums, own)
     return gaps

@@ -7,12 +7,13 @@ those of the nodes of one piece. The loops have no branch and no call left, so t
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, kernel
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
+from pipeline.truth.geometry.heightfield import ALPHA, HeightField
 from pipeline.truth.geometry.march import azimuth_rows
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
@@ -173,6 +174,14 @@ class FlakeLayer(NamedTuple):
     scale: np.float32
 
 
+@inlined_kernel
+def flake_layer(field: HeightField, family: int, places: int) -> FlakeLayer:
+    """Return the layer on yarns of a family, for sums over so many places a node."""
+    alpha = field.yarn[family, ALPHA]
+    scale = alpha**3 / (4.0 * math.pi * places)
+    return FlakeLayer(np.float32(alpha**2), np.float32(field.thickness), np.float32(scale))
+
+
 @fast_kernel
 def weigh(
     normal: Normals,
@@ -283,7 +292,7 @@ def _sigma(x: np.float32, y: np.float32, z: np.float32, along: np.float32, squar
 
 
 @fast_kernel
-def reflected(
+def scattered(
     normal: Normals,
     tangent: Tangents,
     light: Direction,
@@ -292,10 +301,12 @@ def reflected(
     layer: FlakeLayer,
     lit: Float32,
     speculars: Float32,
+    behind: Literal[True] | None,
 ) -> np.float32:
-    """Add each node's share of the reflected specular component to `speculars`; return the sum.
+    """Add each node's share of the specular component to `speculars`; return the sum.
 
-    `size` is 1 / |wi + wo|^2.
+    `size` is 1 / |wi + wo|^2. Light from `behind`, of which `light` is the opposite, -wi, is transmitted, other light
+    reflected; None, not False: the loop is compiled for each of the two alone.
     """
     total = _0
     for k in range(len(lit)):
@@ -304,44 +315,31 @@ def reflected(
         cos_i = max(light.x * nx + light.y * ny + light.z * nz, _0)
         # The half vector's products with the tangent are sums of those of wi and wo.
         ax, ay, az, along_i = _products(light, tangent.x[k], tangent.y[k], tangent.z[k])
+        if behind is not None:
+            ax, ay, az, along_i = -ax, -ay, -az, -along_i
         bx, by, bz, along_o = _products(viewer, tangent.x[k], tangent.y[k], tangent.z[k])
         vx, vy, vz, along = ax + bx, ay + by, az + bz, along_i + along_o
         q = size * (layer.square * (vx * vx + vy * vy + vz * vz) + along * along)
         sigma_i, sigma_o = _sigma(ax, ay, az, along_i, layer.square), _sigma(bx, by, bz, along_o, layer.square)
         flakes = lit[k] * layer.scale * normal.inverse[k]
-        value = reflection(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
+        if behind is not None:
+            value = transmission(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
+        else:
+            value = reflection(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
         speculars[k] += value
         total += value
     return total
 
 
-@fast_kernel
-def transmitted(
-    normal: Normals,
-    tangent: Tangents,
-    light: Direction,
-    viewer: Direction,
-    size: np.float32,
-    layer: FlakeLayer,
-    lit: Float32,
-    speculars: Float32,
+@inlined_kernel
+def scatter(
+    normal: Normals, tangent: Tangents, towards: NodeDirections, layer: FlakeLayer, lit: Float32, speculars: Float32
 ) -> np.float32:
-    """Do the same for light from behind, of which `light` is the opposite, -wi."""
-    total = _0
-    for k in range(len(lit)):
-        nx, ny, nz = normal.x[k], normal.y[k], normal.z[k]
-        cos_o = max(viewer.x * nx + viewer.y * ny + viewer.z * nz, _0)
-        cos_i = max(light.x * nx + light.y * ny + light.z * nz, _0)
-        ax, ay, az, along_i = _products(light, tangent.x[k], tangent.y[k], tangent.z[k])
-        bx, by, bz, along_o = _products(viewer, tangent.x[k], tangent.y[k], tangent.z[k])
-        vx, vy, vz, along = bx - ax, by - ay, bz - az, along_o - along_i
-        q = size * (layer.square * (vx * vx + vy * vy + vz * vz) + along * along)
-        sigma_i, sigma_o = _sigma(ax, ay, az, along_i, layer.square), _sigma(bx, by, bz, along_o, layer.square)
-        flakes = lit[k] * layer.scale * normal.inverse[k]
-        value = transmission(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
-        speculars[k] += value
-        total += value
-    return total
+    """Do what `scattered` does, for the directions of a query."""
+    light, viewer, size = towards.light, towards.viewer, towards.size
+    if towards.behind:
+        return scattered(normal, tangent, light, viewer, size, layer, lit, speculars, True)
+    return scattered(normal, tangent, light, viewer, size, layer, lit, speculars, None)
 
 
 @fast_kernel

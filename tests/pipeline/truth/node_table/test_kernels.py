@@ -77,9 +77,8 @@ def specular(cloth, case, behind, **factors):
     for family, _, fine in pieces(table):
         parts = [np.ascontiguousarray(row[fine]) for row in table.fine]
         lit, shares = np.ones_like(parts[0]), np.zeros_like(parts[0])
-        function = kernels.transmitted if behind else kernels.reflected
         surface, towards = (kernels.Normals(*parts[:4]), kernels.Tangents(*parts[4:])), (direction(wi), direction(wo))
-        total = function(*surface, *towards, size, layer(field, family), lit, shares)
+        total = kernels.scattered(*surface, *towards, size, layer(field, family), lit, shares, behind or None)
         wide = np.stack(parts).astype(np.float64)
         expected = scattered(field, family, given, wo.astype(np.float64), wide[:3], wide[4:], wide[3], **factors)
         yield shares, total, expected
