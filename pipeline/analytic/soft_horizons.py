@@ -122,20 +122,14 @@ _FALL = np.float32(FALL)
 
 
 class Bend(NamedTuple):
-    """A curvature between two tabulated ones.
-
-    Attributes
-    ----------
-    low, high : int
-        Which ones.
-    of_low, of_high : float32
-        Factors of their falls, which are tabulated as shares of `FALL` times the curvature.
-    """
+    """A curvature between two tabulated ones."""
 
     low: int
     high: int
+    """Which ones."""
     of_low: np.float32
     of_high: np.float32
+    """Factors of their falls, which are tabulated as shares of `FALL` times the curvature."""
 
 
 @kernel

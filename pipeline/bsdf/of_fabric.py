@@ -40,21 +40,14 @@ _LABELS = np.array([-1.0, -1.0, 1.0])  # from the label of light to the directio
 
 
 class FabricBsdf(NamedTuple):
-    """The BSDF of a fabric, its bands, and how far the truth is from reciprocal.
-
-    Attributes
-    ----------
-    scattering : Scattering
-        ``visible``, and ``solar`` if another fabric gave its colours.
-    direct : float64 (P,)
-        Share of light of each patch that goes straight through.
-    asymmetry : float
-        Largest of `Scattering.reciprocity` before both ways are averaged.
-    """
+    """The BSDF of a fabric, its bands, and how far the truth is from reciprocal."""
 
     scattering: Scattering
+    """``visible``, and ``solar`` if another fabric gave its colours."""
     direct: Float64
+    """Share of light of each patch that goes straight through, (P,)."""
     asymmetry: float
+    """Largest of `Scattering.reciprocity` before both ways are averaged."""
 
 
 def fabric_bsdf(

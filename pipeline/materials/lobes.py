@@ -49,25 +49,18 @@ _SKY_VIEWS: Final = tuple(math.radians(a) for a in (5.0, 35.0, 65.0, 95.0, 125.0
 
 
 class Reflectance(NamedTuple):
-    """Reflectance by family (warp, weft), unit colours, float64 (2,).
-
-    Attributes
-    ----------
-    coverage : float64 (2,)
-        Share of the area in which the family is seen from above.
-    diffuse, specular, transmitted : float64 (2,)
-        Diffuse and specular reflectance, and diffuse transmittance, towards a viewer on the normal; sums over the
-        cloth, so that a family of little coverage has little.
-    grazing_diffuse, grazing_specular : float64 (2,)
-        Diffuse and specular reflectance towards a viewer at `GRAZING_VIEW`, the mean over azimuths.
-    """
+    """Reflectance by family (warp, weft), unit colours, float64 (2,)."""
 
     coverage: Float64
+    """Share of the area in which the family is seen from above, (2,)."""
     diffuse: Float64
     specular: Float64
     transmitted: Float64
+    """Diffuse and specular reflectance, and diffuse transmittance, towards a viewer on the normal; sums over the cloth,
+    so that a family of little coverage has little, (2,)."""
     grazing_diffuse: Float64
     grazing_specular: Float64
+    """Diffuse and specular reflectance towards a viewer at `GRAZING_VIEW`, the mean over azimuths, (2,)."""
 
     def per_area(self, values: Float64) -> Float64:
         """Return sums over the cloth as values of the area in which a family is seen."""

@@ -34,35 +34,25 @@ _ANY: Final = ""  # key of a network that answers for any fabric
 
 
 class Batch(NamedTuple):
-    """Queries and targets of a training step: F fabrics, n queries each.
-
-    Attributes
-    ----------
-    fabric : int64 (F,)
-        Index into the fabrics the network was built for.
-    u, v, sigma : float32 (F, n)
-        Footprint, in yarn spacings.
-    wi, wo : float32 (F, n, 3)
-        Directions.
-    sigma_minor, angle, curvature : float32 (F, n)
-        The rest of the query, as in `Queries`.
-    target : float32 (F, n, 4)
-        Components.
-    transparency : float32 (F, n)
-        Share of light from straight behind that passes unscattered.
-    """
+    """Queries and targets of a training step: F fabrics, n queries each."""
 
     fabric: Tensor
+    """Index into the fabrics the network was built for, int64 (F,)."""
     u: Tensor
     v: Tensor
     sigma: Tensor
+    """Footprint, in yarn spacings, float32 (F, n)."""
     wi: Tensor
     wo: Tensor
+    """Directions, float32 (F, n, 3)."""
     sigma_minor: Tensor
     angle: Tensor
     curvature: Tensor
+    """The rest of the query, as in `Queries`, float32 (F, n)."""
     target: Tensor
+    """Components, float32 (F, n, 4)."""
     transparency: Tensor
+    """Share of light from straight behind that passes unscattered, float32 (F, n)."""
 
 
 class Trainable(nn.Module):

@@ -40,24 +40,17 @@ _LEAST_DEVIATION = np.float32(1e-3)  # a thousandth of a yarn is a point
 
 
 class Sample(NamedTuple):
-    """N drawn directions.
-
-    Attributes
-    ----------
-    wi : float32 (N, 3)
-        Unit vectors to the light, over the whole sphere.
-    pdf : float32 (N,)
-        Their density, 1/sr; the probability of the delta lobe where light goes straight through.
-    straight : bool (N,)
-        Where light goes straight through, wi = -wo.
-    weight : float64 (N, 3)
-        Linear RGB: f_P / pdf, with the incident cosine inside; the transparency over its probability where straight.
-    """
+    """N drawn directions."""
 
     wi: Float32
+    """Unit vectors to the light, over the whole sphere, (N, 3)."""
     pdf: Float32
+    """Their density, 1/sr; the probability of the delta lobe where light goes straight through, (N,)."""
     straight: Mask
+    """Where light goes straight through, wi = -wo, (N,)."""
     weight: Float64
+    """Linear RGB: f_P / pdf, with the incident cosine inside; the transparency over its probability where straight,
+    (N, 3)."""
 
 
 class Drawn(NamedTuple):

@@ -41,29 +41,20 @@ ROUNDING: Final = 2e-6
 
 
 class CheckResult(NamedTuple):
-    """A measured number, its expected value, and whether both agree.
-
-    Attributes
-    ----------
-    name : str
-        Measured quantity.
-    measured, expected, standard_error : float
-        Measured number, expected value, and standard error, which is 0 for an exact number.
-    relation : str
-        Expected relation of the number to the expected value; ``reported``: there is no expected value.
-    status : str
-        ``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``.
-    note : str
-        Remark, shown in the table.
-    """
+    """A measured number, its expected value, and whether both agree."""
 
     name: str
+    """Measured quantity."""
     measured: float
     expected: float
     standard_error: float
+    """Measured number, expected value, and standard error, which is 0 for an exact number."""
     relation: Literal["=", "<=", "reported"]
+    """Expected relation of the number to the expected value; ``reported``: there is no expected value."""
     status: Literal["exact", "statistics", "broken", "reported"]
+    """``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``."""
     note: str
+    """Remark, shown in the table."""
 
     @property
     def sigmas(self) -> float:

@@ -77,49 +77,34 @@ _LEVELS = np.float32(LEVELS)
 
 
 class Lobes(NamedTuple):
-    """Mixtures for N looks; all probabilities of a look sum to 1.
-
-    Attributes
-    ----------
-    flakes : float32 (N, FLAKE_ROWS, K)
-        Lobes of flakes; the last two are the broad ones of warp and weft.
-    rest : float32 (N, 3)
-        Probabilities of NEAR, FAR and STRAIGHT.
-    """
+    """Mixtures for N looks; all probabilities of a look sum to 1."""
 
     flakes: Float32
+    """Lobes of flakes; the last two are the broad ones of warp and weft, (N, FLAKE_ROWS, K)."""
     rest: Float32
+    """Probabilities of NEAR, FAR and STRAIGHT, (N, 3)."""
 
 
 class Viewing(NamedTuple):
-    """A footprint and its viewer.
-
-    Attributes
-    ----------
-    x, y : float64
-        Centre, within the repeat.
-    dx, dy, rho : float32
-        Deviations along x and y, and correlation of the axes.
-    even : bool
-        Whether it covers the cloth evenly.
-    ox, oy, oz : float32
-        wo.
-    low, high, turn
-        Azimuths around wo, and where between them it lies.
-    """
+    """A footprint and its viewer."""
 
     x: float
     y: float
+    """Centre, within the repeat."""
     dx: np.float32
     dy: np.float32
     rho: np.float32
+    """Deviations along x and y, and correlation of the axes."""
     even: bool
+    """True if it covers the cloth evenly."""
     ox: np.float32
     oy: np.float32
     oz: np.float32
+    """wo."""
     low: int
     high: int
     turn: np.float32
+    """Azimuths around wo, and where between them it lies."""
 
 
 def point_places(count: int) -> Float32:

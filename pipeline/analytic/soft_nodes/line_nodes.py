@@ -40,7 +40,10 @@ FLOAT_BEND, FLOAT_HALF, FLOAT_DROP, BENDING, STEEPEST_SINE, ROWS_FROM, ROWS_PER 
 """Bend radius of the float, negative beneath and 0 if drawn flat, half length and drop; curve and largest sine as in
 `SoftNodeTable.bounds`; row of the grid for b = 0 and rows for each unit of b."""
 
-Falls = npt.NDArray[np.uint8] | None
+Falls = tuple[npt.NDArray[np.uint8], Bend] | None
+"""Falls of the horizons over curved cloth (soft_horizons), and the curvature; None on flat cloth, which has a loop of
+its own."""
+
 
 _0, _1, _2, _HALF = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(0.5)
 _RIGHT = np.float32(1.7)  # more than any angle across
@@ -51,24 +54,16 @@ _INVERSE_PI = np.float32(1.0 / math.pi)
 
 
 class LineRays(NamedTuple):
-    """How the rays of a footprint sink, and its deviation along lines.
-
-    Attributes
-    ----------
-    run : float32
-        Distance in the plane for each unit of height, T.
-    plane : float32
-        Height of the reference plane.
-    bent : float32
-        2 kappa T^2.
-    inverse : float32
-        1 / deviation of the footprint along the lines.
-    """
+    """How the rays of a footprint sink, and its deviation along lines."""
 
     run: np.float32
+    """Distance in the plane for each unit of height, T."""
     plane: np.float32
+    """Height of the reference plane."""
     bent: np.float32
+    """2 kappa T^2."""
     inverse: np.float32
+    """1 / deviation of the footprint along the lines."""
 
 
 class LineNode(NamedTuple):
@@ -141,12 +136,13 @@ def _node(
 
 @inlined_fast_kernel
 def _lit(
-    light: GridHorizons, falls: Falls, fall: Bend, cell: np.uint32, level: np.float32, sharpness: np.float32
+    light: GridHorizons, bent: Falls, cell: np.uint32, level: np.float32, sharpness: np.float32
 ) -> np.float32:  # fmt: skip
     """Return the share of a node that the light reaches."""
     grid, first, last, turn = light.grid, cell + light.low, cell + light.high, light.turn
     over = above(level, np.float32(grid[first]), np.float32(grid[last]), turn, sharpness)
-    if falls is not None:
+    if bent is not None:
+        falls, fall = bent
         little, much = np.float32(falls[fall.low, first]), np.float32(falls[fall.high, first])
         little += turn * (np.float32(falls[fall.low, last]) - little)
         much += turn * (np.float32(falls[fall.high, last]) - much)
@@ -160,8 +156,7 @@ def shade_lines(
     firsts: npt.NDArray[np.uint32],
     rays: LineRays,
     light: GridHorizons,
-    falls: Falls,
-    fall: Bend,
+    bent: Falls,
     size: int,
     sharpness: np.float32,
     d: YarnDirections,
@@ -172,8 +167,7 @@ def shade_lines(
 ) -> Six:
     """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids of `size` cells.
 
-    `falls` and `fall` are those of the horizons over curved cloth (soft_horizons); None on flat cloth, which has a loop
-    of its own. With the light behind, `light` has the horizons of the back.
+    With the light behind, `light` has the horizons of the back.
     """
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
     layer = yarn_layer(yarn, thickness)
@@ -183,6 +177,6 @@ def shade_lines(
     for k in range(len(firsts)):
         at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
         cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
-        lit = _lit(light, falls, fall, cell, level, sharp)
+        lit = _lit(light, bent, cell, level, sharp)
         total = added(total, shade_node(d, at.frame, at.along, at.across, _1, lit, at.weight, layer, behind))
     return total

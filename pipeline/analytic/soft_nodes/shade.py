@@ -58,17 +58,7 @@ _AWAY = np.float32(0.05)  # cosine to the viewer of a fixed node that faces away
 
 
 class YarnDirections(NamedTuple):
-    """One query's directions in the frame of one family.
-
-    Attributes
-    ----------
-    ix, iy, iz, ox, oy, oz : float32
-        wi and wo.
-    size : float32
-        1 / |wi + wo|^2.
-    alike, right, opposite : float32
-        Weights of three relations of their azimuths (soft_horizons).
-    """
+    """One query's directions in the frame of one family."""
 
     ix: np.float32
     iy: np.float32
@@ -76,10 +66,13 @@ class YarnDirections(NamedTuple):
     ox: np.float32
     oy: np.float32
     oz: np.float32
+    """wi and wo."""
     size: np.float32
+    """1 / |wi + wo|^2."""
     alike: np.float32
     right: np.float32
     opposite: np.float32
+    """Weights of three relations of their azimuths (soft_horizons)."""
 
 
 class NodeFrame(NamedTuple):

@@ -38,27 +38,20 @@ _FADED = np.float32(2e-3)  # seen share of the area at which components have fad
 
 
 class Rounds(NamedTuple):
-    """N footprints as round ones along a line.
-
-    Attributes
-    ----------
-    u, v, sigma, cosine, sine : float32 (N,)
-        Centre, deviation of each round one, direction of the line.
-    readings, spread : int64 (N,), float32 (N,)
-        Number of round ones, standard deviation of their places.
-    wi, wo : float32 (N, 3)
-        Directions.
-    """
+    """N footprints as round ones along a line."""
 
     u: Float32
     v: Float32
     sigma: Float32
     cosine: Float32
     sine: Float32
+    """Centre, deviation of each round one, direction of the line, (N,)."""
     readings: Index
     spread: Float32
+    """Number of round ones, standard deviation of their places, int64 (N,), float32 (N,)."""
     wi: Float32
     wo: Float32
+    """Directions, (N, 3)."""
 
 
 def rounds(queries: Queries) -> Rounds:

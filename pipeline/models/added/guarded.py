@@ -55,25 +55,17 @@ class MethodFailed(WorkFailed):
 
 
 class Call(NamedTuple):
-    """Calls of a method that are under way.
-
-    Attributes
-    ----------
-    since : float
-        Time of the last call's begin or end, by the monotonic clock.
-    limit : float
-        Seconds that a call may take.
-    running : int
-        Number of calls, one a thread at most.
-    name, function : str
-        The method, and its function.
-    """
+    """Calls of a method that are under way."""
 
     since: float
+    """Time of the last call's begin or end, by the monotonic clock."""
     limit: float
+    """Seconds that a call may take."""
     running: int
+    """Number of calls, one a thread at most."""
     name: str
     function: str
+    """The method, and its function."""
 
     @classmethod
     def read(cls, shared: Any) -> Call:

@@ -47,25 +47,17 @@ _NO_FALL = -1.0  # finite, because weights are averaged
 
 
 class View(NamedTuple):
-    """Footprints, viewers and curvatures of n queries.
-
-    Attributes
-    ----------
-    u, v : Tensor (n,)
-        Centres, in repeats.
-    sigma : Tensor (n,)
-        Footprints, in yarn spacings.
-    wo : Tensor (n, 3)
-        To the viewer.
-    curvature : Tensor (n,)
-        In the viewer's plane, 1/yarn spacings.
-    """
+    """Footprints, viewers and curvatures of n queries."""
 
     u: Tensor
     v: Tensor
+    """Centres, in repeats, (n,)."""
     sigma: Tensor
+    """Footprints, in yarn spacings, (n,)."""
     wo: Tensor
+    """To the viewer, (n, 3)."""
     curvature: Tensor
+    """In the viewer's plane, 1/yarn spacings, (n,)."""
 
 
 class SilhouetteData(nn.Module):

@@ -164,27 +164,19 @@ class TextureNetwork(QueryNetwork):
         The design.
     repeat : tuple of int
         Extent of the fabric's repeat in x and y, in yarn spacings.
-
-    Attributes
-    ----------
-    textures : tuple of str
-        Names of those parts that are textures.
-    levels : nn.ParameterList
-        Pyramid of features, finest first.
-    decoder : nn.Sequential
-        Puts out the four components in network space.
-    depth : nn.Parameter or None
-        The offset texture.
-    offset : nn.Sequential or None
-        Perceptron from the offset texture and the view to the depth.
     """
 
     textures: ClassVar[tuple[str, ...]]
+    """Names of those parts that are textures."""
     options: TextureOptions
     levels: nn.ParameterList
+    """Pyramid of features, finest first."""
     decoder: nn.Sequential
+    """Puts out the four components in network space."""
     depth: nn.Parameter | None
+    """The offset texture, nn.Parameter or None."""
     offset: nn.Sequential | None
+    """Perceptron from the offset texture and the view to the depth, nn.Sequential or None."""
 
     def __init__(self, options: TextureOptions, repeat: tuple[int, int]) -> None:
         super().__init__()

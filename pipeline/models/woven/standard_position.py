@@ -40,24 +40,16 @@ SYMMETRIES: Final = tuple(Symmetry(bool(i & 1), bool(i & 2), bool(i & 4)) for i 
 
 
 class Placement(NamedTuple):
-    """Transformations that bring F fabrics into standard position.
-
-    Attributes
-    ----------
-    mirror : bool (F, 2)
-        Mirrors of x and of y.
-    exchange : bool (F, 1)
-        Whether x and y change places afterwards.
-    start : float (F, 2)
-        Start of the standard repeat after that, as shares of it.
-    repeat : float (F, 2)
-        Extent of the standard repeat in x and y, in yarn spacings.
-    """
+    """Transformations that bring F fabrics into standard position."""
 
     mirror: Tensor
+    """Mirrors of x and of y, bool (F, 2)."""
     exchange: Tensor
+    """True if x and y change places afterwards, bool (F, 1)."""
     start: Tensor
+    """Start of the standard repeat after that, as shares of it, float (F, 2)."""
     repeat: Tensor
+    """Extent of the standard repeat in x and y, in yarn spacings, float (F, 2)."""
 
     def move(self, u: Tensor, v: Tensor, wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return the queries about the fabrics in standard position.

@@ -62,20 +62,14 @@ _0 = np.float32(0.0)
 
 
 class Requested(NamedTuple):
-    """When an answer is good enough.
-
-    Attributes
-    ----------
-    relative, absolute : float
-        Requested standard error: relative to the norm of the four components, and 1/sr.
-    front, behind : (Factors, Factors)
-        Calibration of answers by the table alone and of refined ones, for light from either side.
-    """
+    """When an answer is good enough."""
 
     relative: float
     absolute: float
+    """Requested standard error: relative to the norm of the four components, and 1/sr."""
     front: tuple[Factors, Factors]
     behind: tuple[Factors, Factors]
+    """Calibration of answers by the table alone and of refined ones, for light from either side."""
 
 
 class _Room(NamedTuple):

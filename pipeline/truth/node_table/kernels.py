@@ -26,51 +26,34 @@ _TINY = np.float32(1e-30)
 
 
 class Direction(NamedTuple):
-    """A unit direction, and where horizons towards it stand in a table.
-
-    Attributes
-    ----------
-    x, y, z : float32
-        Components.
-    slope : float32
-        Rise per unit of distance in the fabric plane.
-    first, second : int
-        The two azimuths of the table around it.
-    turn : float32
-        Its place between them, 0 to 1.
-    """
+    """A unit direction, and where horizons towards it stand in a table."""
 
     x: np.float32
     y: np.float32
     z: np.float32
+    """Components."""
     slope: np.float32
+    """Rise per unit of distance in the fabric plane."""
     first: int
     second: int
+    """The two azimuths of the table around it."""
     turn: np.float32
+    """Its place between them, 0 to 1."""
 
 
 class NodeDirections(NamedTuple):
-    """Directions of one query.
-
-    Attributes
-    ----------
-    behind : bool
-        Whether the light is behind the cloth.
-    light : Direction
-        wi; of light from behind the components of -wi, but slope and azimuths of wi reflected in the fabric plane.
-    viewer : Direction
-        wo.
-    through : Direction
-        -wo reflected in the fabric plane: the way through a gap, as the back of the cloth sees it.
-    size : float32
-        1 / |wi + wo|^2.
-    """
+    """Directions of one query."""
 
     behind: bool
+    """True if the light is behind the cloth."""
     light: Direction
+    """wi; of light from behind the components of -wi, but slope and azimuths of wi reflected in the fabric plane."""
     viewer: Direction
+    """wo."""
     through: Direction
+    """-wo reflected in the fabric plane: the way through a gap, as the back of the cloth sees it."""
     size: np.float32
+    """1 / |wi + wo|^2."""
 
 
 @kernel
@@ -94,30 +77,21 @@ def _direction(x: float, y: float, z: float, sign: float, azimuths: int) -> Dire
 
 
 class NodeShares(NamedTuple):
-    """Shares of the nodes in the sums of one query; overwritten for each query.
-
-    Attributes
-    ----------
-    weight : float32 (N,)
-        Share of the footprint.
-    lit : float32 (N,)
-        `weight` where the viewer and the light are visible, else 0.
-    areas, diffuses, speculars : float32 (N,)
-        Share in the denominator, and in the diffuse (times pi) and specular numerators.
-    margins, lit_margins : float32 (N,)
-        Slope by which the viewer, and viewer and light, lie above the horizon; negative below it.
-    undecided : float32 (N,)
-        Share in the denominator, were the node visible, if the horizons beside a direction disagree; else 0.
-    """
+    """Shares of the nodes in the sums of one query; overwritten for each query."""
 
     weight: Float32
+    """Share of the footprint, (N,)."""
     lit: Float32
+    """`weight` where the viewer and the light are visible, else 0, (N,)."""
     areas: Float32
     diffuses: Float32
     speculars: Float32
+    """Share in the denominator, and in the diffuse (times pi) and specular numerators, (N,)."""
     margins: Float32
     lit_margins: Float32
+    """Slope by which the viewer, and viewer and light, lie above the horizon; negative below it, (N,)."""
     undecided: Float32
+    """Share in the denominator, were the node visible, if the horizons beside a direction disagree; else 0, (N,)."""
 
 
 def no_shares(nodes: int) -> NodeShares:
@@ -157,21 +131,14 @@ class HorizonSlopes(NamedTuple):
 
 
 class FlakeLayer(NamedTuple):
-    """The layer of flakes on a piece of yarn.
-
-    Attributes
-    ----------
-    square : float32
-        alpha^2.
-    thickness : float32
-        Optical thickness.
-    scale : float32
-        alpha^3 / (4 pi), divided by the number of fine nodes in a node.
-    """
+    """The layer of flakes on a piece of yarn."""
 
     square: np.float32
+    """alpha^2."""
     thickness: np.float32
+    """Optical thickness."""
     scale: np.float32
+    """alpha^3 / (4 pi), divided by the number of fine nodes in a node."""
 
 
 @inlined_kernel

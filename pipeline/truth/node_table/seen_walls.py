@@ -35,23 +35,17 @@ _OF_STEPS = np.float32(1.0 / (HEIGHTS - 1))
 
 
 class WallRoom(NamedTuple):
-    """Room for the walls of one query.
-
-    Attributes
-    ----------
-    seen, weight, areas, lit, speculars : float32 (W,)
-        Seen height, share of the footprint, share in the denominator, that of lit walls over the cosine of the rim, and
-        share in the specular numerator.
-    places : float32 (3, W)
-        The middle of what is seen.
-    """
+    """Room for the walls of one query."""
 
     seen: Float32
     weight: Float32
     areas: Float32
     lit: Float32
     speculars: Float32
+    """Seen height, share of the footprint, share in the denominator, that of lit walls over the cosine of the rim, and
+    share in the specular numerator, (W,)."""
     places: Float32
+    """The middle of what is seen, (3, W)."""
 
 
 def wall_room(table: ExactNodes) -> WallRoom:
