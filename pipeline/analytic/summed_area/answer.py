@@ -99,7 +99,9 @@ def _level_of(tables: ClusterTables, sigma: np.float32) -> int:
 
 
 @inlined_kernel
-def find(tables: ClusterTables, level: int, x: float, y: float, texels: Index, weights: Float32) -> None:
+def find(
+    tables: ClusterTables, level: int, x: float | np.float32, y: float | np.float32, texels: Index, weights: Float32
+) -> None:
     """Write the texels around a place, (CORNERS,), and their weights."""
     first, n, shift = tables.levels[level, 0], tables.levels[level, 1], tables.levels[level, 2]
     weights[:] = _0

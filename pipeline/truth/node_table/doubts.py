@@ -51,8 +51,7 @@ class Doubts(NamedTuple):
     diffuse: Float32
     """Changes of a node's family by the borders beside it, if these lie where the margins say, (N,)."""
     left: Float64
-    """Errors that nodes which are not refined leave together: the squared error, and the changes of the four components,
-    (5,)."""
+    """Errors that unrefined nodes leave together: the squared error and the four components' changes, (5,)."""
     levels: Float64
     """The same for nodes whose score lies between two powers of 2, (L, 5)."""
 
