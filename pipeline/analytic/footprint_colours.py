@@ -60,12 +60,7 @@ class Threads(NamedTuple):
 def footprint_colours(fabric: Fabric, queries: Queries) -> Float64:
     """Return the colours of the components of N queries, float64 (N, 4, 3), linear sRGB.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    queries : Queries
-        Footprints of any kind; thinner ellipses than a `COARSE_LINE` resolves count as wider. Cloth counts as flat.
+    Footprints are of any kind; thinner ellipses than a `COARSE_LINE` resolves count as wider. Cloth counts as flat.
     """
     result, back = np.empty((len(queries.u), 4, 3)), queries.wo[:, 2] < 0.0
     if back.any():

@@ -63,12 +63,9 @@ def over_boxes(
 ) -> tuple[Float64, Float64]:
     """Return mean and variance of horizons over boxes, (azimuths, boxes), boxes of a row following each other.
 
-    Parameters
-    ----------
-    values, squares : float (azimuths, rows, columns)
-        Horizons of the cells of a grid, and their squares (means of both, where many grids share the boxes).
-    rows, columns : float64 (boxes, cells)
-        Share of each box in each cell, along both axes.
+    `values` and `squares` (azimuths, rows, columns) are horizons of the cells of a grid, and their squares (means of
+    both, where many grids share the boxes); `rows` and `columns` (boxes, cells) the share of each box in each cell,
+    along both axes.
     """
     mean, square = ((rows @ grid @ columns.T).reshape(len(grid), -1) for grid in (values, squares))
     return mean, np.maximum(square - mean**2, 0.0)

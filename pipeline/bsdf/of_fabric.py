@@ -59,18 +59,8 @@ def fabric_bsdf(
 ) -> FabricBsdf:
     """Compute the BSDF of a fabric; its front is the side z > 0.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        Its colours, as luminance, are those of the visible band.
-    solar : Fabric, optional
-        The same cloth with the colours of the solar band, the mean of its three channels; BadInput if it is another.
-    basis : Basis
-        Patches.
-    points : int
-        Points of a pair of patches, a power of two, at least 1.
-    truth : TruthOptions
-        Options of the truth.
+    Its colours, as luminance, are those of the visible band; those of `solar` are of the solar band, the mean of the
+    three channels; BadInput if that is another cloth. `points` of a pair of patches are a power of two, at least 1.
     """
     if solar is not None and solar.optics() != fabric.optics():
         raise BadInput("export", "solar", solar.name, f"has to be the cloth {fabric.name!r} in other colours")

@@ -110,23 +110,10 @@ def ggx_density(half: Float64, along: float, across: float) -> Float64:
 
 
 def ggx(wi: Float64, wo: Float64, along: float, across: float, f0: Float64) -> Float64:
-    """Return the GGX lobe without the incident cosine.
+    """Return the GGX lobe without the incident cosine, float64 (N, 3), 1/sr.
 
-    Parameters
-    ----------
-    wi : float64 (N, 3)
-        Directions to the light, z > 0, in the frame of fibre (x), across it (y) and normal (z).
-    wo : float64 (3,)
-        Direction to the viewer.
-    along, across : float
-        Roughness a_x and a_y.
-    f0 : float64 (3,)
-        Reflectance at normal incidence.
-
-    Returns
-    -------
-    float64 (N, 3)
-        In 1/sr.
+    `wi` (N, 3) and `wo` (3,) lie in the frame of fibre (x), across it (y) and normal (z), wi.z > 0; roughness is a_x
+    `along` and a_y `across`, `f0` (3,) the reflectance at normal incidence.
     """
     half = wi + wo
     half /= np.linalg.norm(half, axis=-1, keepdims=True)

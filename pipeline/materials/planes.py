@@ -97,10 +97,7 @@ class Planes(NamedTuple):
 def layout(fabric: Fabric, size: int) -> Layout:
     """Return the layout of a fabric's maps, `size` texels along the longer side.
 
-    Raises
-    ------
-    BadInput
-        If the size is no power of two from `SMALLEST_MAP` to `LARGEST_MAP`, or too small for the repeat.
+    BadInput if the size is no power of two from `SMALLEST_MAP` to `LARGEST_MAP`, or too small for the repeat.
     """
     if not SMALLEST_MAP <= size <= LARGEST_MAP or size & (size - 1):
         raise BadInput("export", "size", size, f"must be a power of two from {SMALLEST_MAP} to {LARGEST_MAP}")

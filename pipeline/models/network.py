@@ -141,15 +141,7 @@ class Portable(Method, Protocol):
 
 
 class Answering(nn.Module):
-    """A function of tensors, with the network whose weights it reads.
-
-    Parameters
-    ----------
-    network : nn.Module
-        Holds the weights.
-    answer : callable
-        From inputs and constants to components (N, 4).
-    """
+    """A function from inputs and constants to components (N, 4), with the network whose weights it reads."""
 
     def __init__(self, network: nn.Module, answer: Callable[..., Tensor]) -> None:
         super().__init__()
@@ -187,12 +179,8 @@ def evaluated(
 class NetworkMethod(Generic[Net]):
     """Trained networks as a method: one that answers for any fabric, or one for each fabric.
 
-    Parameters
-    ----------
-    networks : QueryNetwork or mapping
-        Trained weights: one network, or from the fingerprint of a fabric's optics to its network.
-    domain : Domain, optional
-        Domain of the training; any query if left out.
+    `networks` is one network, or from the fingerprint of a fabric's optics to its network. Without the `domain` of the
+    training, any query is answered.
     """
 
     def __init__(self, networks: Net | Mapping[str, Net], domain: Domain | None = None) -> None:

@@ -81,12 +81,7 @@ def worst(
 ) -> CheckResult:
     """Check many numbers; the result is that of the number furthest off, in its standard errors.
 
-    Parameters
-    ----------
-    measured, errors : float (N,)
-        The numbers and their standard errors.
-    freedom : int
-        Degrees of freedom of the errors.
+    `measured` (N,) have `errors` (N,), their standard errors, of so many degrees of freedom.
     """
     values, spread = np.broadcast_arrays(np.atleast_1d(np.asarray(measured, np.float64)), np.asarray(errors))
     # Rounding counts as error too: two sums of the same points differ by it and by nothing else.

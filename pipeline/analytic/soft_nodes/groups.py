@@ -181,16 +181,9 @@ LARGEST_SINE: Final = 0.999
 
 
 def piece_rows(yarn: Float64, piece: CellPiece, across: Rule, along: Rule) -> Float64:
-    """Return the surface at nodes, (SURFACE_ROWS, nodes); nodes across the yarn follow each other.
+    """Return the surface at the nodes of a piece, (SURFACE_ROWS, nodes); nodes across the yarn follow each other.
 
-    Parameters
-    ----------
-    yarn : float64 (families, 8)
-        `HeightField.yarn`.
-    piece : CellPiece
-        The piece, of a yarn or of a gap.
-    across, along : Rule
-        Its nodes.
+    `yarn` is `HeightField.yarn`; `across` and `along` are the nodes of the piece, which may be a gap.
     """
     lines, columns = len(along.places), len(across.places)
     if piece.family == GAP:

@@ -113,12 +113,7 @@ def blocks_of(
 ) -> tuple[dict[int, Index], tuple[int, int, int]]:
     """Return the block of each slice of each patch, (G,), and where warps and wefts begin and end among the blocks.
 
-    Parameters
-    ----------
-    found, patches
-        See `sources`.
-    count : int
-        Blocks of both families, at least 2.
+    `found` and `patches` are those of `sources`; `count` is the number of blocks of both families, at least 2.
     """
     times = Counter(source.block for source in found)
     yarns = {block: patch for block, patch in patches.items() if patch.piece.family != GAP}

@@ -64,16 +64,8 @@ def plan(finest: int, uniform: float) -> list[Level]:
 class Sums:
     """Sums of a quantity over clusters, at all levels.
 
-    Parameters
-    ----------
-    repeat : (picks, ends)
-        The repeat.
-    found, patches, blocks
-        See `clusters`.
-    count : int
-        Blocks of yarn; one more is for gaps.
-    levels : list of Level
-        See `plan`.
+    `repeat` is (picks, ends); `found`, `patches` and `blocks` are those of `clusters`, `levels` those of `plan`; there
+    are `count` blocks of yarn, and one more for gaps.
     """
 
     def __init__(

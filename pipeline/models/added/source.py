@@ -106,19 +106,10 @@ class CodeSource(NamedTuple):
 
 
 def locate(text: str, folder: str = "") -> CodeSource:
-    """Find code by ``module:name`` or ``file.py:name``.
+    """Find code by ``module:name`` or ``file.py:name``, as the command line has it.
 
-    Parameters
-    ----------
-    text : str
-        As the command line has it; a path is relative to the current folder.
-    folder : str
-        Folder with modules that are not installed; default: the current one.
-
-    Raises
-    ------
-    BadInput
-        If it has another form, or there is no such file or module.
+    A path is relative to the current folder; so are modules that are not installed, if no other `folder` is given.
+    BadInput if `text` has another form, or there is no such file or module.
     """
     place, _, name = text.rpartition(":")
     if not place or not name.isidentifier():

@@ -63,17 +63,9 @@ class View(NamedTuple):
 class SilhouetteData(nn.Module):
     """Queries about the silhouette and their answers; no part of a trained model.
 
-    Parameters
-    ----------
-    columns : mapping
-        Rows of kind `opacity` or `grazing_cosine` (`pipeline.shards.silhouettes`).
-    repeat : tuple of int
-        Extent of the fabric's repeat in x and y, in yarn spacings.
-
-    Attributes
-    ----------
-    target : Tensor (n, 2)
-        Opacity and 0; or mean and variance of the grazing cosine, in units of sqrt(kappa) and kappa.
+    `columns` are rows of kind `opacity` or `grazing_cosine` (`pipeline.shards.silhouettes`), `repeat` is ends and
+    picks. Targets (n, 2) are opacity and 0, or mean and variance of the grazing cosine, in units of sqrt(kappa) and
+    kappa.
     """
 
     def __init__(self, columns: Mapping[str, npt.NDArray[Any]], repeat: tuple[int, int]) -> None:
@@ -97,14 +89,8 @@ class SilhouetteData(nn.Module):
 class CurvedNetwork(TextureNetwork):
     """Textures and perceptrons of one fabric.
 
-    Parameters
-    ----------
-    options, repeat : CurvedOptions, tuple of int
-        As of any `TextureNetwork`.
-    silhouettes : SilhouetteData, optional
-        Training rows of the opacity; needed for training only.
-    fall : float
-        Depth below the boundary that every ray hits, in yarn spacings; negative if there is none, as with gaps.
+    `silhouettes` are training rows of the opacity, needed for training only; `fall` is the depth below the boundary
+    that every ray hits, in yarn spacings, negative if there is none, as with gaps.
     """
 
     textures: ClassVar[tuple[str, ...]] = ("opacity_levels", "depth", "levels")

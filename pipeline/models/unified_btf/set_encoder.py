@@ -98,18 +98,9 @@ class SetEncoder(nn.Module):
         self.scale: Tensor
 
     def forward(self, angles: Tensor, values: Tensor) -> Tensor:
-        """Encode T texels seen under the same n pairs of directions.
+        """Encode T texels seen under the same n pairs of directions, (T, latent).
 
-        Parameters
-        ----------
-        angles : Tensor (n, 4)
-            Directions.
-        values : Tensor (n, T, 4)
-            Samples.
-
-        Returns
-        -------
-        Tensor (T, latent)
+        `angles` (n, 4) are the directions, `values` (n, T, 4) the samples.
         """
         count, texels, _ = values.shape
         weights = self.weigh(angles) / count

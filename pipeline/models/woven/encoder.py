@@ -65,14 +65,7 @@ class WovenInputs(NamedTuple):
 def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | None = None) -> WovenInputs:
     """Return the inputs of at least one fabric.
 
-    Parameters
-    ----------
-    fabrics : sequence of Fabric
-        At least one.
-    options : WovenOptions
-        Whether fabrics are brought into standard position, and the side of their maps.
-    like : Fabric, optional
-        All are mirrored, exchanged and begun as brings this one into standard position; otherwise each by itself.
+    All are mirrored, exchanged and begun as brings `like` into standard position; without it, each by itself.
     """
     centre = (np.arange(options.map_texels) + 0.5) / options.map_texels
     maps, parameters, placements = [], [], []

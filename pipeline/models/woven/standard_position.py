@@ -54,12 +54,7 @@ class Placement(NamedTuple):
     def move(self, u: Tensor, v: Tensor, wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return the queries about the fabrics in standard position.
 
-        Parameters
-        ----------
-        u, v : Tensor (F, n)
-            Centres as shares of each fabric's own repeat; the results are shares of the standard one, in [0, 1).
-        wi, wo : Tensor (F, n, 3)
-            Directions.
+        u and v (F, n) are shares of each fabric's own repeat; the results are shares of the standard one, in [0, 1).
         """
         sign = torch.cat([1.0 - 2.0 * self.mirror, torch.ones_like(self.start[:, :1])], dim=-1).unsqueeze(1)
         u, v = u * sign[..., 0], v * sign[..., 1]
@@ -81,16 +76,9 @@ class Placement(NamedTuple):
 
 
 def standard(fabric: Fabric) -> tuple[Fabric, Symmetry, tuple[int, int]]:
-    """Bring a fabric into standard position.
+    """Bring a fabric into standard position; return it, and mirrors and exchange that were applied first.
 
-    Returns
-    -------
-    fabric : Fabric
-        The fabric in standard position.
-    symmetry : Symmetry
-        Mirrors and exchange that are applied first.
-    start : tuple of int
-        End and pick of the result at which the standard repeat begins.
+    Last come the end and the pick of the result at which the standard repeat begins.
     """
     best = min((*_smallest(moved(fabric, symmetry)), symmetry) for symmetry in SYMMETRIES)
     *_, (pick, end), symmetry = best

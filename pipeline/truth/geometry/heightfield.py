@@ -150,12 +150,8 @@ def surface_at(
 ) -> tuple[int, int, float, float, float, float, float, float, float]:
     """Return the surface seen from above at (x, y) in cell (pick, end) of the repeat.
 
-    Returns
-    -------
-    family, side : int
-        WARP, WEFT or GAP; TOP or UNDER.
-    height, n_x, n_y, n_z, t_x, t_y, t_z : float
-        Height and the unit ply normal and fibre tangent; all 0 at a gap.
+    It is family (WARP, WEFT or GAP), side (TOP or UNDER), height, unit ply normal and unit fibre tangent; all 0 at a
+    gap.
     """
     family = int(field.top[pick, end])
     side = TOP

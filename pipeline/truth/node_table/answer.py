@@ -219,12 +219,8 @@ def sum_pieces(
 ) -> tuple[float, float, float, float, int]:
     """Write the sums over all nodes, their changes by borders, and their squared errors.
 
-    Returns
-    -------
-    area, area_error, moved_area, undecided : float
-        The denominator, its squared error, its change by borders, and the share of undecided nodes in it.
-    nodes : int
-        Nodes visited.
+    Returns the denominator, its squared error, its change by borders, the share of undecided nodes in it, and the
+    number of nodes visited.
     """
     area, area_error, moved_area, undecided = np.float64(0.0), np.float64(0.0), np.float64(0.0), np.float64(0.0)
     nodes = 0

@@ -69,12 +69,8 @@ def point_share(
 ) -> tuple[int, float, float, float, float]:
     """Return the shares of a point, 0 <= x < ends, 0 <= y < picks, in the numerators and the denominator.
 
-    Returns
-    -------
-    family : int
-        WARP, WEFT or GAP.
-    area, specular, diffuse, through : float
-        A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); the unscattered share, times A(wo).
+    First the family: WARP, WEFT or GAP; then A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); and the unscattered
+    share, times A(wo).
     """
     viewer = directions.viewer
     surface = surface_at(front, x, y, int(x), int(y))
