@@ -19,13 +19,7 @@ _MOST_OBJECTS = 256  # fabric objects remembered; an editor makes a new one at e
 
 
 class PerFabric(Generic[Made]):
-    """Products of fabrics, each computed at its first use and then kept.
-
-    Parameters
-    ----------
-    make : callable
-        Turns a fabric into its product; must depend on the fabric's optics alone.
-    """
+    """Products of fabrics, which depend on their optics alone, each made at its first use and then kept."""
 
     def __init__(self, make: Callable[[Fabric], Made]) -> None:
         self._make = make

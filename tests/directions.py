@@ -11,6 +11,11 @@ def unit(degrees, azimuth):
     return np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)])
 
 
+def above(x, y):
+    """Return the unit direction in front with these components."""
+    return np.array([x, y, math.sqrt(1.0 - x * x - y * y)])
+
+
 def sphere(rows, columns):
     """Return the middles of cells of equal solid angle, cosine by azimuth, (rows columns, 3)."""
     z = -1.0 + 2.0 * (np.arange(rows) + 0.5) / rows

@@ -30,17 +30,9 @@ Floats = npt.NDArray[np.float64]
 class Draft:
     """One repeat of a weave.
 
-    Parameters
-    ----------
-    warp_over : bool (picks, ends)
-        True where the warp is on top; copied and made read-only.
-    name : str
-        In weavers' terms, such as ``"twill 3/1"``. Equality ignores it.
-
-    Raises
-    ------
-    BadInput
-        If the matrix is empty, not two-dimensional, or larger than `LARGEST_REPEAT`.
+    `warp_over` (picks, ends) is True where the warp is on top; it is copied and made read-only. `name` is in weavers'
+    terms, such as ``"twill 3/1"``; equality ignores it. BadInput if the matrix is empty, not two-dimensional, or larger
+    than `LARGEST_REPEAT`.
     """
 
     warp_over: Bools

@@ -21,16 +21,8 @@ _WORD = 60  # letters of a name that is compared with known ones
 class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
     """Input that cannot be used; exit code 2.
 
-    Parameters
-    ----------
-    where : str
-        The file or command that holds the value.
-    key : str
-        Dotted path of the key; empty when the whole file is meant.
-    value : object
-        The value found.
-    allowed : str
-        What is allowed, as the end of a sentence.
+    `where` is the file or command that holds the value, `key` its dotted path, empty when the whole file is meant;
+    `allowed` is what is allowed, as the end of a sentence.
     """
 
     exit_code = 2
@@ -53,16 +45,9 @@ class WorkFailed(RuntimeError):  # noqa: N818 - the name reads as the sentence d
 
 
 def one_line(text: object, most: int = MOST_LETTERS, keep: str = "start") -> str:
-    """Return a text as one line that a terminal shows as it is.
+    """Return a text, or the `str` of anything else, as one line of at most so many letters, as a terminal shows it.
 
-    Parameters
-    ----------
-    text : object
-        The text; of anything else its `str`.
-    most : int
-        Most letters; a longer text is cut.
-    keep : str
-        ``start`` or ``end``: the part that is left of a longer text. The end of a path has the file's name.
+    Of a longer text the ``start`` or the ``end`` is kept: the end of a path has the file's name.
     """
     words = str(text)
     cut = words[: 4 * most] if keep == "start" else words[-4 * most :]  # whatever its length, in little time

@@ -35,25 +35,17 @@ Floats = npt.NDArray[np.float64]
 
 
 class ClothSurface(NamedTuple):
-    """Surface at given points; arrays of one shape.
-
-    Attributes
-    ----------
-    yarn : int8
-        `WARP`, `WEFT`, or `GAP` where no yarn covers the point.
-    under : bool
-        True where the yarn on top is too narrow and the one beneath shows.
-    height : float64
-        In yarn spacings, -inf in gaps; the axis of a yarn is at 0 where a float begins and ends.
-    normal, tangent : float64 (..., 3)
-        Unit ply normal n_p (upward) and unit fibre tangent t; +z and 0 in gaps.
-    """
+    """Surface at given points; arrays of one shape."""
 
     yarn: npt.NDArray[np.int8]
+    """`WARP`, `WEFT`, or `GAP` where no yarn covers the point, int8."""
     under: npt.NDArray[np.bool_]
+    """True where the yarn on top is too narrow and the one beneath shows."""
     height: Floats
+    """In yarn spacings, -inf in gaps; the axis of a yarn is at 0 where a float begins and ends."""
     normal: Floats
     tangent: Floats
+    """Unit ply normal n_p (upward) and unit fibre tangent t; +z and 0 in gaps, float64 (..., 3)."""
 
 
 def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> ClothSurface:

@@ -46,18 +46,12 @@ _BISECTIONS: Final = 10
 
 
 class CoverageTable(NamedTuple):
-    """One fabric's front.
-
-    Attributes
-    ----------
-    field : HeightField
-        Its heights.
-    shares : float32 (curvatures, azimuths, depths + 1)
-        Coverage of a repeat at roots of the depth from 0 to 1.
-    """
+    """One fabric's front."""
 
     field: HeightField
+    """Its heights."""
     shares: Float32
+    """Coverage of a repeat at roots of the depth from 0 to 1, (curvatures, azimuths, depths + 1)."""
 
 
 @lru_cache(maxsize=64)

@@ -44,35 +44,23 @@ Patch = tuple[float, float, np.float32, np.float32, np.float32]
 
 
 class Threads(NamedTuple):
-    """The coloured ends, or picks, of a fabric.
-
-    Attributes
-    ----------
-    colours : float64 (n, 9)
-        k_s, k_d and k_dt of each of the sequence.
-    seen : float64 (threads of the weave's repeat, crossing threads)
-        Share of each cell in which the yarn is seen from above.
-    repeat : int
-        Repeat of weave and colours together.
-    even : float64 (threads of the weave's repeat, 9)
-        Mean colour of those that fall on each of the weave's repeat, over their number.
-    """
+    """The coloured ends, or picks, of a fabric."""
 
     colours: Float64
+    """k_s, k_d and k_dt of each of the sequence, (n, 9)."""
     seen: Float64
+    """Share of each cell in which the yarn is seen from above, (threads of the weave's repeat, crossing threads)."""
     repeat: int
+    """Repeat of weave and colours together."""
     even: Float64
+    """Mean colour of those that fall on each of the weave's repeat, over their number,
+    (threads of the weave's repeat, 9)."""
 
 
 def footprint_colours(fabric: Fabric, queries: Queries) -> Float64:
     """Return the colours of the components of N queries, float64 (N, 4, 3), linear sRGB.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    queries : Queries
-        Footprints of any kind; thinner ellipses than a `COARSE_LINE` resolves count as wider. Cloth counts as flat.
+    Footprints are of any kind; thinner ellipses than a `COARSE_LINE` resolves count as wider. Cloth counts as flat.
     """
     result, back = np.empty((len(queries.u), 4, 3)), queries.wo[:, 2] < 0.0
     if back.any():

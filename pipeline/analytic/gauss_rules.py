@@ -13,19 +13,13 @@ from pipeline.compiled.arrays import Float64
 
 
 class Rule(NamedTuple):
-    """Nodes along one axis of a cell.
-
-    Attributes
-    ----------
-    places, weights : float64 (n,)
-        Positions within the cell; weights that sum to the length.
-    borders : float64 (n + 1,)
-        Borders of the nodes' boxes, which are as long as the weights.
-    """
+    """Nodes along one axis of a cell."""
 
     places: Float64
     weights: Float64
+    """Positions within the cell; weights that sum to the length, (n,)."""
     borders: Float64
+    """Borders of the nodes' boxes, which are as long as the weights, (n + 1,)."""
 
 
 @lru_cache(maxsize=256)

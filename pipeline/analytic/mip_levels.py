@@ -21,24 +21,16 @@ _1 = np.float32(1.0)
 
 
 class MipLevels(NamedTuple):
-    """Maps at all levels, down to one texel.
-
-    Attributes
-    ----------
-    texels : float32 (T, channels)
-        All levels, finest first, row by row.
-    levels : int64 (L, 3)
-        First texel, columns and rows of each level.
-    extent : float64 (2,)
-        Ends and picks that the maps show.
-    finest : float
-        Width of the finest texels, in yarn spacings (the root of width times height).
-    """
+    """Maps at all levels, down to one texel."""
 
     texels: Float32
+    """All levels, finest first, row by row, (T, channels)."""
     levels: Index
+    """First texel, columns and rows of each level, (L, 3)."""
     extent: Float64
+    """Ends and picks that the maps show, (2,)."""
     finest: float
+    """Width of the finest texels, in yarn spacings (the root of width times height)."""
 
 
 def mip_levels(maps: Sequence[npt.NDArray[Any]], extent: tuple[int, int]) -> MipLevels:

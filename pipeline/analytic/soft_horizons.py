@@ -63,12 +63,9 @@ def over_boxes(
 ) -> tuple[Float64, Float64]:
     """Return mean and variance of horizons over boxes, (azimuths, boxes), boxes of a row following each other.
 
-    Parameters
-    ----------
-    values, squares : float (azimuths, rows, columns)
-        Horizons of the cells of a grid, and their squares (means of both, where many grids share the boxes).
-    rows, columns : float64 (boxes, cells)
-        Share of each box in each cell, along both axes.
+    `values` and `squares` (azimuths, rows, columns) are horizons of the cells of a grid, and their squares (means of
+    both, where many grids share the boxes); `rows` and `columns` (boxes, cells) the share of each box in each cell,
+    along both axes.
     """
     mean, square = ((rows @ grid @ columns.T).reshape(len(grid), -1) for grid in (values, squares))
     return mean, np.maximum(square - mean**2, 0.0)
@@ -122,20 +119,14 @@ _FALL = np.float32(FALL)
 
 
 class Bend(NamedTuple):
-    """A curvature between two tabulated ones.
-
-    Attributes
-    ----------
-    low, high : int
-        Which ones.
-    of_low, of_high : float32
-        Factors of their falls, which are tabulated as shares of `FALL` times the curvature.
-    """
+    """A curvature between two tabulated ones."""
 
     low: int
     high: int
+    """Which ones."""
     of_low: np.float32
     of_high: np.float32
+    """Factors of their falls, which are tabulated as shares of `FALL` times the curvature."""
 
 
 @kernel

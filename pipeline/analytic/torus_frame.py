@@ -56,18 +56,9 @@ def bend(
 ) -> tuple[Angles, Scalar]:
     """Return the angles at a position along the yarn, and the curvature there, 1 / (R + r cos v).
 
-    Parameters
-    ----------
-    sin_v, cos_v : float
-        The angle across the yarn.
-    radius : float
-        Radius r of the yarn, in yarn spacings.
-    position : float
-        Distance along the yarn from the middle of its float, in yarn spacings.
-    curvature : float
-        1 / R of the float's axis; negative for a yarn beneath, whose bend is reversed.
-    limit : float
-        Largest |sin u|.
+    v is the angle across the yarn, r its `radius`, in yarn spacings; `position` the distance along the yarn from the
+    middle of its float; `curvature` 1 / R of the float's axis, negative for a yarn beneath, whose bend is reversed;
+    `limit` the largest |sin u|.
     """
     inner = curvature / (_1 + radius * curvature * cos_v)
     sin_u = min(max(position * inner, -limit), limit)

@@ -28,21 +28,14 @@ LARGEST_SUM: Final = 1.005
 
 
 class Basis(NamedTuple):
-    """Rings of patches.
-
-    Attributes
-    ----------
-    name : str
-        As in files.
-    bounds : tuple of float
-        Angles to the normal between the rings, degrees, from 0 to 90.
-    counts : tuple of int
-        Patches of each ring.
-    """
+    """Rings of patches."""
 
     name: str
+    """As in files."""
     bounds: tuple[float, ...]
+    """Angles to the normal between the rings, degrees, from 0 to 90."""
     counts: tuple[int, ...]
+    """Patches of each ring."""
 
     @property
     def patches(self) -> int:
@@ -95,19 +88,13 @@ KLEMS_FULL: Final = BASES["LBNL/Klems Full"]
 
 
 class Scattering(NamedTuple):
-    """The BSDF of a layer, in 1/sr and without the cosine, means over pairs of P patches.
-
-    Attributes
-    ----------
-    basis : Basis
-        Patches of light and of what is scattered.
-    bands : mapping of str to float64 (2, 2, P, P)
-        By band, such as ``visible``: [kind, side, patch scattered to, patch of the light], in the order of `SCATTERED`
-        and `FACES`; NaN where nothing is known.
-    """
+    """The BSDF of a layer, in 1/sr and without the cosine, means over pairs of P patches."""
 
     basis: Basis
+    """Patches of light and of what is scattered."""
     bands: Mapping[str, Float64]
+    """By band, such as ``visible``: [kind, side, patch scattered to, patch of the light], in the order of `SCATTERED`
+    and `FACES`; NaN where nothing is known, (2, 2, P, P)."""
 
     def hemispherical(self, band: str) -> Float64:
         """Return reflectance and transmittance of each face and patch of the light, (2, 2, P)."""

@@ -24,24 +24,16 @@ _BANDS: Final = {  # name in files, source and detector
 
 
 class LayerFacts(NamedTuple):
-    """Facts of a layer beside its BSDF.
-
-    Attributes
-    ----------
-    name : str
-        Of the product.
-    openness : float
-        Share of light at normal incidence that goes straight through.
-    emissivity : float
-        Of both faces, for heat.
-    thickness : float
-        In metres.
-    """
+    """Facts of a layer beside its BSDF."""
 
     name: str
+    """Of the product."""
     openness: float
+    """Share of light at normal incidence that goes straight through."""
     emissivity: float
+    """Of both faces, for heat."""
     thickness: float
+    """In metres."""
 
 
 def write_klems(path: Path, scattering: Scattering, facts: LayerFacts) -> None:

@@ -40,21 +40,14 @@ _LABELS = np.array([-1.0, -1.0, 1.0])  # from the label of light to the directio
 
 
 class FabricBsdf(NamedTuple):
-    """The BSDF of a fabric, its bands, and how far the truth is from reciprocal.
-
-    Attributes
-    ----------
-    scattering : Scattering
-        ``visible``, and ``solar`` if another fabric gave its colours.
-    direct : float64 (P,)
-        Share of light of each patch that goes straight through.
-    asymmetry : float
-        Largest of `Scattering.reciprocity` before both ways are averaged.
-    """
+    """The BSDF of a fabric, its bands, and how far the truth is from reciprocal."""
 
     scattering: Scattering
+    """``visible``, and ``solar`` if another fabric gave its colours."""
     direct: Float64
+    """Share of light of each patch that goes straight through, (P,)."""
     asymmetry: float
+    """Largest of `Scattering.reciprocity` before both ways are averaged."""
 
 
 def fabric_bsdf(
@@ -66,18 +59,8 @@ def fabric_bsdf(
 ) -> FabricBsdf:
     """Compute the BSDF of a fabric; its front is the side z > 0.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        Its colours, as luminance, are those of the visible band.
-    solar : Fabric, optional
-        The same cloth with the colours of the solar band, the mean of its three channels; BadInput if it is another.
-    basis : Basis
-        Patches.
-    points : int
-        Points of a pair of patches, a power of two, at least 1.
-    truth : TruthOptions
-        Options of the truth.
+    Its colours, as luminance, are those of the visible band; those of `solar` are of the solar band, the mean of the
+    three channels; BadInput if that is another cloth. `points` of a pair of patches are a power of two, at least 1.
     """
     if solar is not None and solar.optics() != fabric.optics():
         raise BadInput("export", "solar", solar.name, f"has to be the cloth {fabric.name!r} in other colours")

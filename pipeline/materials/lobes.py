@@ -49,25 +49,18 @@ _SKY_VIEWS: Final = tuple(math.radians(a) for a in (5.0, 35.0, 65.0, 95.0, 125.0
 
 
 class Reflectance(NamedTuple):
-    """Reflectance by family (warp, weft), unit colours, float64 (2,).
-
-    Attributes
-    ----------
-    coverage : float64 (2,)
-        Share of the area in which the family is seen from above.
-    diffuse, specular, transmitted : float64 (2,)
-        Diffuse and specular reflectance, and diffuse transmittance, towards a viewer on the normal; sums over the
-        cloth, so that a family of little coverage has little.
-    grazing_diffuse, grazing_specular : float64 (2,)
-        Diffuse and specular reflectance towards a viewer at `GRAZING_VIEW`, the mean over azimuths.
-    """
+    """Reflectance by family (warp, weft), unit colours, float64 (2,)."""
 
     coverage: Float64
+    """Share of the area in which the family is seen from above, (2,)."""
     diffuse: Float64
     specular: Float64
     transmitted: Float64
+    """Diffuse and specular reflectance, and diffuse transmittance, towards a viewer on the normal; sums over the cloth,
+    so that a family of little coverage has little, (2,)."""
     grazing_diffuse: Float64
     grazing_specular: Float64
+    """Diffuse and specular reflectance towards a viewer at `GRAZING_VIEW`, the mean over azimuths, (2,)."""
 
     def per_area(self, values: Float64) -> Float64:
         """Return sums over the cloth as values of the area in which a family is seen."""
@@ -117,23 +110,10 @@ def ggx_density(half: Float64, along: float, across: float) -> Float64:
 
 
 def ggx(wi: Float64, wo: Float64, along: float, across: float, f0: Float64) -> Float64:
-    """Return the GGX lobe without the incident cosine.
+    """Return the GGX lobe without the incident cosine, float64 (N, 3), 1/sr.
 
-    Parameters
-    ----------
-    wi : float64 (N, 3)
-        Directions to the light, z > 0, in the frame of fibre (x), across it (y) and normal (z).
-    wo : float64 (3,)
-        Direction to the viewer.
-    along, across : float
-        Roughness a_x and a_y.
-    f0 : float64 (3,)
-        Reflectance at normal incidence.
-
-    Returns
-    -------
-    float64 (N, 3)
-        In 1/sr.
+    `wi` (N, 3) and `wo` (3,) lie in the frame of fibre (x), across it (y) and normal (z), wi.z > 0; roughness is a_x
+    `along` and a_y `across`, `f0` (3,) the reflectance at normal incidence.
     """
     half = wi + wo
     half /= np.linalg.norm(half, axis=-1, keepdims=True)

@@ -44,30 +44,20 @@ _VIEWS: Final = 64
 
 
 class MaterialMaps(NamedTuple):
-    """Maps of one cloth in unit colours, and the sheen.
-
-    Attributes
-    ----------
-    maps : MipLevels
-        Of TEXEL_CHANNELS.
-    sheen : float32 (4,)
-        Share of the sheen of each component, in unit colours.
-    specular : float32
-        Specular colour of the yarns; the F0 of the maps has it as a factor.
-    white : float32 (n,)
-        Reflectance of a white sheen, by the viewer's cosine from 0 to 1.
-    taps : float64 (TAPS + 1, TAPS)
-        In row n the places of n readings along an axis: of mean 0 and variance 1.
-    heights : HeightMaps
-        Heights of the same texels.
-    """
+    """Maps of one cloth in unit colours, and the sheen."""
 
     maps: MipLevels
+    """Of TEXEL_CHANNELS."""
     sheen: Float32
+    """Share of the sheen of each component, in unit colours, (4,)."""
     specular: np.float32
+    """Specular colour of the yarns; the F0 of the maps has it as a factor."""
     white: Float32
+    """Reflectance of a white sheen, by the viewer's cosine from 0 to 1, (n,)."""
     taps: Float64
+    """In row n the places of n readings along an axis: of mean 0 and variance 1, (TAPS + 1, TAPS)."""
     heights: HeightMaps
+    """Heights of the same texels."""
 
 
 def tabulate(

@@ -74,29 +74,20 @@ class Layout(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """Means over the texels of one level, float32 (H, W) and (H, W, n), pick 0 in row 0.
-
-    Attributes
-    ----------
-    coverage : (H, W)
-        Share of the texel that is covered.
-    height : (H, W)
-        Height in yarn spacings; gaps count as the lowest point of the cloth.
-    normal : (H, W, 3)
-        c n.
-    fibres : (H, W, 6)
-        c (1 - alpha^2) t t^T, entries in the order of `PAIRS`.
-    base, specular, through : (H, W, 3)
-        c times the diffuse, the specular and the transmitted colour, linear RGB.
-    """
+    """Means over the texels of one level, float32 (H, W) and (H, W, n), pick 0 in row 0."""
 
     coverage: Float32
+    """Share of the texel that is covered, (H, W)."""
     height: Float32
+    """Height in yarn spacings; gaps count as the lowest point of the cloth, (H, W)."""
     normal: Float32
+    """c n, (H, W, 3)."""
     fibres: Float32
+    """c (1 - alpha^2) t t^T, entries in the order of `PAIRS`, (H, W, 6)."""
     base: Float32
     specular: Float32
     through: Float32
+    """c times the diffuse, the specular and the transmitted colour, linear RGB, (H, W, 3)."""
 
     def halved(self) -> Planes:
         """Return the next mip level: half of each side that is longer than one texel."""
@@ -106,10 +97,7 @@ class Planes(NamedTuple):
 def layout(fabric: Fabric, size: int) -> Layout:
     """Return the layout of a fabric's maps, `size` texels along the longer side.
 
-    Raises
-    ------
-    BadInput
-        If the size is no power of two from `SMALLEST_MAP` to `LARGEST_MAP`, or too small for the repeat.
+    BadInput if the size is no power of two from `SMALLEST_MAP` to `LARGEST_MAP`, or too small for the repeat.
     """
     if not SMALLEST_MAP <= size <= LARGEST_MAP or size & (size - 1):
         raise BadInput("export", "size", size, f"must be a power of two from {SMALLEST_MAP} to {LARGEST_MAP}")

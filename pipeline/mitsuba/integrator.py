@@ -105,12 +105,8 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
             """Render the scene, as all integrators of Mitsuba do.
 
             Pictures of more than `MOST_RAYS` rays are the mean of several, with a bar on a terminal; the film then
-            keeps the last one only.
-
-            Raises
-            ------
-            BadInput
-                If a mesh that wears the BSDF `twillight` has no uv coordinates, or is bent and has no vertex normals.
+            keeps the last one only. BadInput if a mesh that wears the BSDF `twillight` has no uv coordinates, or is
+            bent and has no vertex normals.
             """
             # Mitsuba calls this function again, for each part.
             if self._samples:

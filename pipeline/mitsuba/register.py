@@ -29,12 +29,7 @@ _registered: set[str] = set()
 def register() -> Any:
     """Enter the plugins into Mitsuba, and return the module.
 
-    Without a variant, `best_variant` is set.
-
-    Raises
-    ------
-    BadInput
-        If the variant that is set has other colours than RGB.
+    Without a variant, `best_variant` is set; BadInput if the one that is set has other colours than RGB.
     """
     import mitsuba as mi
 

@@ -121,36 +121,24 @@ def _cut(deviation: Float64) -> Float32:
 
 
 class RayHits(NamedTuple):
-    """N places of a shape that rays meet, in its local frame.
-
-    Attributes
-    ----------
-    uv : float64 (N, 2)
-        Texture coordinates.
-    viewer : float64 (N, 3)
-        Unit vectors to where the ray comes from.
-    outward : float64 (N, 3)
-        Geometric normal; 0 if it is not known.
-    handed : float64 (N,)
-        -1 where u, v are left-handed about the shading normal, 1 elsewhere.
-    jacobian : float64 (N, 2, 2)
-        d(uv)/d(pixel); 0 where the ray has no differentials.
-    spread : float64 (N,)
-        Change of u with the angle of the ray, across it, 1/radian.
-    stride : float64 (N, 2)
-        Change of u and v with the length along the surface towards the viewer.
-    bend : float64 (N,)
-        Curvature of the surface that way, 1/length; 0 if it is flat or not known.
-    """
+    """N places of a shape that rays meet, in its local frame."""
 
     uv: Float64
+    """Texture coordinates, (N, 2)."""
     viewer: Float64
+    """Unit vectors to where the ray comes from, (N, 3)."""
     outward: Float64
+    """Geometric normal; 0 if it is not known, (N, 3)."""
     handed: Float64
+    """-1 where u, v are left-handed about the shading normal, 1 elsewhere, (N,)."""
     jacobian: Float64
+    """d(uv)/d(pixel); 0 where the ray has no differentials, (N, 2, 2)."""
     spread: Float64
+    """Change of u with the angle of the ray, across it, 1/radian, (N,)."""
     stride: Float64
+    """Change of u and v with the length along the surface towards the viewer, (N, 2)."""
     bend: Float64
+    """Curvature of the surface that way, 1/length; 0 if it is flat or not known, (N,)."""
 
 
 class Worn:

@@ -22,15 +22,7 @@ from weaves.fabric import Fabric
 
 
 class AllCores(Around):
-    """A method on several threads.
-
-    Parameters
-    ----------
-    method : Method
-        Answers a run of queries on one thread, on the CPU.
-    threads : int
-        Threads; 0: one a core that this process may use.
-    """
+    """A method, which answers a run of queries on one thread, on several; 0: one a core that this process may use."""
 
     def __init__(self, method: Method, threads: int = 0) -> None:
         super().__init__(method)

@@ -39,13 +39,7 @@ _OTHER_YARN = [1, 0, 3, 2]  # of each component, the same one of the other yarn
 
 
 class Bounded(Around):
-    """A method's answers, each component at most that of the soft nodes without shadows (`limited`).
-
-    Parameters
-    ----------
-    method : Method
-        Anything that answers for flat cloth, lit from either side.
-    """
+    """Answers of a method for flat cloth, each component at most that of the soft nodes without shadows (`limited`)."""
 
     def __init__(self, method: Method) -> None:
         super().__init__(method, "bounded")

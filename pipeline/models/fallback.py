@@ -82,14 +82,8 @@ def fallback_rows(fabric: Fabric, queries: Queries, seed: int) -> Float32:
 class Fallback(Around):
     """A method that answers any query.
 
-    Parameters
-    ----------
-    method : Method
-        Answers all queries of its domain.
-    kinds : collection of str
-        Kinds of queries that it knows, of `behind`, `stretch` and `curvature`.
-    footprint : str
-        Round footprint in place of an ellipse that it does not know: ``geometric_mean`` of the axes, or ``major``.
+    `kinds` are those that `method` knows, of `behind`, `stretch` and `curvature`. In place of an ellipse that it does
+    not know, it sees a round `footprint`: ``geometric_mean`` of the axes, or ``major``.
     """
 
     def __init__(self, method: Method, kinds: Collection[str], footprint: RoundFootprint = "geometric_mean") -> None:

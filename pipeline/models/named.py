@@ -35,17 +35,9 @@ def named_method(name: str, where: str, key: str) -> Fallback:
 def own_method(name: str, where: str, key: str) -> Method:
     """Return a method that answers queries of its own kinds.
 
-    Parameters
-    ----------
-    name : str
-        Name of a model that learns nothing, with ``:k`` for a setting, or the folder of a trained one.
-    where, key : str
-        The verb or function and its option that name the method, for messages.
-
-    Raises
-    ------
-    BadInput
-        If there is no such method, it must be trained first, it has no such setting, or its files are damaged.
+    `name` is that of a model that learns nothing, with ``:k`` for a setting, or the folder of a trained one; `where`
+    and `key` are the verb or function and its option that name it, for messages. BadInput if there is no such method,
+    it must be trained first, it has no such setting, or its files are damaged.
     """
     return loaded(name, where, key)[0]
 

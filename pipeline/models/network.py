@@ -34,35 +34,25 @@ _ANY: Final = ""  # key of a network that answers for any fabric
 
 
 class Batch(NamedTuple):
-    """Queries and targets of a training step: F fabrics, n queries each.
-
-    Attributes
-    ----------
-    fabric : int64 (F,)
-        Index into the fabrics the network was built for.
-    u, v, sigma : float32 (F, n)
-        Footprint, in yarn spacings.
-    wi, wo : float32 (F, n, 3)
-        Directions.
-    sigma_minor, angle, curvature : float32 (F, n)
-        The rest of the query, as in `Queries`.
-    target : float32 (F, n, 4)
-        Components.
-    transparency : float32 (F, n)
-        Share of light from straight behind that passes unscattered.
-    """
+    """Queries and targets of a training step: F fabrics, n queries each."""
 
     fabric: Tensor
+    """Index into the fabrics the network was built for, int64 (F,)."""
     u: Tensor
     v: Tensor
     sigma: Tensor
+    """Footprint, in yarn spacings, float32 (F, n)."""
     wi: Tensor
     wo: Tensor
+    """Directions, float32 (F, n, 3)."""
     sigma_minor: Tensor
     angle: Tensor
     curvature: Tensor
+    """The rest of the query, as in `Queries`, float32 (F, n)."""
     target: Tensor
+    """Components, float32 (F, n, 4)."""
     transparency: Tensor
+    """Share of light from straight behind that passes unscattered, float32 (F, n)."""
 
 
 class Trainable(nn.Module):
@@ -151,15 +141,7 @@ class Portable(Method, Protocol):
 
 
 class Answering(nn.Module):
-    """A function of tensors, with the network whose weights it reads.
-
-    Parameters
-    ----------
-    network : nn.Module
-        Holds the weights.
-    answer : callable
-        From inputs and constants to components (N, 4).
-    """
+    """A function from inputs and constants to components (N, 4), with the network whose weights it reads."""
 
     def __init__(self, network: nn.Module, answer: Callable[..., Tensor]) -> None:
         super().__init__()
@@ -197,12 +179,8 @@ def evaluated(
 class NetworkMethod(Generic[Net]):
     """Trained networks as a method: one that answers for any fabric, or one for each fabric.
 
-    Parameters
-    ----------
-    networks : QueryNetwork or mapping
-        Trained weights: one network, or from the fingerprint of a fabric's optics to its network.
-    domain : Domain, optional
-        Domain of the training; any query if left out.
+    `networks` is one network, or from the fingerprint of a fabric's optics to its network. Without the `domain` of the
+    training, any query is answered.
     """
 
     def __init__(self, networks: Net | Mapping[str, Net], domain: Domain | None = None) -> None:

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.importance.lobes import FLAKE_ROWS, POINT_ROWS, STRAIGHT, TZ, Lobes, find_rows, point_places
+from pipeline.analytic.importance.lobes import STRAIGHT, TZ, Lobes, find_lobes, point_places
 from pipeline.analytic.importance.mixture import density_rows, draw_rows
 from pipeline.analytic.importance.surface import LobeSurface, tabulate_surface
 from pipeline.compiled.arrays import Float32, Float64, Mask
@@ -28,7 +28,6 @@ from pipeline.scenes.bounces import check_bounces
 from pipeline.scenes.options import BOUNCES, Bounces
 from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.shade import shade
-from pipeline.truth.footprint.mixture import footprints
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -36,28 +35,19 @@ from weaves.fabric import Fabric
 USUAL_METHOD: Final = "soft_nodes:2"
 """Method that answers unless another one is given."""
 
-_LEAST_DEVIATION = np.float32(1e-3)  # a thousandth of a yarn is a point
-
 
 class Sample(NamedTuple):
-    """N drawn directions.
-
-    Attributes
-    ----------
-    wi : float32 (N, 3)
-        Unit vectors to the light, over the whole sphere.
-    pdf : float32 (N,)
-        Their density, 1/sr; the probability of the delta lobe where light goes straight through.
-    straight : bool (N,)
-        Where light goes straight through, wi = -wo.
-    weight : float64 (N, 3)
-        Linear RGB: f_P / pdf, with the incident cosine inside; the transparency over its probability where straight.
-    """
+    """N drawn directions."""
 
     wi: Float32
+    """Unit vectors to the light, over the whole sphere, (N, 3)."""
     pdf: Float32
+    """Their density, 1/sr; the probability of the delta lobe where light goes straight through, (N,)."""
     straight: Mask
+    """Where light goes straight through, wi = -wo, (N,)."""
     weight: Float64
+    """Linear RGB: f_P / pdf, with the incident cosine inside; the transparency over its probability where straight,
+    (N, 3)."""
 
 
 class Drawn(NamedTuple):
@@ -118,29 +108,23 @@ class PatchBSDF:
             raise BadInput("PatchBSDF", "widening", widening, "must be a number from 0 on")
         self.fabric, self.bounces = fabric, bounces
         self.method = named_method(method, "PatchBSDF", "method") if isinstance(method, str) else method
-        self._widening = np.float32(widening)
+        self._widening = widening
         self._places = point_places(points)
         self._front = tabulate_surface(fabric)
         self._back: LobeSurface | None = None
 
     def lobes(self, looks: Queries) -> Lobes:
         """Return the mixtures of N looks, whose wi does not matter, for several calls about them."""
-        count = len(looks.u)
-        result = Lobes(
-            np.empty((count, FLAKE_ROWS, len(self._places) + 2), np.float32),
-            np.empty((count, STRAIGHT + 1), np.float32),
-        )
         behind = looks.wo[:, 2] < 0.0
         if not behind.any():
-            self._find(self._front, looks, result)
-            return result
+            return find_lobes(self._front, looks, self._places, self._widening)
         if self._back is None:
             self._back = tabulate_surface(self.fabric.back())
-        for rows, cloth, seen in ((~behind, self._front, looks), (behind, self._back, looks.turned())):
-            part = Lobes(*(np.ascontiguousarray(column[rows]) for column in result))
-            self._find(cloth, seen.take(rows), part)
-            for whole, own in zip(result, part, strict=True):
-                whole[rows] = own
+        front = find_lobes(self._front, looks.take(~behind), self._places, self._widening)
+        back = find_lobes(self._back, looks.turned().take(behind), self._places, self._widening)
+        result = Lobes(*(np.empty((len(behind), *column.shape[1:]), np.float32) for column in front))
+        for whole, own, other in zip(result, front, back, strict=True):
+            whole[~behind], whole[behind] = own, other
         # Turned back: reflected in the fabric plane.
         result.flakes[behind, TZ] *= np.float32(-1.0)
         return result
@@ -215,13 +199,6 @@ class PatchBSDF:
                 "PatchBSDF", "lobes", f"{len(lobes.rest)} rows", f"must be those of the {len(looks.u)} looks"
             )
         return lobes
-
-    def _find(self, cloth: LobeSurface, looks: Queries, result: Lobes) -> None:
-        """Write the mixtures of looks from one side."""
-        scratch = np.empty((POINT_ROWS, len(self._places)), np.float32)
-        wo = np.ascontiguousarray(looks.wo, np.float32)
-        patches = footprints(looks, _LEAST_DEVIATION)
-        find_rows(cloth, patches, wo, self._places, self._widening, scratch, result)
 
 
 def _numbers(random: npt.ArrayLike, rows: int) -> Float64:

@@ -46,21 +46,10 @@ def module_of(model: str) -> ModuleType:
 
 
 def model_folder(model: str, where: str, key: str, others: Iterable[str] = ()) -> Path:
-    """Return the folder of a trained model.
+    """Return the folder of a trained model, with ``model.safetensors`` and ``card.json``; BadInput if it is none.
 
-    Parameters
-    ----------
-    model : str
-        Path of a folder with ``model.safetensors`` and ``card.json``.
-    where, key : str
-        The function or verb and its argument that name the model, for messages.
-    others : iterable of str
-        Names that are allowed there too.
-
-    Raises
-    ------
-    BadInput
-        If there is no such model.
+    `where` and `key` are the function or verb and its argument that name the model, `others` names that are allowed
+    there too, for messages.
     """
     folder, names = place(model, key), list(others)
     if not (folder / CARD).is_file():
@@ -70,21 +59,11 @@ def model_folder(model: str, where: str, key: str, others: Iterable[str] = ()) -
 
 
 def build_network(options: ModelOptions, fabrics: Sequence[Fabric], extra: Iterable[Any] = ()) -> Any:
-    """Return an untrained `pipeline.models.network.Trainable`.
+    """Return an untrained `pipeline.models.network.Trainable` of a design that learns.
 
-    Parameters
-    ----------
-    options : model options
-        The design; it must be one that learns.
-    fabrics : sequence of Fabric
-        What it learns; one for a model of one material.
-    extra : iterable
-        One list for each set that ``options.extra_rows`` declares: the columns of its rows, fabric by fabric.
-
-    Raises
-    ------
-    MethodFailed
-        If the code of a network from outside is not the planned one, or fails.
+    A model of one material learns one fabric. `extra` has one list for each set that ``options.extra_rows`` declares:
+    the columns of its rows, fabric by fabric. MethodFailed if the code of a network from outside is not the planned
+    one, or fails.
     """
     if isinstance(options, AddedMethod):
         from pipeline.models.added.network import build_added
@@ -110,26 +89,11 @@ def restore_methods(options: ModelOptions, trained: Trained) -> list[Method]:
 
 
 def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Method]:
-    """Return the methods that options describe.
+    """Return the methods that options describe: one; for `point_sampled` one a number of points.
 
-    Parameters
-    ----------
-    options : model options
-        The design; must be the one that the folders were trained with.
-    folders : sequence of Path
-        Trained models: one for `woven`, one a fabric for `neumip`, none for `point_sampled`.
-
-    Returns
-    -------
-    list of Method
-        One method; for `point_sampled` one a number of points.
-
-    Raises
-    ------
-    BadInput
-        If a folder holds no model, a damaged one, or one of another design or version.
-    MethodFailed
-        If the code of a method from outside is not the planned one, or fails.
+    `folders` hold trained models of this very design: one for `woven`, one a fabric for `neumip`, none for
+    `point_sampled`. BadInput if one holds no model, a damaged one, or one of another design or version; MethodFailed if
+    the code of a method from outside is not the planned one, or fails.
     """
     trained = [_read(folder, options) for folder in folders]
     try:

@@ -152,14 +152,8 @@ def exported(module: nn.Module, example: Sequence[Tensor], rows: int, names: Seq
 def as_onnx(method: Portable, fabric: Fabric, names: Sequence[str]) -> bytes:
     """Return the part of a method that runs for every query of a fabric as an ONNX model.
 
-    Parameters
-    ----------
-    method : Portable
-        The method.
-    fabric : Fabric
-        A fabric that it covers; what it is encoded as is a constant of the model.
-    names : sequence of str
-        Names of the inputs of N rows. Those that the answers do not depend on are no inputs of the model.
+    What the fabric is encoded as is a constant of the model. `names` are those of the inputs of N rows; those that the
+    answers do not depend on are no inputs of the model.
     """
     import onnx
 
@@ -219,15 +213,7 @@ EXACT: Final = frozenset({"compile", "onnx"})
 
 
 class RunBy(Around):
-    """A method run in another way; its setting says which.
-
-    Parameters
-    ----------
-    method : Portable
-        The method to run.
-    runtime : str
-        A key of `RUNTIMES`.
-    """
+    """A method run in another way: its setting, a key of `RUNTIMES`, says which."""
 
     def __init__(self, method: Portable, runtime: str) -> None:
         super().__init__(method, runtime)
@@ -238,10 +224,7 @@ class RunBy(Around):
     def prepare(self, fabric: Fabric) -> None:
         """Prepare the method; compile or export its module, unless an earlier fabric's serves this one too.
 
-        Raises
-        ------
-        WorkFailed
-            If the answers are not the method's own, though they are computed in single precision.
+        WorkFailed if the answers are not the method's own, though they are computed in single precision.
         """
         self._ready.of(fabric)
 

@@ -21,50 +21,35 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GBuffer:
-    """N places of one fabric in a picture of H by W pixels, and M queries about them.
-
-    Attributes
-    ----------
-    mask : bool (H, W)
-        Pixels that show the fabric; places are among them.
-    pixel : int64 (N,)
-        Where each place is: row * W + column.
-    u, v : float64 (N,)
-        Centre of the footprint, in yarn spacings, not reduced.
-    sigma, sigma_minor : float64 (N,)
-        Standard deviations of the footprint along its two axes, in yarn spacings.
-    angle : float64 (N,)
-        Angle from x to the first axis, radians.
-    curvature : float64 (N,)
-        Of the cloth along the view ray, 1/yarn spacings, 0 to 1.
-    wo : float64 (N, 3)
-        Unit vectors to the viewer, in the local frame.
-    place : int64 (M,)
-        Which place each query is about.
-    wi : float64 (M, 3)
-        Unit vectors to the light, in the place's local frame.
-    irradiance : float64 (M, 3)
-        Linear RGB irradiance that the light would bring to a surface facing it there.
-    rim : int64 (R,)
-        Places at a silhouette: curved cloth whose view rays may leave it again and show what is behind it.
-    rim_wo : float64 (R, 3)
-        Unit vectors from them to the viewer, tilted nowhere; z may have any sign.
-    """
+    """N places of one fabric in a picture of H by W pixels, and M queries about them."""
 
     mask: npt.NDArray[np.bool_]
+    """Pixels that show the fabric; places are among them, bool (H, W)."""
     pixel: npt.NDArray[np.int64]
+    """Where each place is: row * W + column, int64 (N,)."""
     u: Floats
     v: Floats
+    """Centre of the footprint, in yarn spacings, not reduced, float64 (N,)."""
     sigma: Floats
     sigma_minor: Floats
+    """Standard deviations of the footprint along its two axes, in yarn spacings, float64 (N,)."""
     angle: Floats
+    """Angle from x to the first axis, radians, float64 (N,)."""
     curvature: Floats
+    """Of the cloth along the view ray, 1/yarn spacings, 0 to 1, float64 (N,)."""
     wo: Floats
+    """Unit vectors to the viewer, in the local frame, float64 (N, 3)."""
     place: npt.NDArray[np.int64]
+    """Which place each query is about, int64 (M,)."""
     wi: Floats
+    """Unit vectors to the light, in the place's local frame, float64 (M, 3)."""
     irradiance: Floats
+    """Linear RGB irradiance that the light would bring to a surface facing it there, float64 (M, 3)."""
     rim: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Places at a silhouette: curved cloth whose view rays may leave it again and show what is behind it, int64
+    (R,)."""
     rim_wo: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """Unit vectors from them to the viewer, tilted nowhere; z may have any sign, float64 (R, 3)."""
 
     @property
     def lit(self) -> npt.NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.importance.lobes import FLAKE_ROWS, POINT_ROWS, STRAIGHT, TZ, Lobes, find_rows, point_places
+from pipeline.analytic.importance.lobes import TZ, Lobes, find_lobes, point_places
 from pipeline.analytic.importance.mixture import density_rows
 from pipeline.analytic.importance.surface import LobeSurface
 from pipeline.analytic.soft_nodes.answer import SMALLEST
@@ -208,21 +208,14 @@ def transparency(table: SoftNodeTable, looks: Queries) -> Float32:
 
 def lobes_of(sides: Sides, looks: Queries) -> Lobes:
     """Return the mixtures of N looks by pipeline.analytic.importance with the grids of `sides`; viewers on one side."""
-    back, count = bool(looks.wo[0, 2] < 0.0), len(looks.u)
+    back = bool(looks.wo[0, 2] < 0.0)
     table = sides.back if back else sides.front
     assert table is not None
     surface = LobeSurface(
         table.repeat, table.yarn, table.thickness, table.uniform, table.piece_starts, table.pieces, table.bounds,
         table.grid.ravel(), table.grid.shape[-1], (sides.colours @ np.array(LUMINANCE, np.float32)).reshape(3, 2),
     )  # fmt: skip
-    seen, places = looks.turned() if back else looks, point_places(POINTS)
-    columns = (seen.u, seen.v, *deviations(seen, SMALLEST))
-    result = Lobes(np.empty((count, FLAKE_ROWS, POINTS + 2), np.float32), np.empty((count, STRAIGHT + 1), np.float32))
-    find_rows(
-        surface, tuple(np.ascontiguousarray(column, np.float32) for column in columns),  # type: ignore[arg-type]
-        np.ascontiguousarray(seen.wo, np.float32), places, np.float32(WIDENING),
-        np.empty((POINT_ROWS, POINTS), np.float32), result,
-    )  # fmt: skip
+    result = find_lobes(surface, looks.turned() if back else looks, point_places(POINTS), WIDENING)
     if back:
         result.flakes[:, TZ] *= np.float32(-1.0)
     return result

@@ -28,19 +28,9 @@ _KEY: Final = "twillight"
 class State:
     """Weights, their running average, its best state, the optimiser, the step, and the losses so far.
 
-    Parameters
-    ----------
-    network : nn.Module
-        What learns.
-    optimiser : torch.optim.Optimizer
-        How.
-    average : float
-        Share of the running average of the weights kept at a step; it is less in the first steps, which no average
-        should remember. 0: the average is the weights.
-    identity : str
-        Fingerprint of everything that shapes the weights: a checkpoint of another training is not gone on from.
-    path : Path
-        The checkpoint.
+    `average` is the share of the running average of the weights kept at a step; it is less in the first steps, which no
+    average should remember; with 0 the average is the weights. `identity` is the fingerprint of everything that shapes
+    the weights: a checkpoint of another training, at `path`, is not gone on from.
     """
 
     def __init__(

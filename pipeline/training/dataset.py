@@ -44,15 +44,7 @@ _ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
 
 
 class TrainingRows:
-    """A table of rows, fabric after fabric.
-
-    Parameters
-    ----------
-    table : float32 (rows, COLUMNS)
-        May be memory-mapped.
-    counts : sequence of int
-        Rows of each fabric, all at least 1.
-    """
+    """A table of rows (rows, COLUMNS), fabric after fabric, `counts` of each, at least 1; it may be memory-mapped."""
 
     def __init__(self, table: npt.NDArray[np.float32], counts: Sequence[int]) -> None:
         self.table, self.counts = table, list(counts)
@@ -62,14 +54,8 @@ class TrainingRows:
 def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: Path) -> TrainingRows:
     """Return the training rows of fabrics, mapped from `cache`, which is written anew: an older one may be damaged.
 
-    Parameters
-    ----------
-    manifest, folder : Manifest, Path
-        The data set.
-    fabrics : sequence of str
-        Names; their order numbers them.
-    cache : Path
-        A ``.npy`` file; the caller names it after what it holds and deletes it in the end.
+    The order of the fabrics' names numbers them. The caller names the cache, a ``.npy`` file, after what it holds and
+    deletes it in the end.
     """
     counts = [sum(s.rows for s in manifest.shards if (s.fabric, s.split) == (name, "train")) for name in fabrics]
     with atomic_path(cache, durable=False) as temporary:  # no later process reads it
@@ -91,16 +77,7 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
 class Order:
     """Which rows each step sees: a pure function of (seed, step).
 
-    Parameters
-    ----------
-    counts : sequence of int
-        Rows of each fabric.
-    batch : int
-        Rows a step.
-    fabrics : int
-        Fabrics a step; no more than there are.
-    seed : int
-        Seed of the order.
+    `counts` are the rows of each fabric; a step sees `batch` rows of so many fabrics, no more than there are.
     """
 
     def __init__(self, counts: Sequence[int], batch: int, fabrics: int, seed: int) -> None:
@@ -141,16 +118,9 @@ class Order:
 
 
 class Batches:
-    """Batches of a training as tensors on one device.
+    """Batches of a training, in an order, as tensors on one device.
 
-    Parameters
-    ----------
-    rows : TrainingRows
-        The table.
-    order : Order
-        Its order.
-    device : torch.device
-        Where the batches go; a GPU holds the whole table if it takes less than half of the free memory.
+    A GPU holds the whole table if it takes less than half of the free memory.
     """
 
     def __init__(self, rows: TrainingRows, order: Order, device: torch.device) -> None:

@@ -29,16 +29,9 @@ _LOOK_ROWS = 2048  # most queries of a look during the training
 
 
 class HeldOut:
-    """Held-out queries of the trained fabrics.
+    """Held-out queries of the trained fabrics of a data set, at most so many rows in all.
 
-    Parameters
-    ----------
-    options, card : model options, dict
-        What `restore` needs beside the weights.
-    manifest, folder : Manifest, Path
-        The data set.
-    rows : int
-        Most queries in all.
+    `options` and `card` are what `restore` needs beside the weights.
     """
 
     def __init__(self, options: Any, card: dict[str, Any], manifest: Manifest, folder: Path, rows: int) -> None:
@@ -105,11 +98,8 @@ def footprint_labels() -> list[str]:
 def _component_figures(prediction: npt.NDArray[np.float32], answers: Answers) -> dict[str, dict[str, float]]:
     """Compare components (N, 4) with the truth.
 
-    Returns
-    -------
-    dict
-        For each component: ``mse``, ``noise`` (the truth's mean squared standard error), ``mean`` of the truth, and
-        ``relative_rmse``, sqrt(mse) / mean.
+    For each component: ``mse``, ``noise`` (the truth's mean squared standard error), ``mean`` of the truth, and
+    ``relative_rmse``, sqrt(mse) / mean.
     """
     truth = answers.mean.astype(np.float64)
     mse = np.square(prediction - truth).mean(axis=0)

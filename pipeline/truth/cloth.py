@@ -27,31 +27,21 @@ SHAPES: Final = {"gaussian": GAUSSIAN, "box": BOX}
 
 
 class ClothSide(NamedTuple):
-    """One side of a fabric with the options that shape its numbers.
-
-    Attributes
-    ----------
-    front, back : HeightField
-        The side that the viewer sees, and the other, reflected in the fabric plane.
-    choices : Choices
-        Options of the point's share.
-    shape : int
-        GAUSSIAN or BOX.
-    projected : bool
-        Whether the denominator is the footprint's projected area.
-    parallax : bool
-        Whether points of the footprint are view rays through the reference plane.
-    plane : float
-        Height of that plane.
-    """
+    """One side of a fabric with the options that shape its numbers."""
 
     front: HeightField
     back: HeightField
+    """The side that the viewer sees, and the other, reflected in the fabric plane."""
     choices: Choices
+    """Options of the point's share."""
     shape: int
+    """GAUSSIAN or BOX."""
     projected: bool
+    """True if the denominator is the footprint's projected area."""
     parallax: bool
+    """True if points of the footprint are view rays through the reference plane."""
     plane: float
+    """Height of that plane."""
 
 
 class WideQueries(NamedTuple):
@@ -72,22 +62,15 @@ class WideQueries(NamedTuple):
 
 
 class Raw(NamedTuple):
-    """Answers of an estimator, before the calibration of their errors.
-
-    Attributes
-    ----------
-    mean, error : float64 (N, 5)
-        Components and transparency, and the error that the estimator reports of each.
-    count : int64 (N,)
-        Points or nodes evaluated.
-    stage : int64 (N,)
-        The computation that gave the answer: a stage of pipeline.truth.calibration.
-    """
+    """Answers of an estimator, before the calibration of their errors."""
 
     mean: Float64
     error: Float64
+    """Components and transparency, and the error that the estimator reports of each, (N, 5)."""
     count: Index  # type: ignore[assignment]  # the field's word, though tuples have a count too
+    """Points or nodes evaluated, (N,)."""
     stage: Index
+    """The computation that gave the answer: a stage of pipeline.truth.calibration, (N,)."""
 
     @classmethod
     def empty(cls, rows: int) -> Raw:

@@ -41,29 +41,20 @@ ROUNDING: Final = 2e-6
 
 
 class CheckResult(NamedTuple):
-    """A measured number, its expected value, and whether both agree.
-
-    Attributes
-    ----------
-    name : str
-        Measured quantity.
-    measured, expected, standard_error : float
-        Measured number, expected value, and standard error, which is 0 for an exact number.
-    relation : str
-        Expected relation of the number to the expected value; ``reported``: there is no expected value.
-    status : str
-        ``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``.
-    note : str
-        Remark, shown in the table.
-    """
+    """A measured number, its expected value, and whether both agree."""
 
     name: str
+    """Measured quantity."""
     measured: float
     expected: float
     standard_error: float
+    """Measured number, expected value, and standard error, which is 0 for an exact number."""
     relation: Literal["=", "<=", "reported"]
+    """Expected relation of the number to the expected value; ``reported``: there is no expected value."""
     status: Literal["exact", "statistics", "broken", "reported"]
+    """``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``."""
     note: str
+    """Remark, shown in the table."""
 
     @property
     def sigmas(self) -> float:
@@ -90,12 +81,7 @@ def worst(
 ) -> CheckResult:
     """Check many numbers; the result is that of the number furthest off, in its standard errors.
 
-    Parameters
-    ----------
-    measured, errors : float (N,)
-        The numbers and their standard errors.
-    freedom : int
-        Degrees of freedom of the errors.
+    `measured` (N,) have `errors` (N,), their standard errors, of so many degrees of freedom.
     """
     values, spread = np.broadcast_arrays(np.atleast_1d(np.asarray(measured, np.float64)), np.asarray(errors))
     # Rounding counts as error too: two sums of the same points differ by it and by nothing else.

@@ -100,25 +100,19 @@ class Queries(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """N patch BSDF values with their uncertainty; columns in the order of `pipeline.truth.conventions.COMPONENTS`.
-
-    Attributes
-    ----------
-    mean, standard_error, bound : float32 (N, 4)
-        Components with unit colour, the standard error of each, and a bound of its error (pipeline.truth.calibration).
-    count : int32 (N,)
-        Points evaluated.
-    transparency, transparency_standard_error, transparency_bound : float32 (N,)
-        Share of light from straight behind that reaches the viewer unscattered, through gaps and yarns.
-    """
+    """N patch BSDF values with their uncertainty; columns in the order of `pipeline.truth.conventions.COMPONENTS`."""
 
     mean: Float32
     standard_error: Float32
     bound: Float32
+    """Components with unit colour, the standard error of each, and a bound of its error (pipeline.truth.calibration),
+    (N, 4)."""
     count: npt.NDArray[np.int32]  # type: ignore[assignment]  # the field's word, though tuples have a count too
+    """Points evaluated, int32 (N,)."""
     transparency: Float32
     transparency_standard_error: Float32
     transparency_bound: Float32
+    """Share of light from straight behind that reaches the viewer unscattered, through gaps and yarns, (N,)."""
 
     @classmethod
     def opaque(cls, mean: Float32, standard_error: Float32, count: npt.NDArray[np.int32]) -> Answers:

@@ -306,12 +306,14 @@ def _halved(form: Form) -> Form:
 
 def _slab_of_node(wi: Array, wo: Array, t: Array, alpha: Array, thickness: Array) -> Array:
     """Return f_r or f_t, times the two cosines, as the loops over nodes compute it in single precision."""
-    behind = wi[2, 0] < 0
-    function: Form = kernels.transmitted if behind else kernels.reflected
+    behind = True if wi[2, 0] < 0 else None
+    function: Form = kernels.scattered
     inverse = (1 / np.maximum(np.square((wi + wo).astype(np.float64)).sum(axis=0), 1e-12)).astype(np.float32)
     rows = zip((-wi if behind else wi).T, wo.T, t.T[..., None], alpha, thickness, inverse, strict=True)
     return np.array([
-        function(_LEVEL, Tangents(*fibre), _towards(light), _towards(viewer), size, _layer(a, depth), _ONE, 0 * _ONE)
+        function(
+            _LEVEL, Tangents(*fibre), _towards(light), _towards(viewer), size, _layer(a, depth), _ONE, 0 * _ONE, behind
+        )
         for light, viewer, fibre, a, depth, size in rows
     ])  # fmt: skip
 

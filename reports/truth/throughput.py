@@ -37,7 +37,7 @@ from pipeline.truth.node_table.kernels import (
     Tangents,
     no_shares,
     node_directions,
-    reflected,
+    scattered,
 )
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
@@ -149,7 +149,7 @@ def _evaluate_speculars(model: ClothSide, table: ExactNodes, columns: WideQuerie
             tangent = Tangents(table.fine[4, f0:f1], table.fine[5, f0:f1], table.fine[6, f0:f1])
             layer = FlakeLayer(np.float32(alpha**2), np.float32(model.front.thickness), one)
             lit, speculars = shares.lit[:count], shares.speculars[:count]
-            reflected(normal, tangent, towards.light, towards.viewer, one, layer, lit, speculars)
+            scattered(normal, tangent, towards.light, towards.viewer, one, layer, lit, speculars, None)
             points += count
     return points
 

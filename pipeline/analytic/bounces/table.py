@@ -48,20 +48,17 @@ class BounceTable(NamedTuple):
 
     Colours, P of them, are those of `pipeline.analytic.bounces.walks.Transport`: k_d of warp and weft and, with two
     ways, k_dt; Q is P of one way, 2 P of two.
-
-    Attributes
-    ----------
-    viewer : float32 (G, P P RANK + W RANK_OF_THIRD + P P P + W)
-        On the grid: the viewer's factors of C2 and of s, R, and m; of s and m one for each way of what is seen.
-    light : float32 (W G, P P RANK + W RANK_OF_THIRD + P Q + Q)
-        The light's factors, e and e', in front, then behind; all but the factors of s are over the cosine of the light.
-    transfers : float64 (P Q + Q, P)
-        M in P Q rows, and M': the share of what a family sends on in one way that has its light from each place.
     """
 
     viewer: Float32
+    """On the grid: the viewer's factors of C2 and of s, R, and m; of s and m one for each way of what is seen,
+    (G, P P RANK + W RANK_OF_THIRD + P P P + W)."""
     light: Float32
+    """The light's factors, e and e', in front, then behind; all but the factors of s are over the cosine of the light,
+    (W G, P P RANK + W RANK_OF_THIRD + P Q + Q)."""
     transfers: Float64
+    """M in P Q rows, and M': the share of what a family sends on in one way that has its light from each place,
+    (P Q + Q, P)."""
 
 
 def bounce_table(fabric: Fabric, walks: int = WALKS, through: bool = False) -> BounceTable:

@@ -54,23 +54,16 @@ _FOUR: Final = 1.16730397826141868
 
 
 class Start(NamedTuple):
-    """Points from which walks start, spread over the visible yarns of a repeat.
-
-    Attributes
-    ----------
-    x, y : float64 (P,)
-        Places in the first cell of each kind.
-    area : float64 (P,)
-        The area of the fabric plane that each stands for.
-    first, second : float64 (P,)
-        Random numbers of the first direction.
-    """
+    """Points from which walks start, spread over the visible yarns of a repeat."""
 
     x: Float64
     y: Float64
+    """Places in the first cell of each kind, (P,)."""
     area: Float64
+    """The area of the fabric plane that each stands for, (P,)."""
     first: Float64
     second: Float64
+    """Random numbers of the first direction, (P,)."""
 
 
 class Transport(NamedTuple):
@@ -78,34 +71,24 @@ class Transport(NamedTuple):
 
     Families f are 0 for the warp, 1 for the weft. Places are 2 face + f, P = 2 W of them; colours, a and b, are
     2 way + f; c and d are P way + place, Q = W P of them. With two ways, lights behind follow those in front.
-
-    Attributes
-    ----------
-    seen : float64 (O,)
-        Visible area towards each viewer, gaps included.
-    reached : float64 (O, P, P, P)
-        Of it, what has its light from two yarns and more: seen as a, from b, which has it from a place.
-    second : float32 (O, P, P, W I)
-        The sun's light of each direction that is seen as a and comes from b.
-    third : float32 (O, W, W I)
-        The sun's light of each direction that comes from c, by the way of a.
-    further : float64 (O, W)
-        Of the visible area, what has its light from three yarns and more, by the way of a.
-    transfers : float64 (P Q + Q, P)
-        Of walks that have met b and then c, in P Q rows, those that go on to each place; of walks that meet d later, in
-        Q rows, the same.
-    later : float64 (P Q + Q, I + 1)
-        The sun's light on c, and on d, of each direction on the side where they have it from, and the number of these
-        walks in the last column.
     """
 
     seen: Float64
+    """Visible area towards each viewer, gaps included, (O,)."""
     reached: Float64
+    """Of it, what has its light from two yarns and more: seen as a, from b, which has it from a place, (O, P, P, P)."""
     second: Float32
+    """The sun's light of each direction that is seen as a and comes from b, (O, P, P, W I)."""
     third: Float32
+    """The sun's light of each direction that comes from c, by the way of a, (O, W, W I)."""
     further: Float64
+    """Of the visible area, what has its light from three yarns and more, by the way of a, (O, W)."""
     transfers: Float64
+    """Of walks that have met b and then c, in P Q rows, those that go on to each place; of walks that meet d later, in
+    Q rows, the same, (P Q + Q, P)."""
     later: Float64
+    """The sun's light on c, and on d, of each direction on the side where they have it from, and the number of these
+    walks in the last column, (P Q + Q, I + 1)."""
 
 
 class _Place(NamedTuple):

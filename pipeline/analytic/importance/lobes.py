@@ -23,13 +23,14 @@ import numpy as np
 
 from pipeline.analytic.importance.surface import DIFFUSE, SPECULAR, THROUGH, LobeSurface
 from pipeline.analytic.soft_horizons import AZIMUTHS, above, around, ramp
+from pipeline.analytic.soft_nodes.answer import SMALLEST
 from pipeline.analytic.soft_nodes.nodes import BLOCK, BOUND, CURVE, FAMILY, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
 from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, tangent
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel, kernel
 from pipeline.compiled.float32 import arcsine
 from pipeline.compiled.normal import normal_quantile
-from pipeline.truth.footprint.mixture import Footprints
+from pipeline.truth.footprint.mixture import Footprints, footprints
 from pipeline.truth.footprint.sequences import r2_pair
 from pipeline.truth.geometry.heightfield import (
     ALPHA,
@@ -42,6 +43,7 @@ from pipeline.truth.geometry.heightfield import (
     WARP,
     WEFT,
 )
+from pipeline.truth.query import Queries
 from pipeline.truth.scattering.slab_float32 import unscattered
 
 FLAKE_ROWS: Final = 6
@@ -53,16 +55,14 @@ TX, TY, TZ, SQUARE, SHARE, HEIGHT = range(FLAKE_ROWS)
 NEAR, FAR, STRAIGHT = range(3)
 """Columns of `Lobes.rest`: the cosine on the viewer's side, that on the other, light straight through."""
 
-POINT_ROWS: Final = 7
-"""Rows of the scratch of `find_rows`."""
-
 SCATTERED: Final = 0.2
 """Light that leaves after one flake and meets no other yarn, as a share of what meets a flake, roughly."""
 
 BROAD: Final = 0.2
 """Share of a family's lobes that its broad one has."""
 
-_SINE, _PLACE, _CURVE, _LIMIT, _SEEN, _WARPNESS, _YARNNESS = range(POINT_ROWS)
+_POINT_ROWS = 7  # of the scratch
+_SINE, _PLACE, _CURVE, _LIMIT, _SEEN, _WARPNESS, _YARNNESS = range(_POINT_ROWS)
 _SCATTERED, _BROAD = np.float32(SCATTERED), np.float32(BROAD)
 _ASTRAY = np.float32(0.15)  # share of the flakes' light that the cosine takes: no point finds it
 _CLEAR = np.float32(0.05)  # light straight through a yarn at least: few points may all be opaque, the footprint is not
@@ -77,49 +77,34 @@ _LEVELS = np.float32(LEVELS)
 
 
 class Lobes(NamedTuple):
-    """Mixtures for N looks; all probabilities of a look sum to 1.
-
-    Attributes
-    ----------
-    flakes : float32 (N, FLAKE_ROWS, K)
-        Lobes of flakes; the last two are the broad ones of warp and weft.
-    rest : float32 (N, 3)
-        Probabilities of NEAR, FAR and STRAIGHT.
-    """
+    """Mixtures for N looks; all probabilities of a look sum to 1."""
 
     flakes: Float32
+    """Lobes of flakes; the last two are the broad ones of warp and weft, (N, FLAKE_ROWS, K)."""
     rest: Float32
+    """Probabilities of NEAR, FAR and STRAIGHT, (N, 3)."""
 
 
 class Viewing(NamedTuple):
-    """A footprint and its viewer.
-
-    Attributes
-    ----------
-    x, y : float64
-        Centre, within the repeat.
-    dx, dy, rho : float32
-        Deviations along x and y, and correlation of the axes.
-    even : bool
-        Whether it covers the cloth evenly.
-    ox, oy, oz : float32
-        wo.
-    low, high, turn
-        Azimuths around wo, and where between them it lies.
-    """
+    """A footprint and its viewer."""
 
     x: float
     y: float
+    """Centre, within the repeat."""
     dx: np.float32
     dy: np.float32
     rho: np.float32
+    """Deviations along x and y, and correlation of the axes."""
     even: bool
+    """True if it covers the cloth evenly."""
     ox: np.float32
     oy: np.float32
     oz: np.float32
+    """wo."""
     low: int
     high: int
     turn: np.float32
+    """Azimuths around wo, and where between them it lies."""
 
 
 def point_places(count: int) -> Float32:
@@ -134,21 +119,30 @@ def point_places(count: int) -> Float32:
     return result
 
 
+def find_lobes(cloth: LobeSurface, looks: Queries, places: Float32, widening: float) -> Lobes:
+    """Return the mixtures of N looks, of P + 2 lobes each, the viewer in front; their wi does not matter.
+
+    `places` (P, 4) are `point_places`, `widening` is a factor on the widening of lobes.
+    """
+    count, points = len(looks.u), len(places)
+    result = Lobes(np.empty((count, FLAKE_ROWS, points + 2), np.float32), np.empty((count, STRAIGHT + 1), np.float32))
+    wo, scratch = np.ascontiguousarray(looks.wo, np.float32), np.empty((_POINT_ROWS, points), np.float32)
+    _find_rows(cloth, footprints(looks, SMALLEST), wo, places, np.float32(widening), scratch, result)
+    return result
+
+
 @kernel
-def find_rows(
+def _find_rows(
     cloth: LobeSurface,
-    footprints: Footprints,
+    patches: Footprints,
     wo: Float32,
     places: Float32,
     widening: np.float32,
     points: Float32,
     result: Lobes,
 ) -> None:
-    """Write the mixtures of N looks, of P + 2 lobes each, the viewer in front.
-
-    `places` (P, 4) are `point_places`, `widening` a factor on the widening of lobes, `points` (POINT_ROWS, P) scratch.
-    """
-    u, v, deviation_x, deviation_y, correlation = footprints
+    """Write the mixtures of N looks; `points` is scratch."""
+    u, v, deviation_x, deviation_y, correlation = patches
     ends, picks = cloth.repeat[0], cloth.repeat[1]
     for n in range(len(u)):
         # Reduced in double precision: single would lose the place of a far centre within the repeat.

@@ -68,16 +68,8 @@ def sample_flake_scatter(
 ) -> tuple[float, float, float]:
     """Return a unit direction with density D(h) / (4 sigma(w)), h the half vector with w.
 
-    Parameters
-    ----------
-    wx, wy, wz : float
-        Unit direction at hand, wi or wo, away from the surface.
-    tx, ty, tz : float
-        Unit fibre tangent.
-    alpha : float
-        Roughness, (0, 1].
-    first, second : float
-        Random numbers in [0, 1).
+    w is the unit direction at hand, wi or wo, away from the surface; t the unit fibre tangent; alpha the roughness, (0,
+    1]; `first` and `second` are random numbers in [0, 1).
     """
     dx, dy, dz, projected = _squeeze(wx, wy, wz, tx, ty, tz, alpha)
     nx, ny, nz = _sample_cosine(dx, dy, dz, first, second)

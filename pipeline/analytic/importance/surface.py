@@ -22,36 +22,25 @@ _GRID = 12  # cells along each axis: some tens of kilobytes, which stay in the c
 
 
 class LobeSurface(NamedTuple):
-    """One side of a cloth.
-
-    Attributes
-    ----------
-    repeat : int64 (2,)
-        Ends and picks.
-    yarn : float32 (2, 8)
-        `HeightField.yarn`.
-    thickness : float32
-        Optical thickness T.
-    uniform : float
-        Deviation from which on a Gaussian covers the cloth evenly.
-    piece_starts, pieces, bounds, grid
-        As in `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, the grid flat.
-    size : int
-        Cells of a grid along each axis.
-    luminance : float32 (3, 2)
-        Luminances of the mean colours of warp and weft: SPECULAR, DIFFUSE, THROUGH.
-    """
+    """One side of a cloth."""
 
     repeat: Index
+    """Ends and picks, (2,)."""
     yarn: Float32
+    """`HeightField.yarn`, (2, 8)."""
     thickness: np.float32
+    """Optical thickness T."""
     uniform: float
+    """Deviation from which on a Gaussian covers the cloth evenly."""
     piece_starts: Index
     pieces: Index
     bounds: Float32
     grid: npt.NDArray[np.uint8]
+    """As in `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, the grid flat."""
     size: int
+    """Cells of a grid along each axis."""
     luminance: Float32
+    """Luminances of the mean colours of warp and weft: SPECULAR, DIFFUSE, THROUGH, (3, 2)."""
 
 
 def tabulate_surface(fabric: Fabric) -> LobeSurface:

@@ -49,25 +49,11 @@ def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32
 def sum_queries(
     table: SoftNodeTable, patches: Footprints, wi: Float32, wo: Float32, curvature: Float32
 ) -> tuple[Float32, Float32]:
-    """Return the sums of N queries, the viewer in front.
+    """Return the sums of N queries, the viewer in front, and the areas seen through gaps, (N,).
 
-    The light is behind only if the table knows it; without falls in the table, all cloth counts as flat.
-
-    Parameters
-    ----------
-    table : SoftNodeTable
-        The cloth.
-    patches : Footprints
-        In yarn spacings.
-    wi, wo : float32 (N, 3)
-        Directions.
-    curvature : float32 (N,)
-        Of the cloth in the viewer's plane, 1/yarn spacings.
-
-    Returns
-    -------
-    float32 (N, K, NODE_SUMS), float32 (N,)
-        The sums of each kind of yarn (`SoftNodeTable.kinds`), five with the light behind; the area seen through gaps.
+    The sums (N, K, NODE_SUMS) are of each kind of yarn (`SoftNodeTable.kinds`), five with the light behind. The light
+    is behind only if the table knows it; without falls in the table, all cloth counts as flat. `curvature` (N,) is that
+    of the cloth in the viewer's plane, 1/yarn spacings.
     """
     kinds = table.kinds[0] + table.kinds[1]
     result, gaps = np.zeros((len(wi), kinds, NODE_SUMS), np.float32), np.zeros(len(wi), np.float32)

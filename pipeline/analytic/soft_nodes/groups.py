@@ -28,27 +28,18 @@ from pipeline.truth.geometry.pieces import CellPiece
 
 
 class Detail(NamedTuple):
-    """How fine the nodes of a table are.
-
-    Attributes
-    ----------
-    most : int
-        Nodes of all groups of pieces on top above which groups are merged; half as many beneath.
-    along : float
-        Nodes along a yarn, as a multiple of those at level 2.
-    parts : int
-        Parts of a yarn across, each with nodes of its own.
-    lines : float
-        Deviation, in yarn spacings, below which a footprint places its nodes, on lines.
-    spacing : float
-        Distance of these lines and of their nodes, as a multiple of that at level 2.
-    """
+    """How fine the nodes of a table are."""
 
     most: int
+    """Nodes of all groups of pieces on top above which groups are merged; half as many beneath."""
     along: float
+    """Nodes along a yarn, as a multiple of those at level 2."""
     parts: int
+    """Parts of a yarn across, each with nodes of its own."""
     lines: float
+    """Deviation, in yarn spacings, below which a footprint places its nodes, on lines."""
     spacing: float
+    """Distance of these lines and of their nodes, as a multiple of that at level 2."""
 
 
 DETAILS: Final = {
@@ -74,27 +65,18 @@ Cell = tuple[int, int]
 
 
 class PieceGroup(NamedTuple):
-    """Pieces that share nodes.
-
-    Attributes
-    ----------
-    piece : CellPiece
-        The mean of them.
-    cells : list of (end, pick)
-        Cells of the pieces.
-    blocks : list of int
-        Numbers of their horizons, one for each cell.
-    thread : int
-        The end or pick that they belong to; 0 if groups hold pieces of all threads.
-    dense : float
-        Nodes along it, as a multiple of those at level 2.
-    """
+    """Pieces that share nodes."""
 
     piece: CellPiece
+    """The mean of them."""
     cells: list[Cell]
+    """Cells of the pieces, (end, pick)."""
     blocks: list[int]
+    """Numbers of their horizons, one for each cell."""
     thread: int = 0
+    """The end or pick that they belong to; 0 if groups hold pieces of all threads."""
     dense: float = 1.0
+    """Nodes along it, as a multiple of those at level 2."""
 
     @property
     def lines(self) -> int:
@@ -199,16 +181,9 @@ LARGEST_SINE: Final = 0.999
 
 
 def piece_rows(yarn: Float64, piece: CellPiece, across: Rule, along: Rule) -> Float64:
-    """Return the surface at nodes, (SURFACE_ROWS, nodes); nodes across the yarn follow each other.
+    """Return the surface at the nodes of a piece, (SURFACE_ROWS, nodes); nodes across the yarn follow each other.
 
-    Parameters
-    ----------
-    yarn : float64 (families, 8)
-        `HeightField.yarn`.
-    piece : CellPiece
-        The piece, of a yarn or of a gap.
-    across, along : Rule
-        Its nodes.
+    `yarn` is `HeightField.yarn`; `across` and `along` are the nodes of the piece, which may be a gap.
     """
     lines, columns = len(along.places), len(across.places)
     if piece.family == GAP:

@@ -17,20 +17,20 @@ from pipeline.analytic.soft_horizons import Bend, above, ramp
 from pipeline.analytic.soft_nodes.nodes import LEVELS, UPPER
 from pipeline.analytic.soft_nodes.scratch import DRAFT_ROWS
 from pipeline.analytic.soft_nodes.shade import (
-    Five,
+    Behind,
     GridHorizons,
     NodeFrame,
     Six,
     YarnDirections,
-    add_node,
-    node_behind,
+    added,
+    shade_node,
     yarn_layer,
 )
 from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
 from pipeline.compiled.float32 import arcsine, remaining
-from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, WARP
+from pipeline.truth.geometry.heightfield import BETA, COS_TWIST, RADIUS, SIN_TWIST, WARP
 
 AT, LENGTH, ACROSS, BY_ACROSS, ALONG_FROM, BY_ALONG, DENSITY, APART = range(8)
 """Angle across the yarn, or place along the line; length, negative of the latter and 0 at a rim; place across and along
@@ -40,7 +40,10 @@ FLOAT_BEND, FLOAT_HALF, FLOAT_DROP, BENDING, STEEPEST_SINE, ROWS_FROM, ROWS_PER 
 """Bend radius of the float, negative beneath and 0 if drawn flat, half length and drop; curve and largest sine as in
 `SoftNodeTable.bounds`; row of the grid for b = 0 and rows for each unit of b."""
 
-Falls = npt.NDArray[np.uint8] | None
+Falls = tuple[npt.NDArray[np.uint8], Bend] | None
+"""Falls of the horizons over curved cloth (soft_horizons), and the curvature; None on flat cloth, which has a loop of
+its own."""
+
 
 _0, _1, _2, _HALF = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(0.5)
 _RIGHT = np.float32(1.7)  # more than any angle across
@@ -52,24 +55,16 @@ _INVERSE_PI = np.float32(1.0 / math.pi)
 
 
 class LineRays(NamedTuple):
-    """How the rays of a footprint sink, and its deviation along lines.
-
-    Attributes
-    ----------
-    run : float32
-        Distance in the plane for each unit of height, T.
-    plane : float32
-        Height of the reference plane.
-    bent : float32
-        2 kappa T^2.
-    inverse : float32
-        1 / deviation of the footprint along the lines.
-    """
+    """How the rays of a footprint sink, and its deviation along lines."""
 
     run: np.float32
+    """Distance in the plane for each unit of height, T."""
     plane: np.float32
+    """Height of the reference plane."""
     bent: np.float32
+    """2 kappa T^2."""
     inverse: np.float32
+    """1 / deviation of the footprint along the lines."""
 
 
 class LineNode(NamedTuple):
@@ -142,12 +137,13 @@ def _node(
 
 @inlined_fast_kernel
 def _lit(
-    light: GridHorizons, falls: Falls, fall: Bend, cell: np.uint32, level: np.float32, sharpness: np.float32
+    light: GridHorizons, bent: Falls, cell: np.uint32, level: np.float32, sharpness: np.float32
 ) -> np.float32:  # fmt: skip
     """Return the share of a node that the light reaches."""
     grid, first, last, turn = light.grid, cell + light.low, cell + light.high, light.turn
     over = above(level, np.float32(grid[first]), np.float32(grid[last]), turn, sharpness)
-    if falls is not None:
+    if bent is not None:
+        falls, fall = bent
         little, much = np.float32(falls[fall.low, first]), np.float32(falls[fall.high, first])
         little += turn * (np.float32(falls[fall.low, last]) - little)
         much += turn * (np.float32(falls[fall.high, last]) - much)
@@ -161,72 +157,34 @@ def shade_lines(
     firsts: npt.NDArray[np.uint32],
     rays: LineRays,
     light: GridHorizons,
-    falls: Falls,
-    fall: Bend,
+    bent: Falls,
     size: int,
     sharpness: np.float32,
     d: YarnDirections,
     yarn: Float32,
     family: int,
     thickness: np.float32,
+    behind: Behind,
+    hidden_ends: bool = False,
 ) -> Six:
     """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids of `size` cells.
 
-    `falls` and `fall` are those of the horizons over curved cloth (soft_horizons); None on flat cloth, which has a loop
-    of its own.
+    With the light behind, `light` has the horizons of the back. With `hidden_ends` the back then shows, at the rim
+    where a float ends, the upright edge of a crossing yarn: light from the float's side does not reach it.
     """
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
+    layer = yarn_layer(yarn, thickness)
     step_a, step_b = (1, size) if family == WARP else (size, 1)
-    level, sharp = d.iz * _LEVELS, sharpness / _LEVELS
+    level, sharp = (d.iz if behind is None else -d.iz) * _LEVELS, sharpness / _LEVELS
+    near_end = _NEAR_END if hidden_ends else -_1
     total = (_0, _0, _0, _0, _0, _0)
     for k in range(len(firsts)):
         at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
         cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
-        total = add_node(
-            total, d, at.frame, at.along, at.across, _1, _lit(light, falls, fall, cell, level, sharp), at.weight, layer
-        )
+        lit = _lit(light, bent, cell, level, sharp)
+        if behind is not None and draft[LENGTH, k] == _0:
+            inwards = d.iy * draft[ROWS_PER, k]
+            inwards = -inwards if at.row > np.float32(size) - near_end else (inwards if at.row < near_end else -_1)
+            lit = _0 if inwards > _0 else lit
+        total = added(total, shade_node(d, at.frame, at.along, at.across, _1, lit, at.weight, layer, behind))
     return total
-
-
-@fast_kernel
-def shade_lines_behind(
-    draft: Float32,
-    firsts: npt.NDArray[np.uint32],
-    rays: LineRays,
-    light: GridHorizons,
-    falls: Falls,
-    fall: Bend,
-    size: int,
-    sharpness: np.float32,
-    d: YarnDirections,
-    yarn: Float32,
-    family: int,
-    thickness: np.float32,
-    hidden_ends: bool,
-) -> Five:
-    """Return the same with the light behind, whose horizons are those of the back.
-
-    With `hidden_ends` the back shows, at the rim where a float ends, the upright edge of a crossing yarn: light from
-    the float's side does not reach it.
-    """
-    radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    layer = yarn_layer(yarn[ALPHA], thickness, yarn[BLEND])
-    step_a, step_b = (1, size) if family == WARP else (size, 1)
-    level, sharp = -d.iz * _LEVELS, sharpness / _LEVELS
-    near_end = _NEAR_END if hidden_ends else -_1
-    a, c, s, a0, through = _0, _0, _0, _0, _0
-    for k in range(len(firsts)):
-        at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
-        cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
-        inwards = d.iy * draft[ROWS_PER, k]
-        inwards = -inwards if at.row > np.float32(size) - near_end else (inwards if at.row < near_end else -_1)
-        hidden = draft[LENGTH, k] == _0 and inwards > _0
-        lit = _0 if hidden else _lit(light, falls, fall, cell, level, sharp)
-        of_node = node_behind(d, at.frame, at.along, at.across, _1, lit, at.weight, layer)
-        a += of_node[0]
-        c += of_node[1]
-        s += of_node[2]
-        a0 += of_node[3]
-        through += of_node[4]
-    return a, c, s, a0, through

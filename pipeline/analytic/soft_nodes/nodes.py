@@ -75,106 +75,77 @@ X_LOW, X_HIGH, Y_LOW, Y_HIGH, SHIFT, CURVE, BOUND = range(7)
 
 
 class SoftNodeTable(NamedTuple):
-    """A cloth's nodes and grids.
-
-    Attributes
-    ----------
-    repeat : int64 (2,)
-        Ends and picks.
-    yarn : float32 (2, 8)
-        `HeightField.yarn`.
-    thickness : float32
-        Optical thickness T.
-    float_length : float32 (2,)
-        Mean length of the floats of each family over the cells that show them; 1 if none does.
-    uniform : float
-        Deviation from which on a Gaussian covers the cloth evenly.
-    starts : int64 (K + 2,)
-        First block of the nodes of each kind of yarn, and of gaps; their end. Kinds are warps and wefts, K = 2, or all
-        ends, then all picks.
-    kinds : int64 (2,)
-        Kinds of warps, kinds of wefts: 1 and 1, or ends and picks.
-    nodes : float32 (B, ROWS, BLOCK_NODES)
-        See `surface`.
-    evenly : float32 (B, BLOCK_NODES)
-        Share of the cloth's area that a node represents.
-    mean, sharpness : float32 (AZIMUTHS, B, BLOCK_NODES)
-        Mean of the horizon, and 1 over the width of its ramp, sqrt 12 standard deviations.
-    groups : uint32 (K, 3)
-        First node, lines of nodes, family.
-    group_starts, cell_groups : uint32
-        The groups in cell c = pick ends + end are cell_groups[group_starts[c] : group_starts[c + 1]].
-    piece_starts : int64
-        The pieces of cell c are those from piece_starts[c] to piece_starts[c + 1].
-    pieces : int64 (P, 2)
-        Family, grid.
-    floats : float64 (P, 4)
-        Row of `HeightField.floats`.
-    crowns : float64 (P,)
-        Greatest height of its cell.
-    bounds : float32 (P, 7)
-        Extent in x and y within the cell; offset, curve (negative beneath) and largest sine of the inclination.
-    grid : uint8 (grids, AZIMUTHS, cells along y, cells along x)
-        Horizons; cells are even in v across a yarn.
-    behind_mean, behind_sharpness, behind_grid
-        The same of the back of the cloth at the same places, its tangent planes included: above them the back sees
-        light from behind. Of no nodes and no grids if the table was built without.
-    falls, grid_falls : float32 (curvatures, AZIMUTHS, B, BLOCK_NODES), uint8 (curvatures, …)
-        Falls of `mean` and `grid` over curved cloth, as shares (curved_horizons); of no curvatures if the table was
-        built without.
-    heights : float64 (2, 8)
-        `HeightField.yarn` in double precision, in which heights are found.
-    highest, lowest, plane : float
-        Those of the height field, and the height of the reference plane.
-    spots : float32 (lines, 4, COLUMNS)
-        Of every line of nodes: places in x and y from the corner of the cell, shares of the cell, heights.
-    shown : float32 (2,)
-        Least and greatest of these heights.
-    areas : float32 (AZIMUTHS, SEEN_ANGLES, B, BLOCK_NODES)
-        Area that a viewer sees of each node's box (seen_areas).
-    view_lines : float
-        Deviation below which a footprint places its nodes on lines.
-    spacing : float
-        Distance of lines and of their nodes, as a multiple of that at level 2.
-    rims : bool
-        Whether view rays that meet a wall see the yarn's rim above it.
-    """
+    """A cloth's nodes and grids."""
 
     repeat: Index
+    """Ends and picks, (2,)."""
     yarn: Float32
+    """`HeightField.yarn`, (2, 8)."""
     thickness: np.float32
+    """Optical thickness T."""
     float_length: Float32
+    """Mean length of the floats of each family over the cells that show them; 1 if none does, (2,)."""
     uniform: float
+    """Deviation from which on a Gaussian covers the cloth evenly."""
     starts: Index
+    """First block of the nodes of each kind of yarn, and of gaps; their end, (K + 2,). Kinds are warps and wefts,
+    K = 2, or all ends, then all picks."""
     kinds: Index
+    """Kinds of warps, kinds of wefts: 1 and 1, or ends and picks, (2,)."""
     nodes: Float32
+    """See `surface`, (B, ROWS, BLOCK_NODES)."""
     evenly: Float32
+    """Share of the cloth's area that a node represents, (B, BLOCK_NODES)."""
     mean: Float32
     sharpness: Float32
+    """Mean of the horizon, and 1 over the width of its ramp, sqrt 12 standard deviations,
+    (AZIMUTHS, B, BLOCK_NODES)."""
     groups: npt.NDArray[np.uint32]
+    """First node, lines of nodes, family, uint32 (K, 3)."""
     group_starts: npt.NDArray[np.uint32]
     cell_groups: npt.NDArray[np.uint32]
+    """The groups in cell c = pick ends + end are cell_groups[group_starts[c] : group_starts[c + 1]], uint32."""
     piece_starts: Index
+    """The pieces of cell c are those from piece_starts[c] to piece_starts[c + 1]."""
     pieces: Index
+    """Family, grid, (P, 2)."""
     bounds: Float32
+    """Extent in x and y within the cell; offset, curve (negative beneath) and largest sine of the inclination,
+    (P, 7)."""
     floats: Float64
+    """Row of `HeightField.floats`, (P, 4)."""
     crowns: Float64
+    """Greatest height of its cell, (P,)."""
     grid: npt.NDArray[np.uint8]
+    """Horizons; cells are even in v across a yarn, uint8 (grids, AZIMUTHS, cells along y, cells along x)."""
     behind_mean: Float32
     behind_sharpness: Float32
     behind_grid: npt.NDArray[np.uint8]
+    """The same of the back of the cloth at the same places, its tangent planes included: above them the back sees light
+    from behind. Of no nodes and no grids if the table was built without."""
     falls: Float32
     grid_falls: npt.NDArray[np.uint8]
+    """Falls of `mean` and `grid` over curved cloth, as shares (curved_horizons); of no curvatures if the table was
+    built without, float32 (curvatures, AZIMUTHS, B, BLOCK_NODES), uint8 (curvatures, …)."""
     heights: Float64
+    """`HeightField.yarn` in double precision, in which heights are found, (2, 8)."""
     highest: float
     lowest: float
     plane: float
+    """Those of the height field, and the height of the reference plane."""
     spots: Float32
+    """Of every line of nodes: places in x and y from the corner of the cell, shares of the cell, heights,
+    (lines, 4, COLUMNS)."""
     shown: Float32
+    """Least and greatest of these heights, (2,)."""
     areas: Float32
+    """Area that a viewer sees of each node's box (seen_areas), (AZIMUTHS, SEEN_ANGLES, B, BLOCK_NODES)."""
     view_lines: float
+    """Deviation below which a footprint places its nodes on lines."""
     spacing: float
+    """Distance of lines and of their nodes, as a multiple of that at level 2."""
     rims: bool
+    """True if view rays that meet a wall see the yarn's rim above it."""
 
 
 def tabulate(

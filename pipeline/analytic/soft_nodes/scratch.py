@@ -14,42 +14,33 @@ from pipeline.compiled.decorators import allocating_kernel
 
 
 class SoftQuery(NamedTuple):
-    """A query.
-
-    Attributes
-    ----------
-    x, y : float64
-        Centre of the footprint, within the repeat.
-    dx, dy, rho, narrowest : float32
-        Deviations along x and y in yarn spacings, correlation of the axes, and the least deviation of any direction.
-    ix, iy, iz, ox, oy, oz : float32
-        wi and wo.
-    low_i, high_i, turn_i, low_o, high_o, turn_o
-        Azimuths around wi and wo, and where between them these lie.
-    bend_i, bend_o : float32
-        Curvatures of the cloth towards wi and wo, 1/yarn spacings.
-    """
+    """A query."""
 
     x: float
     y: float
+    """Centre of the footprint, within the repeat."""
     dx: np.float32
     dy: np.float32
     rho: np.float32
     narrowest: np.float32
+    """Deviations along x and y in yarn spacings, correlation of the axes, and the least deviation of any direction."""
     ix: np.float32
     iy: np.float32
     iz: np.float32
     ox: np.float32
     oy: np.float32
     oz: np.float32
+    """wi and wo."""
     low_i: int
     high_i: int
     turn_i: np.float32
     low_o: int
     high_o: int
     turn_o: np.float32
+    """Azimuths around wi and wo, and where between them these lie."""
     bend_i: np.float32
     bend_o: np.float32
+    """Curvatures of the cloth towards wi and wo, 1/yarn spacings."""
 
 
 DRAFT_ROWS: Final = 15
@@ -60,44 +51,33 @@ MOST_ON_LINES: Final = 2048
 
 
 class Scratch(NamedTuple):
-    """Arrays that each query overwrites.
-
-    Attributes
-    ----------
-    weight, lines : float32 (B, BLOCK_NODES), (lines, COLUMNS)
-        Weights of the fixed nodes, as blocks and as lines of one array.
-    stops : int64 (K,)
-        Number of nodes on view lines of each kind of yarn.
-    line : float32 (2, 8)
-        Places and lengths of the nodes of an interval.
-    grid, behind_grid, grid_falls : uint8
-        Those of the table, flat.
-    curved : float32 (2, B, BLOCK_NODES)
-        Horizons of the fixed nodes towards light and viewer, over curved cloth.
-    view_lines : float64 (2, lines)
-        Places of view lines across the viewer's azimuth, and the widths that they stand for.
-    drafts, firsts : float32 (K, DRAFT_ROWS, MOST_ON_LINES), uint32 (K, MOST_ON_LINES)
-        Nodes on view lines, and the first cells of their grids.
-    seen : float32 (lines, 2, COLUMNS)
-        Where the viewer sees the fixed nodes, in x and in y.
-    areas, freed : float32 (B, BLOCK_NODES)
-        Area seen of the boxes of the fixed nodes, and by how much more of them is seen over curved cloth.
-    """
+    """Arrays that each query overwrites."""
 
     weight: Float32
     lines: Float32
+    """Weights of the fixed nodes, as blocks and as lines of one array, (B, BLOCK_NODES), (lines, COLUMNS)."""
     stops: Index
+    """Number of nodes on view lines of each kind of yarn, (K,)."""
     line: Float32
+    """Places and lengths of the nodes of an interval, (2, 8)."""
     grid: npt.NDArray[np.uint8]
     behind_grid: npt.NDArray[np.uint8]
     grid_falls: npt.NDArray[np.uint8]
+    """Those of the table, flat, uint8."""
     curved: Float32
+    """Horizons of the fixed nodes towards light and viewer, over curved cloth, (2, B, BLOCK_NODES)."""
     view_lines: Float64
+    """Places of view lines across the viewer's azimuth, and the widths that they stand for, (2, lines)."""
     drafts: Float32
     firsts: npt.NDArray[np.uint32]
+    """Nodes on view lines, and the first cells of their grids, float32 (K, DRAFT_ROWS, MOST_ON_LINES), uint32
+    (K, MOST_ON_LINES)."""
     seen: Float32
+    """Where the viewer sees the fixed nodes, in x and in y, (lines, 2, COLUMNS)."""
     areas: Float32
     freed: Float32
+    """Area seen of the boxes of the fixed nodes, and by how much more of them is seen over curved cloth,
+    (B, BLOCK_NODES)."""
 
 
 @allocating_kernel

@@ -66,18 +66,9 @@ def seen_areas(
 ) -> Iterator[Float64]:
     """Yield the areas of each group's nodes, (azimuths, angles, nodes).
 
-    Parameters
-    ----------
-    front : HeightField
-        The cloth.
-    samples : list of (pick, end, CellPiece)
-        The piece of every grid.
-    grid : uint8 (grids, AZIMUTHS, cells along y, cells along x)
-        Their horizons.
-    groups : list of (PieceGroup, (across, along))
-        Groups, whose `blocks` are numbers of grids, and their rules.
-    rims : bool
-        Whether walls count.
+    `samples` are the pieces of all grids, each with its pick and end, and `grid` their horizons, (grids, AZIMUTHS,
+    cells along y, cells along x); `groups` come with their rules, and their `blocks` are numbers of grids. Walls count
+    if `rims`.
     """
     towards = _directions()
     of_grids = [_areas_of(front, sample, own, towards, rims) for sample, own in zip(samples, grid, strict=True)]

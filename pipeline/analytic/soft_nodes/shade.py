@@ -16,7 +16,7 @@ crosses the yarn unscattered.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +26,7 @@ from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES
 from pipeline.analytic.torus_frame import sigma, spread
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel
-from pipeline.truth.geometry.heightfield import WEFT
+from pipeline.truth.geometry.heightfield import ALPHA, BLEND, WEFT
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
 NODE_SUMS: Final = 6
@@ -46,7 +46,8 @@ TINY: Final = np.float32(1e-18)
 """Keeps a quotient of sums finite."""
 
 Six = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
-Five = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
+Behind = Literal[True] | None
+"""True if the light is behind. None, not False: kernels are compiled for each of the two alone."""
 
 _0, _1 = np.float32(0.0), np.float32(1.0)
 _SHORTEST = np.float32(1e-6)  # least squared length of a half vector
@@ -57,17 +58,7 @@ _AWAY = np.float32(0.05)  # cosine to the viewer of a fixed node that faces away
 
 
 class YarnDirections(NamedTuple):
-    """One query's directions in the frame of one family.
-
-    Attributes
-    ----------
-    ix, iy, iz, ox, oy, oz : float32
-        wi and wo.
-    size : float32
-        1 / |wi + wo|^2.
-    alike, right, opposite : float32
-        Weights of three relations of their azimuths (soft_horizons).
-    """
+    """One query's directions in the frame of one family."""
 
     ix: np.float32
     iy: np.float32
@@ -75,10 +66,13 @@ class YarnDirections(NamedTuple):
     ox: np.float32
     oy: np.float32
     oz: np.float32
+    """wi and wo."""
     size: np.float32
+    """1 / |wi + wo|^2."""
     alike: np.float32
     right: np.float32
     opposite: np.float32
+    """Weights of three relations of their azimuths (soft_horizons)."""
 
 
 class NodeFrame(NamedTuple):
@@ -158,70 +152,40 @@ def shade_node(
     lit: np.float32,
     weight: np.float32,
     layer: YarnLayer,
+    behind: Behind = None,
     least: np.float32 = _0,
 ) -> Six:
-    """Return a node's shares of the six sums; `along`, `across` as for `_flakes`.
+    """Return a node's shares of the sums; `along`, `across` as for `_flakes`.
 
     A node that faces away from the viewer has the cosine `least` to it. Of `seen`, what exceeds 1 are walls, which are
     lit as the whole box.
     """
     facing_o = d.ox * at.nx + d.oy * at.ny + d.oz * at.nz
     facing_i = d.ix * at.nx + d.iy * at.ny + d.iz * at.nz
-    cos_o, cos_i = max(facing_o, least), max(facing_i, _0)
-    of_box = min(seen, _WHOLE)
-    both = seen_and_lit(of_box, lit, d.alike, d.right, d.opposite) + (seen - of_box) * lit
-    wide = weight * at.inverse
+    wide, cos_o = weight * at.inverse, max(facing_o, least)
     area = wide * cos_o
-    diffuse = area * ((layer.blend * cos_i + (_1 - layer.blend) * d.iz) if facing_i > _0 else _0)
     along_i, along_o = d.ix * at.tx + d.iy * at.ty + d.iz * at.tz, d.ox * at.tx + d.oy * at.ty + d.oz * at.tz
     flakes = _flakes(d, along_i + along_o, along, across, layer.square, layer.scale)
     sigma_i, sigma_o = sigma(along_i, layer.square), sigma(along_o, layer.square)
+    if behind is not None:
+        cos_i = max(-facing_i, _0)
+        diffuse = area * ((layer.blend * cos_i - (_1 - layer.blend) * d.iz) if cos_i > _0 else _0)
+        specular = wide * transmission(flakes, _1, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
+        both, clear = seen * lit, unscattered(sigma_o, cos_o, layer.thickness)
+        return area * seen, diffuse * both, specular * both, area, area * seen * clear, _0
+    cos_i, of_box = max(facing_i, _0), min(seen, _WHOLE)
+    both = seen_and_lit(of_box, lit, d.alike, d.right, d.opposite) + (seen - of_box) * lit
+    diffuse = area * ((layer.blend * cos_i + (_1 - layer.blend) * d.iz) if facing_i > _0 else _0)
     specular = wide * reflection(flakes, _1, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
     return area * seen, diffuse * both, specular * both, area, diffuse * seen, specular * seen
 
 
 @inlined_fast_kernel
-def add_node(
-    total: Six,
-    d: YarnDirections,
-    at: NodeFrame,
-    along: np.float32,
-    across: np.float32,
-    seen: np.float32,
-    lit: np.float32,
-    weight: np.float32,
-    layer: YarnLayer,
-    least: np.float32 = _0,
-) -> Six:
-    """Return the six sums with a node's shares added; arguments as for `shade_node`."""
-    a, c, s, a0, open_c, open_s = shade_node(d, at, along, across, seen, lit, weight, layer, least)
-    return total[0] + a, total[1] + c, total[2] + s, total[3] + a0, total[4] + open_c, total[5] + open_s
-
-
-@inlined_fast_kernel
-def node_behind(
-    d: YarnDirections,
-    at: NodeFrame,
-    along: np.float32,
-    across: np.float32,
-    seen: np.float32,
-    lit: np.float32,
-    weight: np.float32,
-    layer: YarnLayer,
-    least: np.float32 = _0,
-) -> Five:
-    """Return a node's shares of the five sums with the light behind; arguments as for `shade_node`."""
-    cos_o = max(d.ox * at.nx + d.oy * at.ny + d.oz * at.nz, least)
-    cos_i = max(-(d.ix * at.nx + d.iy * at.ny + d.iz * at.nz), _0)
-    wide = weight * at.inverse
-    area = wide * cos_o
-    diffuse = area * ((layer.blend * cos_i - (_1 - layer.blend) * d.iz) if cos_i > _0 else _0)
-    along_i, along_o = d.ix * at.tx + d.iy * at.ty + d.iz * at.tz, d.ox * at.tx + d.oy * at.ty + d.oz * at.tz
-    flakes = _flakes(d, along_i + along_o, along, across, layer.square, layer.scale)
-    sigma_o = sigma(along_o, layer.square)
-    specular = wide * transmission(flakes, _1, sigma(along_i, layer.square), sigma_o, cos_i, cos_o, layer.thickness)
-    both, clear = seen * lit, unscattered(sigma_o, cos_o, layer.thickness)
-    return area * seen, diffuse * both, specular * both, area, area * seen * clear
+def added(total: Six, own: Six) -> Six:
+    """Return sums with the shares of a node added."""
+    return (
+        total[0] + own[0], total[1] + own[1], total[2] + own[2], total[3] + own[3], total[4] + own[4], total[5] + own[5]
+    )  # fmt: skip
 
 
 @inlined_fast_kernel
@@ -246,10 +210,11 @@ def _fixed_node(
 
 
 @inlined_fast_kernel
-def yarn_layer(alpha: np.float32, thickness: np.float32, blend: np.float32) -> YarnLayer:
-    """Return the optics of a family."""
+def yarn_layer(yarn: Float32, thickness: np.float32) -> YarnLayer:
+    """Return the optics of a family, given its row of `SoftNodeTable.yarn`."""
+    alpha = yarn[ALPHA]
     square = alpha * alpha
-    return YarnLayer(square, _FLAKES * alpha * square, thickness, blend)
+    return YarnLayer(square, _FLAKES * alpha * square, thickness, yarn[BLEND])
 
 
 @fast_kernel
@@ -260,57 +225,30 @@ def shade_fixed(
     areas: Float32,
     freed: Float32,
     d: YarnDirections,
-    alpha: np.float32,
+    yarn: Float32,
     thickness: np.float32,
-    blend: np.float32,
+    behind: Behind,
 ) -> Six:
-    """Return the sums over fixed nodes of one family; `areas` and `freed` as in `Scratch`."""
-    layer = yarn_layer(alpha, thickness, blend)
+    """Return the sums over fixed nodes of one family; `areas` and `freed` as in `Scratch`.
+
+    With the light behind, `light` has the horizons of the back.
+    """
+    layer, rise = yarn_layer(yarn, thickness), d.iz if behind is None else -d.iz
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     total = (_0, _0, _0, _0, _0, _0)
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
-            lit = ramp(above(d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
+            lit = ramp(above(rise, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
             seen = _seen_of(at, areas[b, k], freed[b, k], d)
-            total = add_node(total, d, at, along, across, seen, lit, weight[b, k], layer, _AWAY)
+            total = added(total, shade_node(d, at, along, across, seen, lit, weight[b, k], layer, behind, _AWAY))
     return total
 
 
-@fast_kernel
-def shade_fixed_behind(
-    nodes: Float32,
-    weight: Float32,
-    light: NodeHorizons,
-    areas: Float32,
-    freed: Float32,
-    d: YarnDirections,
-    alpha: np.float32,
-    thickness: np.float32,
-    blend: np.float32,
-) -> Five:
-    """Return the sums over fixed nodes with the light behind; `light` has the horizons of the back."""
-    layer = YarnLayer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, blend)
-    hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
-    a, c, s, a0, through = _0, _0, _0, _0, _0
-    for b in range(len(weight)):
-        for k in range(BLOCK_NODES):
-            lit = ramp(above(-d.iz, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
-            at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
-            seen = _seen_of(at, areas[b, k], freed[b, k], d)
-            of_node = node_behind(d, at, along, across, seen, lit, weight[b, k], layer, _AWAY)
-            a += of_node[0]
-            c += of_node[1]
-            s += of_node[2]
-            a0 += of_node[3]
-            through += of_node[4]
-    return a, c, s, a0, through
-
-
 @inlined_kernel
-def write_sums(sums: Six | Five, result: Float32) -> None:
+def write_sums(sums: Six, result: Float32) -> None:
     """Write the sums of a family to its row."""
-    for q in range(len(sums)):
+    for q in range(NODE_SUMS):
         result[q] = sums[q]
 
 

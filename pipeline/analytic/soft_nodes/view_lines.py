@@ -34,7 +34,6 @@ from pipeline.analytic.soft_nodes.line_nodes import (
     STEEPEST_SINE,
     LineRays,
     shade_lines,
-    shade_lines_behind,
 )
 from pipeline.analytic.soft_nodes.nodes import (
     BLOCK,
@@ -137,23 +136,16 @@ def _lines_across(
 
 
 class ViewLine(NamedTuple):
-    """A line of a footprint.
-
-    Attributes
-    ----------
-    x, y : float
-        Its place s = 0, where the footprint is densest on it.
-    density, sigma : float
-        Density there times the width that the line stands for, and deviation along the line.
-    apart : float
-        That width.
-    """
+    """A line of a footprint."""
 
     x: float
     y: float
+    """Its place s = 0, where the footprint is densest on it."""
     density: float
     sigma: float
+    """Density there times the width that the line stands for, and deviation along the line."""
     apart: float
+    """That width."""
 
 
 # Eight statements in place of a loop: they become one instruction, which a loop over arrays that may overlap does not.
@@ -428,7 +420,7 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
     grid = scratch.behind_grid if back else scratch.grid
     light = GridHorizons(grid, *_offsets(table, look.low_i, look.high_i), look.turn_i)
     sharp, thickness = sharpness_of_points(min(look.narrowest, _BOX)), np.float32(table.thickness)
-    falls, fall = scratch.grid_falls, bend_of(look.bend_i)
+    bent = scratch.grid_falls, bend_of(look.bend_i)
     for kind in range(len(result)):
         count = scratch.stops[kind]
         if count == 0:
@@ -437,17 +429,11 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
         draft, firsts, yarn, own = scratch.drafts[kind], scratch.firsts[kind, :count], table.yarn[family], result[kind]
         if back:
-            hidden_ends = table.heights[1 - family, RADIUS] >= 0.5  # no gap beside the crossing yarn
-            sums = shade_lines_behind(
-                draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness, hidden_ends
-            )
-            write_sums(sums, own)
+            hidden = bool(table.heights[1 - family, RADIUS] >= 0.5)  # no gap beside the crossing yarn
+            sums = shade_lines(draft, firsts, rays, light, None, size, sharp, d, yarn, family, thickness, True, hidden)
         elif look.bend_i > _0:
-            write_sums(
-                shade_lines(draft, firsts, rays, light, falls, fall, size, sharp, d, yarn, family, thickness), own
-            )
+            sums = shade_lines(draft, firsts, rays, light, bent, size, sharp, d, yarn, family, thickness, None)
         else:
-            write_sums(
-                shade_lines(draft, firsts, rays, light, None, fall, size, sharp, d, yarn, family, thickness), own
-            )
+            sums = shade_lines(draft, firsts, rays, light, None, size, sharp, d, yarn, family, thickness, None)
+        write_sums(sums, own)
     return gaps

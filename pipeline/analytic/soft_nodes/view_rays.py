@@ -36,54 +36,38 @@ _WHERE_IT_ENDS: Final = 0.3  # and where the footprint ends
 
 
 class ViewRay(NamedTuple):
-    """How the rays of a footprint sink.
-
-    Attributes
-    ----------
-    dx, dy : float
-        The viewer's azimuth.
-    run : float
-        Distance in the plane for each unit of height, T.
-    bend : float
-        Curvature of the cloth in this azimuth, 1/yarn spacings.
-    plane : float
-        Height of the reference plane.
-    least : float
-        Height at which the rays rise again; that of the lowest yarn if they do not before.
-    """
+    """How the rays of a footprint sink."""
 
     dx: float
     dy: float
+    """The viewer's azimuth."""
     run: float
+    """Distance in the plane for each unit of height, T."""
     bend: float
+    """Curvature of the cloth in this azimuth, 1/yarn spacings."""
     plane: float
+    """Height of the reference plane."""
     least: float
+    """Height at which the rays rise again; that of the lowest yarn if they do not before."""
 
 
 class YarnCurve(NamedTuple):
-    """A piece of a yarn along a line, in its own frame.
-
-    Attributes
-    ----------
-    across, by_across, along, by_along : float
-        Place across and along the yarn, a + s a' and b + s b'.
-    per_radius, radius, beta : float
-        Of the yarn.
-    bend, half, drop, side : float
-        Of its float: bend radius, 0 if it is drawn flat; half length and drop; 1 on top and -1 beneath.
-    """
+    """A piece of a yarn along a line, in its own frame."""
 
     across: float
     by_across: float
     along: float
     by_along: float
+    """Place across and along the yarn, a + s a' and b + s b'."""
     per_radius: float
     radius: float
     beta: float
+    """Of the yarn."""
     bend: float
     half: float
     drop: float
     side: float
+    """Of its float: bend radius, 0 if it is drawn flat; half length and drop; 1 on top and -1 beneath."""
 
 
 @fast_kernel

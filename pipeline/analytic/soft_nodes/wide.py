@@ -16,7 +16,6 @@ from pipeline.analytic.soft_nodes.shade import (
     NodeHorizons,
     directions,
     shade_fixed,
-    shade_fixed_behind,
     shares_of,
     write_freed,
     write_sums,
@@ -24,7 +23,6 @@ from pipeline.analytic.soft_nodes.shade import (
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel
 from pipeline.compiled.float32 import remaining
-from pipeline.truth.geometry.heightfield import ALPHA, BLEND
 
 RESOLVED: Final = 0.12
 """Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
@@ -164,7 +162,7 @@ def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: F
     else:
         displaced_weights(table, scratch, look)
     of_warp, kinds = table.kinds[0], table.kinds[0] + table.kinds[1]
-    mean, low_i, high_i = table.mean, look.low_i, look.high_i
+    mean, sharp, low_i, high_i = table.mean, table.sharpness, look.low_i, look.high_i
     near_i = look.high_i if look.turn_i > _HALF else look.low_i
     step, part = angle_of(look.oz)
     write_areas(table.areas, look.low_o, look.high_o, look.turn_o, step, part, scratch.areas)
@@ -178,20 +176,19 @@ def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: F
         if look.iz > _0:
             bend_rows(mean, table.falls, low_i, high_i, look.turn_i, bend_of(look.bend_i), scratch.curved[0])
             mean, low_i, high_i = scratch.curved, 0, 0
+    if look.iz < _0:
+        mean, sharp = table.behind_mean, table.behind_sharpness
     for kind in range(kinds):
         family = 0 if kind < of_warp else 1
         a, b = table.starts[kind], table.starts[kind + 1]
         d = directions(look.ix, look.iy, look.iz, look.ox, look.oy, look.oz, family)
-        alpha, blend = table.yarn[family, ALPHA], table.yarn[family, BLEND]
-        nodes, own, thickness = table.nodes[a:b], shares[a:b], np.float32(table.thickness)
+        nodes, own, yarn, thickness = table.nodes[a:b], shares[a:b], table.yarn[family], np.float32(table.thickness)
         areas, freed = scratch.areas[a:b], scratch.freed[a:b]
+        light = NodeHorizons(mean[low_i, a:b], mean[high_i, a:b], sharp[near_i, a:b], look.turn_i)
         if look.iz < _0:
-            behind, sharpness = table.behind_mean, table.behind_sharpness[near_i, a:b]
-            light = NodeHorizons(behind[look.low_i, a:b], behind[look.high_i, a:b], sharpness, look.turn_i)
-            sums = shade_fixed_behind(nodes, own, light, areas, freed, d, alpha, thickness, blend)
-            write_sums(sums, result[kind])
+            sums = shade_fixed(nodes, own, light, areas, freed, d, yarn, thickness, True)
         else:
-            light = NodeHorizons(mean[low_i, a:b], mean[high_i, a:b], table.sharpness[near_i, a:b], look.turn_i)
-            write_sums(shade_fixed(nodes, own, light, areas, freed, d, alpha, thickness, blend), result[kind])
+            sums = shade_fixed(nodes, own, light, areas, freed, d, yarn, thickness, None)
+        write_sums(sums, result[kind])
     a, b = table.starts[kinds], table.starts[kinds + 1]
     return shares_of(shares[a:b], scratch.areas[a:b]) if b > a else _0

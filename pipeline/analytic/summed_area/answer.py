@@ -16,12 +16,12 @@ import numpy as np
 
 from pipeline.analytic.gauss_rules import taps
 from pipeline.analytic.soft_horizons import around, ramp
-from pipeline.analytic.soft_nodes.shade import directions
-from pipeline.analytic.summed_area.layers import HeightLayer, layers_of, sum_layer
+from pipeline.analytic.soft_nodes.shade import YarnDirections, directions
+from pipeline.analytic.summed_area.layers import HeightLayer, layers_of
 from pipeline.analytic.summed_area.shade import CORNERS, Azimuth, Slots, corner, over_horizon, sum_clusters
 from pipeline.analytic.summed_area.tables import OCTAVE_STEPS, TEXEL_AZIMUTHS, ClusterTables
 from pipeline.compiled.arrays import Float32, Float64, Index
-from pipeline.compiled.decorators import allocating_kernel, inlined_kernel, kernel
+from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.query import Queries
 
 MOST_TAPS: Final = 12
@@ -38,27 +38,20 @@ _FADED = np.float32(2e-3)  # seen share of the area at which components have fad
 
 
 class Rounds(NamedTuple):
-    """N footprints as round ones along a line.
-
-    Attributes
-    ----------
-    u, v, sigma, cosine, sine : float32 (N,)
-        Centre, deviation of each round one, direction of the line.
-    readings, spread : int64 (N,), float32 (N,)
-        Number of round ones, standard deviation of their places.
-    wi, wo : float32 (N, 3)
-        Directions.
-    """
+    """N footprints as round ones along a line."""
 
     u: Float32
     v: Float32
     sigma: Float32
     cosine: Float32
     sine: Float32
+    """Centre, deviation of each round one, direction of the line, (N,)."""
     readings: Index
     spread: Float32
+    """Number of round ones, standard deviation of their places, int64 (N,), float32 (N,)."""
     wi: Float32
     wo: Float32
+    """Directions, (N, 3)."""
 
 
 def rounds(queries: Queries) -> Rounds:
@@ -79,13 +72,12 @@ def rounds(queries: Queries) -> Rounds:
 
 def answer(tables: ClusterTables, queries: Queries) -> Float32:
     """Return the components of N queries about flat cloth, light and viewer in front, (N, 4)."""
-    if not len(tables.extent):
-        return _answer(tables, rounds(queries), _PLACES)
-    deep = rounds(queries)
-    layers = layers_of(tables, deep.sigma, queries.wo)
-    result, flat = np.empty((len(layers), 4), np.float32), layers == 1
-    result[flat] = _answer(tables, Rounds(*(column[flat] for column in deep)), _PLACES)
-    result[~flat] = _answer_rays(tables, Rounds(*(column[~flat] for column in deep)), _PLACES, layers[~flat])
+    footprints = rounds(queries)
+    layers = layers_of(tables, footprints.sigma, queries.wo)
+    result = np.zeros((len(layers), 4), np.float32)
+    window = np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32)
+    slots = np.zeros((tables.slots.shape[1] + 1, CORNERS), np.uint32)
+    _answer_rows(tables, footprints, _PLACES, layers, window, slots, result)
     return result
 
 
@@ -107,7 +99,9 @@ def _level_of(tables: ClusterTables, sigma: np.float32) -> int:
 
 
 @inlined_kernel
-def find(tables: ClusterTables, level: int, x: float, y: float, texels: Index, weights: Float32) -> None:
+def find(
+    tables: ClusterTables, level: int, x: float | np.float32, y: float | np.float32, texels: Index, weights: Float32
+) -> None:
     """Write the texels around a place, (CORNERS,), and their weights."""
     first, n, shift = tables.levels[level, 0], tables.levels[level, 1], tables.levels[level, 2]
     weights[:] = _0
@@ -136,16 +130,25 @@ def find(tables: ClusterTables, level: int, x: float, y: float, texels: Index, w
 
 
 @inlined_kernel
-def touched(tables: ClusterTables, texels: Index, first: int, last: int, slots: Slots) -> int:
-    """List the blocks from `first` to `last` that any texel has: (n, CORNERS); return how many."""
+def touched(
+    tables: ClusterTables, texels: Index, first: int, last: int, slots: Slots, layer: HeightLayer | None
+) -> int:
+    """List the blocks from `first` to `last` that any texel has, of a layer those in it: (n, CORNERS); return how many.
+
+    A thin cluster has shares of the layers below and above.
+    """
     count = 0
     for block in range(first, last):
-        some = np.uint32(0)
+        some = False
         for c in range(CORNERS):
             slot = tables.slots[texels[c], block]
             slots[count, c] = slot
-            some |= slot
-        if some != np.uint32(0):
+            if layer is None:
+                some |= slot != np.uint32(0)
+            else:
+                low, high = layer.middle - layer.half - layer.half, layer.middle + layer.half + layer.half
+                some |= slot != np.uint32(0) and tables.extent[slot, 0] < high and tables.extent[slot, 1] > low
+        if some:
             count += 1
     return count
 
@@ -166,22 +169,12 @@ def _gap_area(
     return area * oz, area * oz * ramp(over_horizon(oz, low, width, _1 / max(area, _TINY)))
 
 
-@allocating_kernel
-def _answer(tables: ClusterTables, queries: Rounds, places: Float64) -> Float32:
-    """Return the components of all queries."""
-    result = np.zeros((len(queries.u), 4), np.float32)
-    window = np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32)
-    slots = np.zeros((tables.slots.shape[1] + 1, CORNERS), np.uint32)
-    _answer_rows(tables, queries, places, window, slots, result)
-    return result
-
-
-# Not in `_answer`: what allocates counts references to every slice.
 @kernel
 def _answer_rows(
     tables: ClusterTables,
     queries: Rounds,
     places: Float64,
+    layers: Index,
     window: tuple[Index, Float32],
     slots: Slots,
     result: Float32,
@@ -192,22 +185,29 @@ def _answer_rows(
         ix, iy, iz = queries.wi[n, 0], queries.wi[n, 1], queries.wi[n, 2]
         ox, oy, oz = queries.wo[n, 0], queries.wo[n, 1], queries.wo[n, 2]
         i, o = azimuth(ix, iy), azimuth(ox, oy)
+        by_family = directions(ix, iy, iz, ox, oy, oz, 0), directions(ix, iy, iz, ox, oy, oz, 1)
         level = _level_of(tables, queries.sigma[n])
         count = queries.readings[n] if level < len(tables.levels) - 1 else 1
         area, bare = _0, _0
         for tap in range(count):
             along = queries.spread[n] * places[count, tap]
             x, y = queries.u[n] + along * queries.cosine[n], queries.v[n] + along * queries.sine[n]
+            if layers[n] > 1:
+                seen, whole = _add_layers(
+                    tables, level, x, y, (ox / oz, oy / oz, oz), layers[n], i, o, by_family, window, slots, result[n]
+                )
+                area += seen
+                bare += whole
+                continue
             find(tables, level, x, y, texels, weights)
             four = weights[0], weights[1], weights[2], weights[3]
             for family in range(2):
-                found = touched(tables, texels, tables.starts[family], tables.starts[family + 1], slots)
+                found = touched(tables, texels, tables.starts[family], tables.starts[family + 1], slots, None)
                 if found == 0:
                     continue
                 seen, diffuse, specular, whole = sum_clusters(
-                    tables.surface, tables.horizon, slots, found, four, i, o,
-                    directions(ix, iy, iz, ox, oy, oz, family), tables.yarn[family], tables.thickness,
-                )  # fmt: skip
+                    tables, slots, found, four, i, o, by_family[family], tables.yarn[family], None
+                )
                 area += seen
                 bare += whole
                 result[n, family] += specular
@@ -218,77 +218,31 @@ def _answer_rows(
         divide(result[n], area, bare)
 
 
-@allocating_kernel
-def _answer_rays(tables: ClusterTables, queries: Rounds, places: Float64, layers: Index) -> Float32:
-    """Return the components of all queries, whose rays cross more than one layer."""
-    result = np.zeros((len(queries.u), 4), np.float32)
-    window = np.zeros(CORNERS, np.int64), np.zeros(CORNERS, np.float32)
-    slots = np.zeros((tables.slots.shape[1] + 1, CORNERS), np.uint32)
-    _answer_rays_rows(tables, queries, places, layers, window, slots, result)
-    return result
-
-
-@kernel
-def _answer_rays_rows(
-    tables: ClusterTables, queries: Rounds, places: Float64, layers: Index, window: tuple[Index, Float32], slots: Slots,
-    result: Float32,
-) -> None:  # fmt: skip
-    """Write the components of all queries; `window` and `slots` are scratch memory."""
-    for n in range(len(queries.u)):
-        i, o = azimuth(queries.wi[n, 0], queries.wi[n, 1]), azimuth(queries.wo[n, 0], queries.wo[n, 1])
-        level = _level_of(tables, queries.sigma[n])
-        area, bare = _0, _0
-        for tap in range(queries.readings[n]):
-            along = queries.spread[n] * places[queries.readings[n], tap]
-            x, y = queries.u[n] + along * queries.cosine[n], queries.v[n] + along * queries.sine[n]
-            seen, whole = _add_layers(tables, level, x, y, queries, n, layers[n], i, o, window, slots, result[n])
-            area += seen
-            bare += whole
-        divide(result[n], area, bare)
-
-
-@inlined_kernel
-def _touched_layer(
-    tables: ClusterTables, texels: Index, first: int, last: int, layer: HeightLayer, slots: Slots
-) -> int:
-    """List the blocks as `touched` does, those that a layer touches in any texel."""
-    # A thin cluster has shares of the layers below and above.
-    count, low, high = 0, layer.middle - layer.half - layer.half, layer.middle + layer.half + layer.half
-    for block in range(first, last):
-        near = False
-        for c in range(CORNERS):
-            slot = tables.slots[texels[c], block]
-            slots[count, c] = slot
-            near |= slot != np.uint32(0) and tables.extent[slot, 0] < high and tables.extent[slot, 1] > low
-        if near:
-            count += 1
-    return count
-
-
 @inlined_kernel
 def _add_layers(
-    tables: ClusterTables, level: int, x: float, y: float, queries: Rounds, n: int, layers: int, i: Azimuth, o: Azimuth,
+    tables: ClusterTables, level: int, x: float, y: float, seen_from: tuple[np.float32, np.float32, np.float32],
+    layers: int, i: Azimuth, o: Azimuth, by_family: tuple[YarnDirections, YarnDirections],
     window: tuple[Index, Float32], slots: Slots, sums: Float32,
 ) -> tuple[np.float32, np.float32]:  # fmt: skip
-    """Add the components under a round footprint of rays, times its seen area; return that and the bare area."""
+    """Add the components under a round footprint of rays, times its seen area; return that and the bare area.
+
+    `seen_from` is the run of the rays along x and y for each unit of height, and their cosine.
+    """
     texels, weights = window
-    ix, iy, iz = queries.wi[n, 0], queries.wi[n, 1], queries.wi[n, 2]
-    ox, oy, oz = queries.wo[n, 0], queries.wo[n, 1], queries.wo[n, 2]
-    run_x, run_y = ox / oz, oy / oz
+    run_x, run_y, oz = seen_from
     lowest, highest = tables.extent[0, 0], tables.extent[0, 1]
     apart = (highest - lowest) / np.float32(layers - 1)
     area, bare = _0, _0
-    by_family = directions(ix, iy, iz, ox, oy, oz, 0), directions(ix, iy, iz, ox, oy, oz, 1)
     for number in range(layers):
         layer = HeightLayer(lowest + apart * np.float32(number), _HALF * apart)
         find(tables, level, x + layer.middle * run_x, y + layer.middle * run_y, texels, weights)
         four = weights[0], weights[1], weights[2], weights[3]
         for family in range(2):
-            blocks = _touched_layer(tables, texels, tables.starts[family], tables.starts[family + 1], layer, slots)
+            blocks = touched(tables, texels, tables.starts[family], tables.starts[family + 1], slots, layer)
             if blocks == 0:
                 continue
-            seen, diffuse, specular, whole = sum_layer(
-                tables, slots, blocks, four, layer, i, o, by_family[family], tables.yarn[family]
+            seen, diffuse, specular, whole = sum_clusters(
+                tables, slots, blocks, four, i, o, by_family[family], tables.yarn[family], layer
             )
             area += seen
             bare += whole

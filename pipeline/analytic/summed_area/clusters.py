@@ -30,28 +30,19 @@ _STEEPEST: Final = 0.99999
 
 
 class Patch(NamedTuple):
-    """A piece of yarn, or a gap, on the nodes of a horizon map: (along, across) each.
-
-    Attributes
-    ----------
-    piece : CellPiece
-        Its place within a cell.
-    surface : float64 (G, G)
-        Area of the surface over that of the plane.
-    v, u : float64 (G, G)
-        Angles across and along the yarn.
-    horizon : float64 (azimuths, G, G)
-        Sine of the horizon's elevation, at every other azimuth of soft nodes.
-    height : float64 (G, G)
-        Height over the fabric plane.
-    """
+    """A piece of yarn, or a gap, on the nodes of a horizon map: (along, across) each."""
 
     piece: CellPiece
+    """Its place within a cell."""
     surface: Float64
+    """Area of the surface over that of the plane, (G, G)."""
     v: Float64
     u: Float64
+    """Angles across and along the yarn, (G, G)."""
     horizon: Float64
+    """Sine of the horizon's elevation, at every other azimuth of soft nodes, (azimuths, G, G)."""
     height: Float64
+    """Height over the fabric plane, (G, G)."""
 
 
 class PlacedPatch(NamedTuple):
@@ -122,12 +113,7 @@ def blocks_of(
 ) -> tuple[dict[int, Index], tuple[int, int, int]]:
     """Return the block of each slice of each patch, (G,), and where warps and wefts begin and end among the blocks.
 
-    Parameters
-    ----------
-    found, patches
-        See `sources`.
-    count : int
-        Blocks of both families, at least 2.
+    `found` and `patches` are those of `sources`; `count` is the number of blocks of both families, at least 2.
     """
     times = Counter(source.block for source in found)
     yarns = {block: patch for block, patch in patches.items() if patch.piece.family != GAP}

@@ -23,22 +23,16 @@ SLOTS: Final = 4
 
 
 class HorizonMap(NamedTuple):
-    """Horizons of one repeat.
-
-    Attributes
-    ----------
-    blocks : int32 (picks * ends * SLOTS,)
-        Index of the first horizon of each piece.
-    horizon : float32 (blocks * azimuths * grid * grid,)
-        Sine of the horizon's elevation: azimuth by azimuth, line by line along the yarn, across it.
-    grid, azimuths : int
-        Nodes a block and side; azimuths from +x, counter-clockwise.
-    """
+    """Horizons of one repeat."""
 
     blocks: npt.NDArray[np.int32]
+    """Index of the first horizon of each piece, int32 (picks * ends * SLOTS,)."""
     horizon: Float32
+    """Sine of the horizon's elevation: azimuth by azimuth, line by line along the yarn, across it,
+    (blocks * azimuths * grid * grid,)."""
     grid: int
     azimuths: int
+    """Nodes a block and side; azimuths from +x, counter-clockwise."""
 
 
 def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int) -> HorizonMap:

@@ -9,13 +9,25 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import ramp
-from pipeline.analytic.soft_nodes.shade import NodeFrame, Six, YarnDirections, YarnLayer, shade_node
+from pipeline.analytic.soft_nodes.shade import NodeFrame, Six, YarnDirections, YarnLayer, shade_node, yarn_layer
 from pipeline.analytic.summed_area.clusters import LANES
-from pipeline.analytic.summed_area.tables import AREA, MEAN, MEAN_SCALE, SPREAD, SPREAD_SCALE, SPREAD_U, SPREAD_V, U, V
+from pipeline.analytic.summed_area.layers import HeightLayer, layer_share
+from pipeline.analytic.summed_area.tables import (
+    AREA,
+    MEAN,
+    MEAN_SCALE,
+    SPREAD,
+    SPREAD_SCALE,
+    SPREAD_U,
+    SPREAD_V,
+    ClusterTables,
+    U,
+    V,
+)
 from pipeline.analytic.torus_frame import Angles, Fibre, normal, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel
-from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, SIN_TWIST
+from pipeline.truth.geometry.heightfield import BETA, COS_TWIST, SIN_TWIST
 
 CORNERS: Final = 4
 """Texels around a centre."""
@@ -28,7 +40,6 @@ Four = tuple[np.float32, np.float32, np.float32, np.float32]
 
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _TINY = np.float32(1e-18)
-_FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a cluster; 1 / (4 pi) of the density
 _ONE_LEVEL = _1 / MEAN_SCALE
 # Width of a ramp: a share of that of an even distribution, sqrt 12 standard deviations, and a least one.
 _WIDTH = np.float32(0.8 * math.sqrt(12.0)) / SPREAD_SCALE
@@ -58,9 +69,7 @@ class Optics(NamedTuple):
 @inlined_fast_kernel
 def optics(yarn: Float32, thickness: np.float32) -> Optics:
     """Return the optics of a family, given its row of `HeightField.yarn`."""
-    alpha = yarn[ALPHA]
-    fibre = Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    return Optics(fibre, YarnLayer(alpha * alpha, _FLAKES * alpha * alpha * alpha, thickness, yarn[BLEND]))
+    return Optics(Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA]), yarn_layer(yarn, thickness))
 
 
 @inlined_fast_kernel
@@ -117,22 +126,25 @@ def evaluate(sums: Nine, d: YarnDirections, own: Optics) -> Six:
 
 
 @inlined_fast_kernel
+def _part(
+    tables: ClusterTables, slot: int, k: int, weight: np.float32, i: Azimuth, o: Azimuth, layer: HeightLayer | None
+) -> Nine:
+    """Return what `corner` does, of a layer or of all heights."""
+    if layer is not None:
+        weight *= layer_share(tables.height[slot], k, layer)
+    return corner(tables.surface, tables.horizon, slot, k, weight, i, o)
+
+
+@inlined_fast_kernel
 def _cluster(
-    surface: Float32,
-    horizon: npt.NDArray[np.uint8],
-    slots: tuple[int, int, int, int],
-    k: int,
-    weights: Four,
-    i: Azimuth,
-    o: Azimuth,
-    d: YarnDirections,
-    own: Optics,
-) -> Six:
+    tables: ClusterTables, slots: tuple[int, int, int, int], k: int, weights: Four, i: Azimuth, o: Azimuth,
+    d: YarnDirections, own: Optics, layer: HeightLayer | None,
+) -> Six:  # fmt: skip
     """Return the sums of cluster k of a block."""
-    p = corner(surface, horizon, slots[0], k, weights[0], i, o)
-    q = corner(surface, horizon, slots[1], k, weights[1], i, o)
-    r = corner(surface, horizon, slots[2], k, weights[2], i, o)
-    s = corner(surface, horizon, slots[3], k, weights[3], i, o)
+    p = _part(tables, slots[0], k, weights[0], i, o, layer)
+    q = _part(tables, slots[1], k, weights[1], i, o, layer)
+    r = _part(tables, slots[2], k, weights[2], i, o, layer)
+    s = _part(tables, slots[3], k, weights[3], i, o, layer)
     sums = (
         p[0] + q[0] + r[0] + s[0], p[1] + q[1] + r[1] + s[1], p[2] + q[2] + r[2] + s[2], p[3] + q[3] + r[3] + s[3],
         p[4] + q[4] + r[4] + s[4], p[5] + q[5] + r[5] + s[5], p[6] + q[6] + r[6] + s[6], p[7] + q[7] + r[7] + s[7],
@@ -143,26 +155,21 @@ def _cluster(
 
 @inlined_fast_kernel
 def sum_clusters(
-    surface: Float32,
-    horizon: npt.NDArray[np.uint8],
-    slots: Slots,
-    count: int,
-    weights: Four,
-    i: Azimuth,
-    o: Azimuth,
-    d: YarnDirections,
-    yarn: Float32,
-    thickness: np.float32,
-) -> Four:
-    """Return seen area, diffuse, specular and bare area of the first `count` blocks of `slots`, (blocks, CORNERS)."""
-    own = optics(yarn, thickness)
+    tables: ClusterTables, slots: Slots, count: int, weights: Four, i: Azimuth, o: Azimuth, d: YarnDirections,
+    yarn: Float32, layer: HeightLayer | None,
+) -> Four:  # fmt: skip
+    """Return seen area, diffuse, specular and bare area of the first `count` blocks of `slots`, (blocks, CORNERS).
+
+    Of a `layer`, what lies in it; None: in all heights.
+    """
+    own = optics(yarn, tables.thickness)
     area, diffuse, specular, bare = _0, _0, _0, _0
     for b in range(count):
-        s0, s1, s2, s3 = slots[b, 0], slots[b, 1], slots[b, 2], slots[b, 3]
+        four = slots[b, 0], slots[b, 1], slots[b, 2], slots[b, 3]
         for k in range(LANES):
-            found = _cluster(surface, horizon, (s0, s1, s2, s3), k, weights, i, o, d, own)
-            area += found[0]
-            diffuse += found[1]
-            specular += found[2]
-            bare += found[3]
+            part = _cluster(tables, four, k, weights, i, o, d, own, layer)
+            area += part[0]
+            diffuse += part[1]
+            specular += part[2]
+            bare += part[3]
     return area, diffuse, specular, bare

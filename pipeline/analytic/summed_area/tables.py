@@ -64,16 +64,8 @@ def plan(finest: int, uniform: float) -> list[Level]:
 class Sums:
     """Sums of a quantity over clusters, at all levels.
 
-    Parameters
-    ----------
-    repeat : (picks, ends)
-        The repeat.
-    found, patches, blocks
-        See `clusters`.
-    count : int
-        Blocks of yarn; one more is for gaps.
-    levels : list of Level
-        See `plan`.
+    `repeat` is (picks, ends); `found`, `patches` and `blocks` are those of `clusters`, `levels` those of `plan`; there
+    are `count` blocks of yarn, and one more for gaps.
     """
 
     def __init__(
@@ -185,52 +177,39 @@ _LEVELS_OF_FINEST = 5.3  # texels of all levels, over those of the finest
 
 
 class ClusterTables(NamedTuple):
-    """Clusters of one side of a cloth.
-
-    Attributes
-    ----------
-    repeat : int64 (2,)
-        Ends and picks.
-    cells : int64 (picks * ends,)
-        Number of the texels of each cell; cells that a translation of the cloth carries into one another share theirs.
-    levels : int64 (L, 3)
-        First texel, texels a yarn spacing and their logarithm, of each level; the last is the cloth's mean, one texel.
-    finest : float
-        Deviation of the first level, in yarn spacings.
-    starts : int64 (3,)
-        First block of warps and of wefts, and their end; gaps have the block after it.
-    slots : uint32 (T, blocks + 1)
-        Where a texel's blocks are stored; 0, which has no area, if it leaves the block out.
-    surface : float32 (S, 5, LANES)
-        Area of the surface of each cluster over the area of the cloth; mean and standard deviation of v and u.
-    horizon : uint8 (S, TEXEL_AZIMUTHS, 2, LANES)
-        Mean and standard deviation of the sine of the horizon's elevation, times MEAN_SCALE and SPREAD_SCALE.
-    yarn : float32 (2, 8)
-        `HeightField.yarn`.
-    thickness : float32
-        Optical thickness.
-    plane : float
-        Height of the reference plane.
-    height : float32 (S, 2, LANES)
-        Mean height of each cluster over the reference plane, and half the range of an even distribution of heights
-        with its standard deviation; no row without parallax.
-    extent : float32 (S, 2)
-        Lowest and highest height of all clusters of a slot; in row 0 of the cloth; no row without parallax.
-    """
+    """Clusters of one side of a cloth."""
 
     repeat: Index
+    """Ends and picks, (2,)."""
     cells: Index
+    """Number of the texels of each cell; cells that a translation of the cloth carries into one another share theirs,
+    (picks * ends,)."""
     levels: Index
+    """First texel, texels a yarn spacing and their logarithm, of each level; the last is the cloth's mean, one texel,
+    (L, 3)."""
     finest: float
+    """Deviation of the first level, in yarn spacings."""
     starts: Index
+    """First block of warps and of wefts, and their end; gaps have the block after it, (3,)."""
     slots: npt.NDArray[np.uint32]
+    """Where a texel's blocks are stored; 0, which has no area, if it leaves the block out, uint32 (T, blocks + 1)."""
     surface: Float32
+    """Area of the surface of each cluster over the area of the cloth; mean and standard deviation of v and u,
+    (S, 5, LANES)."""
     horizon: npt.NDArray[np.uint8]
+    """Mean and standard deviation of the sine of the horizon's elevation, times MEAN_SCALE and SPREAD_SCALE, uint8
+    (S, TEXEL_AZIMUTHS, 2, LANES)."""
     yarn: Float32
+    """`HeightField.yarn`, (2, 8)."""
     thickness: np.float32
+    """Optical thickness."""
     plane: float
+    """Height of the reference plane."""
     height: Float32
+    """Mean height of each cluster over the reference plane, and half the range of an even distribution of heights with
+    its standard deviation; no row without parallax, (S, 2, LANES)."""
     extent: Float32
+    """Lowest and highest height of all clusters of a slot; in row 0 of the cloth; no row without parallax, (S, 2)."""
 
 
 def tabulate(fabric: Fabric, clusters: int, parallax: bool = True) -> ClusterTables:

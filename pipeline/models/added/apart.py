@@ -19,12 +19,8 @@ def run_apart(
 ) -> Result:
     """Call ``function(*arguments, progress)`` in a process of its own, as `in_own_process` does.
 
-    Raises
-    ------
-    MethodFailed
-        If a method from outside raises, returns nothing usable, takes too long in one call, or ends the process.
-    Exception
-        What the function raises; WorkFailed if the process ends for another reason.
+    It raises what the function raises; MethodFailed if a method from outside raises, returns nothing usable, takes too
+    long in one call, or ends the process; WorkFailed if the process ends for another reason.
     """
     with tempfile.NamedTemporaryFile(prefix="twillight-") as state:
         state.truncate(STATE_BYTES)

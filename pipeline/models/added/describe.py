@@ -43,19 +43,9 @@ _SETTING: Final = re.compile(r"[\w .,=+%()-]{0,40}")  # it becomes part of file 
 def describe(text: str, own: Mapping[str, Any], more: Mapping[str, Any]) -> AddedMethod | AddedFunction:
     """Return what code from outside is: a function is a metric, a class a method.
 
-    Parameters
-    ----------
-    text : str
-        ``module:name`` or ``file.py:name``.
-    own : mapping
-        The method's own options; others have their defaults.
-    more : mapping
-        Name in tables, if it is not the method's own, and the limit of a call.
-
-    Raises
-    ------
-    BadInput
-        If there is no such code, it cannot be imported, the method cannot be made, or it lacks what a method needs.
+    `text` is ``module:name`` or ``file.py:name``; `own` are the method's own options, others have their defaults;
+    `more` are the name in tables, if it is not the method's own, and the limit of a call. BadInput if there is no such
+    code, it cannot be imported, the method cannot be made, or it lacks what a method needs.
     """
     try:
         json.dumps(own)

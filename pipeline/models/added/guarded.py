@@ -36,15 +36,7 @@ STATE_BYTES: Final = _STATE.size
 
 
 class MethodFailed(WorkFailed):
-    """A fault in the code of a method from outside.
-
-    Parameters
-    ----------
-    name : str
-        Name of the method.
-    reason : str
-        The fault.
-    """
+    """A fault in the code of the method `name` from outside."""
 
     def __init__(self, name: str, reason: str) -> None:
         self.name, self.reason = name, reason
@@ -55,25 +47,17 @@ class MethodFailed(WorkFailed):
 
 
 class Call(NamedTuple):
-    """Calls of a method that are under way.
-
-    Attributes
-    ----------
-    since : float
-        Time of the last call's begin or end, by the monotonic clock.
-    limit : float
-        Seconds that a call may take.
-    running : int
-        Number of calls, one a thread at most.
-    name, function : str
-        The method, and its function.
-    """
+    """Calls of a method that are under way."""
 
     since: float
+    """Time of the last call's begin or end, by the monotonic clock."""
     limit: float
+    """Seconds that a call may take."""
     running: int
+    """Number of calls, one a thread at most."""
     name: str
     function: str
+    """The method, and its function."""
 
     @classmethod
     def read(cls, shared: Any) -> Call:
@@ -114,14 +98,8 @@ WATCH: Final = Watch()
 def faults_of(name: str, function: str, limit: float, root: Path) -> Iterator[None]:
     """Turn any exception in the block into a `MethodFailed`, and mark the block as a call.
 
-    Parameters
-    ----------
-    name, function : str
-        The method, and its function that is called.
-    limit : float
-        Seconds that it may take.
-    root : Path
-        The method's file, or the folder of its package.
+    The call is of a `function` of the method `name`, may take `limit` seconds, and its code is the file `root`, or the
+    package in this folder.
     """
     call = name.encode()[:64], function.encode()[:16], limit
     WATCH.mark(1, *call)
@@ -153,18 +131,9 @@ def described(error: BaseException, root: Path) -> str:
 class Guarded:
     """A method from outside with the interface of `pipeline.models.method.Method`.
 
-    Parameters
-    ----------
-    method : object
-        The method.
-    options : AddedMethod
-        Its options; its name in tables is theirs.
-    root : Path
-        Its file, or the folder of its package.
-    values : bool
-        Refuse answers that are negative or not finite. Without it, only their form is checked.
-    domain : Domain, optional
-        Domain of its training; any query if left out.
+    Its name in tables is that of its options; `root` is its file, or the folder of its package. Answers that are
+    negative or not finite are refused if `values`; else only their form is checked. Without the `domain` of its
+    training it takes any query.
     """
 
     def __init__(

@@ -36,16 +36,8 @@ Calls = Callable[[str], AbstractContextManager[None]]
 class GuardedNetwork(Trainable):
     """A network from outside behind a guard; of its functions ``loss`` is needed, the others have defaults.
 
-    Parameters
-    ----------
-    network : nn.Module
-        The network.
-    name : str
-        Name of the method in tables.
-    fabrics : sequence of Fabric
-        Fabrics that it learns.
-    call : Calls
-        Guard of its functions. The training loop guards ``loss``, together with the gradients.
+    `name` is that of the method in tables, `fabrics` are those that it learns, `call` guards its functions. The
+    training loop guards ``loss``, together with the gradients.
     """
 
     def __init__(self, network: nn.Module, name: str, fabrics: Sequence[Fabric], call: Calls) -> None:
@@ -102,13 +94,7 @@ class GuardedNetwork(Trainable):
 
 
 class PerFabricMethod:
-    """Methods from outside that know one fabric each, as one method.
-
-    Parameters
-    ----------
-    methods : mapping
-        From the fingerprint of a fabric's optics to the method that learnt it.
-    """
+    """Methods from outside that know one fabric each, by the fingerprint of its optics, as one method."""
 
     name = setting = ""
 
@@ -136,12 +122,8 @@ class PerFabricMethod:
 def build_added(options: AddedMethod, fabrics: Sequence[Fabric]) -> GuardedNetwork:
     """Return an untrained network from outside.
 
-    Raises
-    ------
-    WorkFailed
-        If the code is not the planned one.
-    MethodFailed
-        If it fails, or its function `network` returns none that can be trained.
+    WorkFailed if the code is not the planned one; MethodFailed if it fails, or its function `network` returns none that
+    can be trained.
     """
     make, root = imported(options)
     return _built(
@@ -152,12 +134,7 @@ def build_added(options: AddedMethod, fabrics: Sequence[Fabric]) -> GuardedNetwo
 def restore_added(options: AddedMethod, trained: Trained) -> Guarded:
     """Return the method from outside with its trained networks: one, or one a fabric.
 
-    Raises
-    ------
-    WorkFailed
-        If the code is not the planned one.
-    MethodFailed
-        If it fails, or its network does not take the weights.
+    WorkFailed if the code is not the planned one; MethodFailed if it fails, or its network does not take the weights.
     """
     make, root = imported(options)
     methods = {}

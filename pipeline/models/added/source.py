@@ -31,24 +31,16 @@ _OURS: Final = ("weaves", "pipeline", "reports", "jobs", "twillight")
 
 
 class CodeSource(NamedTuple):
-    """Code that was found.
-
-    Attributes
-    ----------
-    place : str
-        Name of a module, or absolute path of a file.
-    name : str
-        Name of the class in it.
-    folder : str
-        Folder that holds the module; empty if it is installed, or a file.
-    root : Path
-        The file, or the folder of the package.
-    """
+    """Code that was found."""
 
     place: str
+    """Name of a module, or absolute path of a file."""
     name: str
+    """Name of the class in it."""
     folder: str
+    """Folder that holds the module; empty if it is installed, or a file."""
     root: Path
+    """The file, or the folder of the package."""
 
     @property
     def text(self) -> str:
@@ -114,19 +106,10 @@ class CodeSource(NamedTuple):
 
 
 def locate(text: str, folder: str = "") -> CodeSource:
-    """Find code by ``module:name`` or ``file.py:name``.
+    """Find code by ``module:name`` or ``file.py:name``, as the command line has it.
 
-    Parameters
-    ----------
-    text : str
-        As the command line has it; a path is relative to the current folder.
-    folder : str
-        Folder with modules that are not installed; default: the current one.
-
-    Raises
-    ------
-    BadInput
-        If it has another form, or there is no such file or module.
+    A path is relative to the current folder; so are modules that are not installed, if no other `folder` is given.
+    BadInput if `text` has another form, or there is no such file or module.
     """
     place, _, name = text.rpartition(":")
     if not place or not name.isidentifier():

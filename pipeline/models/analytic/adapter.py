@@ -31,20 +31,11 @@ class AnalyticOptions(Options):
 
 
 class Analytic(Generic[Table]):
-    """A method that answers for any fabric.
+    """A method that answers for any fabric, of the name and the kinds of queries that its options know.
 
-    Parameters
-    ----------
-    options : AnalyticOptions
-        Its name, and the kinds of queries that it knows.
-    k : int or None
-        Its setting, if it has settings.
-    tables : PerFabric
-        Tables of each fabric; methods of different settings may share them.
-    read : callable
-        Answers N queries, float32 (N, 4), from the tables of a fabric; the third argument names random numbers.
-    stored : callable
-        Bytes of the tables that a renderer stores.
+    `k` is its setting, if it has settings; `tables` are those of each fabric, which methods of different settings may
+    share. `read` answers N queries, float32 (N, 4), from the tables of a fabric; its third argument names random
+    numbers. `stored` returns the bytes of the tables that a renderer stores.
     """
 
     def __init__(

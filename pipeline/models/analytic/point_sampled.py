@@ -60,15 +60,7 @@ class PointSampledOptions(AnalyticOptions):
 
 
 class ExactPoints(Analytic["ClothSide"]):
-    """Point sampling with exact visibility.
-
-    Parameters
-    ----------
-    options : PointSampledOptions
-        The design.
-    count : int
-        Points a query, k.
-    """
+    """Point sampling with exact visibility, `count` points a query."""
 
     def __init__(self, options: PointSampledOptions, count: int) -> None:
         from pipeline.analytic.exact_points import sample_points

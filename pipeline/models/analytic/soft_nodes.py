@@ -66,16 +66,9 @@ class SoftNodesOptions(AnalyticOptions):
 
 
 class SoftNodes(Analytic["SoftNodeTable"]):
-    """Soft nodes of one level.
+    """Soft nodes of one level of `pipeline.analytic.soft_nodes.groups.DETAILS`.
 
-    Parameters
-    ----------
-    level : int
-        Level of detail, one of `pipeline.analytic.soft_nodes.groups.DETAILS`.
-    name : str
-        Name of the method.
-    walls : {"left_out", "rim"}
-        What view rays see that meet a wall.
+    View rays that meet a wall see `walls`.
     """
 
     turns: ClassVar[bool] = SoftNodesOptions.turns

@@ -47,41 +47,25 @@ _NO_FALL = -1.0  # finite, because weights are averaged
 
 
 class View(NamedTuple):
-    """Footprints, viewers and curvatures of n queries.
-
-    Attributes
-    ----------
-    u, v : Tensor (n,)
-        Centres, in repeats.
-    sigma : Tensor (n,)
-        Footprints, in yarn spacings.
-    wo : Tensor (n, 3)
-        To the viewer.
-    curvature : Tensor (n,)
-        In the viewer's plane, 1/yarn spacings.
-    """
+    """Footprints, viewers and curvatures of n queries."""
 
     u: Tensor
     v: Tensor
+    """Centres, in repeats, (n,)."""
     sigma: Tensor
+    """Footprints, in yarn spacings, (n,)."""
     wo: Tensor
+    """To the viewer, (n, 3)."""
     curvature: Tensor
+    """In the viewer's plane, 1/yarn spacings, (n,)."""
 
 
 class SilhouetteData(nn.Module):
     """Queries about the silhouette and their answers; no part of a trained model.
 
-    Parameters
-    ----------
-    columns : mapping
-        Rows of kind `opacity` or `grazing_cosine` (`pipeline.shards.silhouettes`).
-    repeat : tuple of int
-        Extent of the fabric's repeat in x and y, in yarn spacings.
-
-    Attributes
-    ----------
-    target : Tensor (n, 2)
-        Opacity and 0; or mean and variance of the grazing cosine, in units of sqrt(kappa) and kappa.
+    `columns` are rows of kind `opacity` or `grazing_cosine` (`pipeline.shards.silhouettes`), `repeat` is ends and
+    picks. Targets (n, 2) are opacity and 0, or mean and variance of the grazing cosine, in units of sqrt(kappa) and
+    kappa.
     """
 
     def __init__(self, columns: Mapping[str, npt.NDArray[Any]], repeat: tuple[int, int]) -> None:
@@ -105,14 +89,8 @@ class SilhouetteData(nn.Module):
 class CurvedNetwork(TextureNetwork):
     """Textures and perceptrons of one fabric.
 
-    Parameters
-    ----------
-    options, repeat : CurvedOptions, tuple of int
-        As of any `TextureNetwork`.
-    silhouettes : SilhouetteData, optional
-        Training rows of the opacity; needed for training only.
-    fall : float
-        Depth below the boundary that every ray hits, in yarn spacings; negative if there is none, as with gaps.
+    `silhouettes` are training rows of the opacity, needed for training only; `fall` is the depth below the boundary
+    that every ray hits, in yarn spacings, negative if there is none, as with gaps.
     """
 
     textures: ClassVar[tuple[str, ...]] = ("opacity_levels", "depth", "levels")

@@ -72,18 +72,12 @@ class Residual(nn.Module):
 
 
 class EncoderDecoder(QueryNetwork):
-    """A network of two parts, which subclasses create.
-
-    Attributes
-    ----------
-    encoder : nn.Module
-        Runs once a fabric.
-    decoder : nn.Module
-        Runs for every query; all that a renderer keeps beside what was encoded.
-    """
+    """A network of two parts, which subclasses create."""
 
     encoder: nn.Module
+    """Runs once a fabric."""
     decoder: nn.Module
+    """Runs for every query; all that a renderer keeps beside what was encoded."""
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of parameters of both parts."""

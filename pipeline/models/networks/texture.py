@@ -85,18 +85,9 @@ def read_pyramid(
 ) -> Tensor:
     """Read a pyramid at footprints: (n, channels).
 
-    Parameters
-    ----------
-    levels : sequence of Tensor (channels, rows, columns)
-        Finest first.
-    u, v : Tensor (n,)
-        Positions, in repeats.
-    sigma : Tensor (n,)
-        Footprint, in yarn spacings.
-    texels_per_yarn : int
-        Texels of the finest level along one yarn spacing.
-    blur : float
-        Standard deviation of the blur, in finest texels.
+    Levels (channels, rows, columns) come finest first, with `texels_per_yarn` along one yarn spacing in the finest. u
+    and v (n,) are in repeats, sigma (n,) in yarn spacings; `blur` is the standard deviation of the blur, in finest
+    texels.
     """
     level = torch.log2(sigma / (0.5 / texels_per_yarn)).clamp(0.0, len(levels) - 1.0)
     below = level.floor().clamp_max(max(len(levels) - 2, 0))
@@ -111,22 +102,11 @@ def read_pyramid(
 def read_texture(
     textures: list[Tensor], u: Tensor, v: Tensor, levels: list[Tensor], shares: list[Tensor] | None = None
 ) -> Tensor:
-    """Read wrapped textures bilinearly and blend levels.
+    """Read wrapped textures bilinearly and blend levels: (n, channels).
 
-    Parameters
-    ----------
-    textures : list of Tensor (channels, rows, columns)
-        Textures over one repeat; texel (r, c) has its centre at v = (r + 1/2)/rows, u = (c + 1/2)/columns.
-    u, v : Tensor (n,)
-        Positions, in repeats; any real number.
-    levels : list of int64 Tensor (n,)
-        Textures to read for each query.
-    shares : list of Tensor (n,), optional
-        Weight of each entry of `levels`; 1 if left out.
-
-    Returns
-    -------
-    Tensor (n, channels)
+    Textures (channels, rows, columns) lie over one repeat; texel (r, c) has its centre at v = (r + 1/2)/rows, u = (c +
+    1/2)/columns. u and v (n,) are in repeats, any real numbers. `levels` are int64 (n,), textures to read for each
+    query; `shares` the weight of each, 1 if left out.
     """
     table = torch.cat([texture.flatten(1) for texture in textures], dim=1).t().contiguous()
     rows, columns = (torch.tensor([t.shape[axis] for t in textures], device=u.device) for axis in (-2, -1))
@@ -156,35 +136,19 @@ def texels_of(texture: Tensor) -> Float32:
 
 
 class TextureNetwork(QueryNetwork):
-    """Textures of one fabric, and perceptrons that read them.
-
-    Parameters
-    ----------
-    options : TextureOptions
-        The design.
-    repeat : tuple of int
-        Extent of the fabric's repeat in x and y, in yarn spacings.
-
-    Attributes
-    ----------
-    textures : tuple of str
-        Names of those parts that are textures.
-    levels : nn.ParameterList
-        Pyramid of features, finest first.
-    decoder : nn.Sequential
-        Puts out the four components in network space.
-    depth : nn.Parameter or None
-        The offset texture.
-    offset : nn.Sequential or None
-        Perceptron from the offset texture and the view to the depth.
-    """
+    """Textures of one fabric, with a repeat of so many ends and picks, and perceptrons that read them."""
 
     textures: ClassVar[tuple[str, ...]]
+    """Names of those parts that are textures."""
     options: TextureOptions
     levels: nn.ParameterList
+    """Pyramid of features, finest first."""
     decoder: nn.Sequential
+    """Puts out the four components in network space."""
     depth: nn.Parameter | None
+    """The offset texture, nn.Parameter or None."""
     offset: nn.Sequential | None
+    """Perceptron from the offset texture and the view to the depth, nn.Sequential or None."""
 
     def __init__(self, options: TextureOptions, repeat: tuple[int, int]) -> None:
         super().__init__()

@@ -49,16 +49,8 @@ def price_of(curve: Float64, error: float) -> float:
 def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -> Chosen:
     """Return the answers of least summed squared error whose mean time is at most `time`, which is possible.
 
-    Parameters
-    ----------
-    squares : float32 (N, answers)
-        Expected squared errors.
-    kinds : int64 (N,)
-        Rows of `seconds`.
-    seconds : float64 (kinds, answers)
-        Time of an answer.
-    time : float
-        Mean seconds of a query, at least those of the cheapest answers.
+    `squares` (N, answers) are expected squared errors, `kinds` (N,) rows of `seconds` (kinds, answers), the time of an
+    answer; `time` is the mean of a query, at least that of the cheapest answers.
     """
     chosen, every = np.empty(len(squares), np.uint8), max(1, len(squares) // _SAMPLE)
     some = np.ascontiguousarray(squares[::every]), np.ascontiguousarray(kinds[::every])

@@ -38,14 +38,8 @@ _ANY = Queries.round(u=[0.5], v=[0.5], sigma=[1.0], wi=[[0.6, 0.0, 0.8]], wo=[[0
 class Selvage:
     """Answers within a wished error or time.
 
-    Parameters
-    ----------
-    error : float
-        Wished relative error where a query names neither error nor time, above 0 and below 1.
-    name : str
-        Name of the method.
-    walls : {"left_out", "rim"}
-        What view rays see that meet a wall.
+    `error`, above 0 and below 1, is the wished relative error where a query names neither error nor time; view rays
+    that meet a wall see `walls`.
     """
 
     turns: ClassVar[bool] = True

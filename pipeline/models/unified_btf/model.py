@@ -63,12 +63,7 @@ def decoder(latent: int, hidden: int, outputs: int = 4) -> nn.Sequential:
 class UnifiedBtfNetwork(EncoderDecoder):
     """Encoder and decoder, with the samples of the fabrics they are trained on.
 
-    Parameters
-    ----------
-    options : BtfOptions
-        The design.
-    texels : sequence of Texels
-        Samples of the training fabrics, addressed by index in batches; none for inference.
+    `texels` are these samples, addressed by index in batches; none for inference.
     """
 
     options: BtfOptions

@@ -36,21 +36,14 @@ _COMPONENTS = 4
 
 @dataclass(frozen=True, eq=False)
 class Texels:
-    """T texels of one repeat, each seen under the same n pairs of directions: inputs of the encoder.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Rows and columns of texels; texel t lies in row t // columns, column t % columns.
-    angles : float32 Tensor (n, 4)
-        Directions (`angles_of`).
-    values : float16 Tensor (n, T, 4)
-        Components; their own noise is far above the rounding.
-    """
+    """T texels of one repeat, each seen under the same n pairs of directions: inputs of the encoder."""
 
     shape: tuple[int, int]
+    """Rows and columns of texels; texel t lies in row t // columns, column t % columns."""
     angles: Tensor
+    """Directions (`angles_of`), float32 Tensor (n, 4)."""
     values: Tensor
+    """Components; their own noise is far above the rounding, float16 Tensor (n, T, 4)."""
 
     def to(self, device: torch.device) -> Texels:
         """Return the same on a device."""
@@ -105,18 +98,9 @@ class SetEncoder(nn.Module):
         self.scale: Tensor
 
     def forward(self, angles: Tensor, values: Tensor) -> Tensor:
-        """Encode T texels seen under the same n pairs of directions.
+        """Encode T texels seen under the same n pairs of directions, (T, latent).
 
-        Parameters
-        ----------
-        angles : Tensor (n, 4)
-            Directions.
-        values : Tensor (n, T, 4)
-            Samples.
-
-        Returns
-        -------
-        Tensor (T, latent)
+        `angles` (n, 4) are the directions, `values` (n, T, 4) the samples.
         """
         count, texels, _ = values.shape
         weights = self.weigh(angles) / count

@@ -34,34 +34,16 @@ _SHARPNESS = 0.4  # deviation of the sharpest blob of `local`, in bins
 
 
 def one_blob(x: Tensor, bins: int) -> Tensor:
-    """Encode numbers in [0, 1] as blobs of deviation 1/bins.
-
-    Returns
-    -------
-    Tensor (..., bins)
-        Share of the blob in each bin; at the edges of [0, 1] half of it is lost.
-    """
+    """Encode numbers in [0, 1] as blobs of deviation 1/bins, (..., bins); at the edges half of a blob is lost."""
     edges = torch.linspace(0.0, 1.0, bins + 1, dtype=x.dtype, device=x.device)
     distance = edges - x.unsqueeze(-1)
     return (0.5 * torch.erf(distance * (bins / math.sqrt(2.0)))).diff(dim=-1)
 
 
 def periodic_blob(x: Tensor, deviation: Tensor | float, bins: int) -> Tensor:
-    """Encode numbers of period 1 as blobs.
+    """Encode numbers of period 1 as the shares of blobs in each of at least 2 bins, (..., bins), which sum to 1.
 
-    Parameters
-    ----------
-    x : Tensor (...)
-        Any real numbers.
-    deviation : Tensor (...) or float
-        Standard deviation, in periods, > 0; wide blobs fill all bins alike.
-    bins : int
-        Number of bins, at least 2.
-
-    Returns
-    -------
-    Tensor (..., bins)
-        Share of the blob in each bin; sums to 1.
+    `deviation` is the standard deviation, in periods, > 0; wide blobs fill all bins alike.
     """
     m = torch.arange(1, bins, dtype=x.dtype, device=x.device)
     phase = 2.0 * math.pi * x.unsqueeze(-1) * m
@@ -87,23 +69,9 @@ def encode_patch(
 ) -> tuple[Tensor | None, Tensor]:
     """Return the decoder's inputs that describe footprints.
 
-    Parameters
-    ----------
-    options : WovenOptions
-        Options of the one-blobs.
-    u, v : Tensor (F, n)
-        Centres as shares of the repeat, in [0, 1).
-    sigma : Tensor (F, n)
-        Footprints, in yarn spacings.
-    repeat : Tensor (F, 2)
-        Extent of the repeat in x and y, in yarn spacings.
-
-    Returns
-    -------
-    where : Tensor (F, n, bins^2) or None
-        The footprint's share of every entry of the picture, if there is one.
-    patch : Tensor (F, n, 3 bins or 3)
-        One-blobs, or the bare numbers.
+    Centres u and v (F, n) are shares of the repeat (F, 2), in [0, 1), sigma (F, n) in yarn spacings. The first input is
+    the footprint's share of every entry of the picture, (F, n, bins^2), or None without a picture; the second
+    one-blobs, or the bare numbers, (F, n, 3 bins or 3).
     """
     bins = options.bins
     size = sigma / repeat.prod(dim=-1, keepdim=True).sqrt()
@@ -152,16 +120,7 @@ class Decoder(nn.Module):
     def forward(self, latent: Tensor, where: Tensor | None, patch: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
         """Answer in network space, (F, n, 4), transparency appended if `transmission` is learnt.
 
-        Parameters
-        ----------
-        latent : Tensor (F, latent or latent + bins^2)
-            From the encoder.
-        where : Tensor (F, n, bins^2) or None
-            The footprint's share of every entry of the picture.
-        patch : Tensor (F, n, 3 bins or 3)
-            One-blobs, or the bare numbers.
-        wi, wo : Tensor (F, n, 3)
-            Directions.
+        `latent` (F, latent or latent + bins^2) is from the encoder, `where` and `patch` are from `encode_patch`.
         """
         directions = torch.cat([wi, wo[..., :2]], dim=-1)
         if self.fusion is None:

@@ -28,21 +28,15 @@ from weaves.surface import surface_at
 
 
 class WovenInputs(NamedTuple):
-    """Inputs of the network from F fabrics, in standard position.
-
-    Attributes
-    ----------
-    maps : Tensor (F, 6, side, side)
-        Ply normal and fibre tangent at texel centres over one repeat; row = y, column = x.
-    parameters : Tensor (F, 4 or 7)
-        alpha_warp, alpha_weft, beta_warp, beta_weft; with `transmission` both widths and the optical thickness.
-    placement : Placement
-        Transformation of queries into standard position.
-    """
+    """Inputs of the network from F fabrics, in standard position."""
 
     maps: Tensor
+    """Ply normal and fibre tangent at texel centres over one repeat; row = y, column = x, (F, 6, side, side)."""
     parameters: Tensor
+    """alpha_warp, alpha_weft, beta_warp, beta_weft; with `transmission` both widths and the optical thickness,
+    (F, 4 or 7)."""
     placement: Placement
+    """Transformation of queries into standard position."""
 
     def take(self, index: Tensor) -> WovenInputs:
         """Return the fabrics at `index`."""
@@ -71,14 +65,7 @@ class WovenInputs(NamedTuple):
 def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | None = None) -> WovenInputs:
     """Return the inputs of at least one fabric.
 
-    Parameters
-    ----------
-    fabrics : sequence of Fabric
-        At least one.
-    options : WovenOptions
-        Whether fabrics are brought into standard position, and the side of their maps.
-    like : Fabric, optional
-        All are mirrored, exchanged and begun as brings this one into standard position; otherwise each by itself.
+    All are mirrored, exchanged and begun as brings `like` into standard position; without it, each by itself.
     """
     centre = (np.arange(options.map_texels) + 0.5) / options.map_texels
     maps, parameters, placements = [], [], []

@@ -47,15 +47,7 @@ from weaves.fabric import Fabric
 
 
 class WovenNetwork(EncoderDecoder):
-    """Encoder and decoder, with the cloth it is trained on.
-
-    Parameters
-    ----------
-    options : WovenOptions
-        The design.
-    fabrics : sequence of Fabric
-        Training fabrics, addressed by index in batches; none for inference.
-    """
+    """Encoder and decoder, with the fabrics it is trained on, addressed by index in batches; none for inference."""
 
     options: WovenOptions
     encoder: Encoder
@@ -79,26 +71,10 @@ class WovenNetwork(EncoderDecoder):
     def decode(
         self, latent: Tensor, placement: Placement, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor
     ) -> Tensor:
-        """Answer in network space, for fabrics in standard position.
+        """Answer in network space, for fabrics in standard position, (F, n, 4), transparency appended if it is learnt.
 
-        Parameters
-        ----------
-        latent : Tensor (F, latent)
-            From `encode`.
-        placement : Placement
-            Placement of the F fabrics.
-        u, v : Tensor (F, n)
-            Centres as shares of each fabric's own repeat.
-        sigma : Tensor (F, n)
-            Footprints, in yarn spacings.
-        wi, wo : Tensor (F, n, 3)
-            Directions.
-
-        Returns
-        -------
-        Tensor (F, n, 4 or 5)
-            Of the fabric in standard position: `placement.swap` gives the fabric's own components. With `transmission`
-            the fifth is the transparency.
+        `latent` (F, latent) is from `encode`; centres u and v (F, n) are shares of each fabric's own repeat, sigma (F,
+        n) in yarn spacings. `placement.swap` gives the fabric's own components.
         """
         u, v, wi, wo = placement.move(u, v, wi, wo)
         where, patch = encode_patch(self.options, u, v, sigma, placement.repeat)
@@ -152,26 +128,11 @@ class Woven(NetworkMethod[WovenNetwork]):
     """A trained network that answers for any fabric; it encodes each once."""
 
     def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> Float32:
-        """Answer for a blend of two fabrics: their latents are blended, no intermediate fabric is encoded.
+        """Answer, (N, 4), for a blend of two fabrics: their latents are blended, no intermediate fabric is encoded.
 
-        Parameters
-        ----------
-        first, second : Fabric
-            Two fabrics of one repeat. The second one is placed as the first one is, because blended latents must lie in
-            the same place.
-        share : float
-            Share of the second fabric's latent; 0 is the first fabric, 1 the second.
-        queries : Queries
-            N queries, in yarn spacings of either fabric.
-
-        Returns
-        -------
-        float32 (N, 4)
-
-        Raises
-        ------
-        BadInput
-            If the repeats differ, or for kinds of queries not trained on.
+        `share` is that of the second fabric's latent. Queries are in yarn spacings of either fabric, which have one
+        repeat; the second one is placed as the first one is, because blended latents must lie in the same place.
+        BadInput if the repeats differ, or for kinds of queries not trained on.
         """
         if first.weave.repeat != second.weave.repeat:
             (ends, picks), allowed = second.weave.repeat, "the repeat of {} is needed, {} x {}, to blend the two"

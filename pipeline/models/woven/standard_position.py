@@ -40,34 +40,21 @@ SYMMETRIES: Final = tuple(Symmetry(bool(i & 1), bool(i & 2), bool(i & 4)) for i 
 
 
 class Placement(NamedTuple):
-    """Transformations that bring F fabrics into standard position.
-
-    Attributes
-    ----------
-    mirror : bool (F, 2)
-        Mirrors of x and of y.
-    exchange : bool (F, 1)
-        Whether x and y change places afterwards.
-    start : float (F, 2)
-        Start of the standard repeat after that, as shares of it.
-    repeat : float (F, 2)
-        Extent of the standard repeat in x and y, in yarn spacings.
-    """
+    """Transformations that bring F fabrics into standard position."""
 
     mirror: Tensor
+    """Mirrors of x and of y, bool (F, 2)."""
     exchange: Tensor
+    """True if x and y change places afterwards, bool (F, 1)."""
     start: Tensor
+    """Start of the standard repeat after that, as shares of it, float (F, 2)."""
     repeat: Tensor
+    """Extent of the standard repeat in x and y, in yarn spacings, float (F, 2)."""
 
     def move(self, u: Tensor, v: Tensor, wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return the queries about the fabrics in standard position.
 
-        Parameters
-        ----------
-        u, v : Tensor (F, n)
-            Centres as shares of each fabric's own repeat; the results are shares of the standard one, in [0, 1).
-        wi, wo : Tensor (F, n, 3)
-            Directions.
+        u and v (F, n) are shares of each fabric's own repeat; the results are shares of the standard one, in [0, 1).
         """
         sign = torch.cat([1.0 - 2.0 * self.mirror, torch.ones_like(self.start[:, :1])], dim=-1).unsqueeze(1)
         u, v = u * sign[..., 0], v * sign[..., 1]
@@ -89,16 +76,9 @@ class Placement(NamedTuple):
 
 
 def standard(fabric: Fabric) -> tuple[Fabric, Symmetry, tuple[int, int]]:
-    """Bring a fabric into standard position.
+    """Bring a fabric into standard position; return it, and mirrors and exchange that were applied first.
 
-    Returns
-    -------
-    fabric : Fabric
-        The fabric in standard position.
-    symmetry : Symmetry
-        Mirrors and exchange that are applied first.
-    start : tuple of int
-        End and pick of the result at which the standard repeat begins.
+    Last come the end and the pick of the result at which the standard repeat begins.
     """
     best = min((*_smallest(moved(fabric, symmetry)), symmetry) for symmetry in SYMMETRIES)
     *_, (pick, end), symmetry = best

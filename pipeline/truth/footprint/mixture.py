@@ -24,25 +24,17 @@ from pipeline.truth.query import Queries
 
 
 class Line(NamedTuple):
-    """Positions of the points on the line.
-
-    Attributes
-    ----------
-    step : float
-        Distance between points, in deviations of the line; for correlation r times sqrt((1 - r) / (1 + r)).
-    reach : float
-        Largest distance of the points from the centre, in deviations of the line.
-    three, two : float
-        Largest correlations of three and of two points.
-    half : int
-        Most points on either side of the middle.
-    """
+    """Positions of the points on the line."""
 
     step: float
+    """Distance between points, in deviations of the line; for correlation r times sqrt((1 - r) / (1 + r))."""
     reach: float
+    """Largest distance of the points from the centre, in deviations of the line."""
     three: float
     two: float
+    """Largest correlations of three and of two points."""
     half: int
+    """Most points on either side of the middle."""
 
     @property
     def points(self) -> int:

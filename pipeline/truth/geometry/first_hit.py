@@ -41,26 +41,18 @@ _BEHIND = 1e-9  # distance of a point of a wall from the border that the ray cro
 
 
 class Hit(NamedTuple):
-    """Where a ray ends.
-
-    Attributes
-    ----------
-    what : int
-        ON_YARN, ON_WALL or MISSED.
-    x, y : float
-        The point, in the cell (pick, end) of the repeat; the start of the ray if it meets nothing.
-    end, pick : int
-        The cell.
-    distance : float
-        Distance from the start of the ray, in the fabric plane.
-    """
+    """Where a ray ends."""
 
     what: int
+    """ON_YARN, ON_WALL or MISSED."""
     x: float
     y: float
+    """The point, in the cell (pick, end) of the repeat; the start of the ray if it meets nothing."""
     end: int
     pick: int
+    """The cell."""
     distance: float
+    """Distance from the start of the ray, in the fabric plane."""
 
 
 @kernel

@@ -30,32 +30,22 @@ _EDGE = 1e-9  # cosine across a yarn below which the slope counts as vertical
 
 
 class HeightField(NamedTuple):
-    """Geometry and optics of one repeat; all arrays float64 except `top` (int8).
-
-    Attributes
-    ----------
-    top : (picks, ends)
-        Family on top: WARP or WEFT.
-    floats : (picks, ends, 2, 4)
-        For the yarn on top and the one beneath: cell centre minus float centre along the yarn, bend radius R, half
-        length L/2, R cos(u_max).
-    crown : (picks, ends)
-        Greatest height that any surface of the cell reaches.
-    highest, lowest : float
-        Greatest height of the fabric, and a bound that no yarn lies below.
-    yarn : (2, 8)
-        Radius r, 1/r, sine and cosine of the twist, alpha, relief beta, blend w_d, u_max in radians.
-    thickness : float
-        Optical thickness T.
-    """
+    """Geometry and optics of one repeat; all arrays float64 except `top` (int8)."""
 
     top: npt.NDArray[np.int8]
+    """Family on top: WARP or WEFT, (picks, ends)."""
     floats: Float64
+    """For the yarn on top and the one beneath: cell centre minus float centre along the yarn, bend radius R, half
+    length L/2, R cos(u_max), (picks, ends, 2, 4)."""
     crown: Float64
+    """Greatest height that any surface of the cell reaches, (picks, ends)."""
     highest: float
     lowest: float
+    """Greatest height of the fabric, and a bound that no yarn lies below."""
     yarn: Float64
+    """Radius r, 1/r, sine and cosine of the twist, alpha, relief beta, blend w_d, u_max in radians, (2, 8)."""
     thickness: float
+    """Optical thickness T."""
 
 
 def height_field(fabric: Fabric) -> HeightField:
@@ -160,12 +150,8 @@ def surface_at(
 ) -> tuple[int, int, float, float, float, float, float, float, float]:
     """Return the surface seen from above at (x, y) in cell (pick, end) of the repeat.
 
-    Returns
-    -------
-    family, side : int
-        WARP, WEFT or GAP; TOP or UNDER.
-    height, n_x, n_y, n_z, t_x, t_y, t_z : float
-        Height and the unit ply normal and fibre tangent; all 0 at a gap.
+    It is family (WARP, WEFT or GAP), side (TOP or UNDER), height, unit ply normal and unit fibre tangent; all 0 at a
+    gap.
     """
     family = int(field.top[pick, end])
     side = TOP

@@ -27,31 +27,22 @@ def wrap(x: float, repeat: float) -> float:
 
 
 class Ray(NamedTuple):
-    """A direction prepared for marches; the same for every point of a query.
-
-    Attributes
-    ----------
-    x, y, z : float
-        The unit vector.
-    dx, dy : float
-        Unit direction in the fabric plane.
-    rise : float
-        Height gained per unit of distance in the plane; infinite for the normal itself.
-    bend : float
-        Curvature of the base along the ray, >= 0: it falls away by bend s^2 / 2.
-    stride_x, stride_y : float
-        Distance between two cell borders in x and in y.
-    """
+    """A direction prepared for marches; the same for every point of a query."""
 
     x: float
     y: float
     z: float
+    """The unit vector."""
     dx: float
     dy: float
+    """Unit direction in the fabric plane."""
     rise: float
+    """Height gained per unit of distance in the plane; infinite for the normal itself."""
     bend: float
+    """Curvature of the base along the ray, >= 0: it falls away by bend s^2 / 2."""
     stride_x: float
     stride_y: float
+    """Distance between two cell borders in x and in y."""
 
 
 @kernel
@@ -77,24 +68,17 @@ def _stride(d: float) -> float:
 
 
 class Cell(NamedTuple):
-    """A cell on the way of a ray.
-
-    Attributes
-    ----------
-    end, pick : int
-        Its place in the repeat.
-    column, row : int
-        Its place in the endless cloth, counted from the repeat in which the ray starts.
-    next_x, next_y : float
-        Distance from the start at which the ray reaches the next border in x and in y.
-    """
+    """A cell on the way of a ray."""
 
     end: int
     pick: int
+    """Its place in the repeat."""
     column: int
     row: int
+    """Its place in the endless cloth, counted from the repeat in which the ray starts."""
     next_x: float
     next_y: float
+    """Distance from the start at which the ray reaches the next border in x and in y."""
 
 
 @inlined_kernel

@@ -37,29 +37,21 @@ Extent = tuple[float, float]
 
 
 class CellPiece(NamedTuple):
-    """A rectangle of a cell with one surface; x runs across a warp and along a weft, and across a gap.
-
-    Attributes
-    ----------
-    family, side : int
-        WARP, WEFT or GAP; TOP or UNDER.
-    across, along : (low, high)
-        Extent within the cell.
-    radius : float
-        Radius of its yarn; 0 for a gap.
-    offset, curve, half : float
-        Of its float (`HeightField.floats`): middle of the cell along the yarn, 1 / bend radius, half length, which is
-        infinite for a yarn that never changes side.
-    """
+    """A rectangle of a cell with one surface; x runs across a warp and along a weft, and across a gap."""
 
     family: int
     side: int
+    """WARP, WEFT or GAP; TOP or UNDER."""
     across: Extent
     along: Extent
+    """Extent within the cell."""
     radius: float
+    """Radius of its yarn; 0 for a gap."""
     offset: float
     curve: float
     half: float
+    """Of its float (`HeightField.floats`): middle of the cell along the yarn, 1 / bend radius, half length, which is
+    infinite for a yarn that never changes side."""
 
     @property
     def sign(self) -> float:

@@ -21,7 +21,7 @@ from pipeline.truth.cloth import ClothSide, Raw, WideQueries
 from pipeline.truth.footprint.mixture import Line
 from pipeline.truth.footprint.place import GAUSSIAN
 from pipeline.truth.footprint.sequences import derive
-from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP
+from pipeline.truth.geometry.heightfield import BLEND, GAP
 from pipeline.truth.monte_carlo import conceal, query_directions
 from pipeline.truth.node_table.build import (
     FINE_COUNT,
@@ -35,7 +35,6 @@ from pipeline.truth.node_table.build import (
 from pipeline.truth.node_table.displaced import DensityRoom, density_room, fill_displaced
 from pipeline.truth.node_table.doubts import doubtful_from
 from pipeline.truth.node_table.kernels import (
-    FlakeLayer,
     HorizonSlopes,
     NodeDirections,
     NodeShares,
@@ -43,10 +42,10 @@ from pipeline.truth.node_table.kernels import (
     Tangents,
     borders,
     crossing,
+    flake_layer,
     no_shares,
     node_directions,
-    reflected,
-    transmitted,
+    scatter,
     weigh,
 )
 from pipeline.truth.node_table.refine import UNSEEN, RefineRoom, refine, refine_room
@@ -63,20 +62,14 @@ _0 = np.float32(0.0)
 
 
 class Requested(NamedTuple):
-    """When an answer is good enough.
-
-    Attributes
-    ----------
-    relative, absolute : float
-        Requested standard error: relative to the norm of the four components, and 1/sr.
-    front, behind : (Factors, Factors)
-        Calibration of answers by the table alone and of refined ones, for light from either side.
-    """
+    """When an answer is good enough."""
 
     relative: float
     absolute: float
+    """Requested standard error: relative to the norm of the four components, and 1/sr."""
     front: tuple[Factors, Factors]
     behind: tuple[Factors, Factors]
+    """Calibration of answers by the table alone and of refined ones, for light from either side."""
 
 
 class _Room(NamedTuple):
@@ -226,12 +219,8 @@ def sum_pieces(
 ) -> tuple[float, float, float, float, int]:
     """Write the sums over all nodes, their changes by borders, and their squared errors.
 
-    Returns
-    -------
-    area, area_error, moved_area, undecided : float
-        The denominator, its squared error, its change by borders, and the share of undecided nodes in it.
-    nodes : int
-        Nodes visited.
+    Returns the denominator, its squared error, its change by borders, the share of undecided nodes in it, and the
+    number of nodes visited.
     """
     area, area_error, moved_area, undecided = np.float64(0.0), np.float64(0.0), np.float64(0.0), np.float64(0.0)
     nodes = 0
@@ -329,29 +318,18 @@ def _scatter(
     The unscattered light is added too. Returns the number of finer nodes visited beyond one a node.
     """
     count, fine, family = piece[NODES_X] * piece[NODES_Y], piece[FINE_COUNT], piece[PIECE_FAMILY]
-    yarn = cloth.front.yarn[family]
-    layer = FlakeLayer(
-        np.float32(yarn[ALPHA] ** 2),
-        np.float32(cloth.front.thickness),
-        np.float32(yarn[ALPHA] ** 3 / (4.0 * math.pi * fine)),
-    )
-    light, viewer = towards.light, towards.viewer
+    layer = flake_layer(cloth.front, family, fine)
     f0 = piece[FIRST_FINE]
     f1 = f0 + count
     tangent = Tangents(table.fine[4, f0:f1], table.fine[5, f0:f1], table.fine[6, f0:f1])
-    sums[4] += crossing(normal, tangent, viewer, layer, shares.areas)
+    sums[4] += crossing(normal, tangent, towards.viewer, layer, shares.areas)
     shares.speculars[:] = _0
     if not lit:
         return 0
     for _ in range(fine):
         finer = Normals(table.fine[0, f0:f1], table.fine[1, f0:f1], table.fine[2, f0:f1], table.fine[3, f0:f1])
         tangent = Tangents(table.fine[4, f0:f1], table.fine[5, f0:f1], table.fine[6, f0:f1])
-        if towards.behind:
-            sums[family] += transmitted(
-                finer, tangent, light, viewer, towards.size, layer, shares.lit, shares.speculars
-            )
-        else:
-            sums[family] += reflected(finer, tangent, light, viewer, towards.size, layer, shares.lit, shares.speculars)
+        sums[family] += scatter(finer, tangent, towards, layer, shares.lit, shares.speculars)
         f0, f1 = f1, f1 + count
     return int(count * (fine - 1))
 

@@ -30,59 +30,39 @@ _SMOOTH = Choices(False, False)
 
 
 class Known(NamedTuple):
-    """Knowledge of a node that the table already has.
-
-    Attributes
-    ----------
-    seen, lit : bool
-        Whether the viewer, and the light, clear the horizon all around.
-    every : bool
-        Whether the point model must be evaluated at every place: a highlight is narrower than the node.
-    """
+    """Knowledge of a node that the table already has."""
 
     seen: bool
     lit: bool
+    """True if the viewer, and the light, clear the horizon all around."""
     every: bool
+    """True if the point model must be evaluated at every place: a highlight is narrower than the node."""
 
 
 class Row(NamedTuple):
-    """A row of places through a node.
-
-    Attributes
-    ----------
-    x, y, dx, dy : float
-        Where it starts, in the repeat, and how far it leads.
-    offset : float
-        Place of the first place within its eighth, 0 <= offset < 1.
-    weight, tilt : float
-        Share of the footprint, and its relative change from the start to the end.
-    """
+    """A row of places through a node."""
 
     x: float
     y: float
     dx: float
     dy: float
+    """Where it starts, in the repeat, and how far it leads."""
     offset: float
+    """Place of the first place within its eighth, 0 <= offset < 1."""
     weight: float
     tilt: float
+    """Share of the footprint, and its relative change from the start to the end."""
 
 
 class RowRoom(NamedTuple):
-    """Room for a row.
-
-    Attributes
-    ----------
-    states : int64 (PLACES,)
-        Whether each place is hidden, seen, or seen and lit.
-    parts : int64 (2 PLACES, 2)
-        First and last place of parts not yet decided.
-    value : float64 (POINT_SUMS,)
-        The row's sums.
-    """
+    """Room for a row."""
 
     states: Index
+    """State of each place: hidden, seen, or seen and lit, (PLACES,)."""
     parts: Index
+    """First and last place of parts not yet decided, (2 PLACES, 2)."""
     value: Float64
+    """The row's sums, (POINT_SUMS,)."""
 
 
 def row_room() -> RowRoom:

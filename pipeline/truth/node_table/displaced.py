@@ -55,29 +55,20 @@ class GridSize(NamedTuple):
 
 
 class DensityRoom(NamedTuple):
-    """Room for the density of one footprint.
-
-    Attributes
-    ----------
-    grid : float32 (G,)
-        Density at the points of the grid, row by row.
-    along_x, along_y : float32
-        Density along both axes, the first over two periods.
-    points : float32 (2, P)
-        Places and shares of the points of a mixture.
-    squares : uint32 (N,)
-        Square of the grid in which each node is seen.
-    part_x, part_y : float32 (N,)
-        Where in it, 0 to 1.
-    """
+    """Room for the density of one footprint."""
 
     grid: Float32
+    """Density at the points of the grid, row by row, (G,)."""
     along_x: Float32
     along_y: Float32
+    """Density along both axes, the first over two periods."""
     points: Float32
+    """Places and shares of the points of a mixture, (2, P)."""
     squares: Squares
+    """Square of the grid in which each node is seen, uint32 (N,)."""
     part_x: Float32
     part_y: Float32
+    """Where in it, 0 to 1, (N,)."""
 
 
 def density_room(table: ExactNodes, line: Line) -> DensityRoom:

@@ -38,32 +38,22 @@ _TINY = np.float32(1e-30)
 
 
 class Doubts(NamedTuple):
-    """Possible errors of the nodes, for one query; overwritten for each.
-
-    Attributes
-    ----------
-    right, down : float32 (N,)
-        Squared change of the components by the border to the next node in x and in y; 0 without one.
-    score : float32 (N,)
-        Squared change of the components by a node.
-    bits : int32 (N,)
-        The bits of `score`: the same memory.
-    specular, diffuse : float32 (N,)
-        Changes of a node's family by the borders beside it, if these lie where the margins say.
-    left : float64 (5,)
-        What all nodes together leave that are not refined: the squared error, and the changes of the four components.
-    levels : float64 (L, 5)
-        The same for nodes whose score lies between two powers of 2.
-    """
+    """Possible errors of the nodes, for one query; overwritten for each."""
 
     right: Float32
     down: Float32
+    """Squared change of the components by the border to the next node in x and in y; 0 without one, (N,)."""
     score: Float32
+    """Squared change of the components by a node, (N,)."""
     bits: npt.NDArray[np.int32]
+    """The bits of `score`: the same memory, int32 (N,)."""
     specular: Float32
     diffuse: Float32
+    """Changes of a node's family by the borders beside it, if these lie where the margins say, (N,)."""
     left: Float64
+    """Errors that unrefined nodes leave together: the squared error and the four components' changes, (5,)."""
     levels: Float64
+    """The same for nodes whose score lies between two powers of 2, (L, 5)."""
 
 
 def no_doubts(nodes: int) -> Doubts:

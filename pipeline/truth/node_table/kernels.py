@@ -7,12 +7,13 @@ those of the nodes of one piece. The loops have no branch and no call left, so t
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, kernel
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
+from pipeline.truth.geometry.heightfield import ALPHA, HeightField
 from pipeline.truth.geometry.march import azimuth_rows
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
@@ -25,51 +26,34 @@ _TINY = np.float32(1e-30)
 
 
 class Direction(NamedTuple):
-    """A unit direction, and where horizons towards it stand in a table.
-
-    Attributes
-    ----------
-    x, y, z : float32
-        Components.
-    slope : float32
-        Rise per unit of distance in the fabric plane.
-    first, second : int
-        The two azimuths of the table around it.
-    turn : float32
-        Its place between them, 0 to 1.
-    """
+    """A unit direction, and where horizons towards it stand in a table."""
 
     x: np.float32
     y: np.float32
     z: np.float32
+    """Components."""
     slope: np.float32
+    """Rise per unit of distance in the fabric plane."""
     first: int
     second: int
+    """The two azimuths of the table around it."""
     turn: np.float32
+    """Its place between them, 0 to 1."""
 
 
 class NodeDirections(NamedTuple):
-    """Directions of one query.
-
-    Attributes
-    ----------
-    behind : bool
-        Whether the light is behind the cloth.
-    light : Direction
-        wi; of light from behind the components of -wi, but slope and azimuths of wi reflected in the fabric plane.
-    viewer : Direction
-        wo.
-    through : Direction
-        -wo reflected in the fabric plane: the way through a gap, as the back of the cloth sees it.
-    size : float32
-        1 / |wi + wo|^2.
-    """
+    """Directions of one query."""
 
     behind: bool
+    """True if the light is behind the cloth."""
     light: Direction
+    """wi; of light from behind the components of -wi, but slope and azimuths of wi reflected in the fabric plane."""
     viewer: Direction
+    """wo."""
     through: Direction
+    """-wo reflected in the fabric plane: the way through a gap, as the back of the cloth sees it."""
     size: np.float32
+    """1 / |wi + wo|^2."""
 
 
 @kernel
@@ -93,30 +77,21 @@ def _direction(x: float, y: float, z: float, sign: float, azimuths: int) -> Dire
 
 
 class NodeShares(NamedTuple):
-    """Shares of the nodes in the sums of one query; overwritten for each query.
-
-    Attributes
-    ----------
-    weight : float32 (N,)
-        Share of the footprint.
-    lit : float32 (N,)
-        `weight` where the viewer and the light are visible, else 0.
-    areas, diffuses, speculars : float32 (N,)
-        Share in the denominator, and in the diffuse (times pi) and specular numerators.
-    margins, lit_margins : float32 (N,)
-        Slope by which the viewer, and viewer and light, lie above the horizon; negative below it.
-    undecided : float32 (N,)
-        Share in the denominator, were the node visible, if the horizons beside a direction disagree; else 0.
-    """
+    """Shares of the nodes in the sums of one query; overwritten for each query."""
 
     weight: Float32
+    """Share of the footprint, (N,)."""
     lit: Float32
+    """`weight` where the viewer and the light are visible, else 0, (N,)."""
     areas: Float32
     diffuses: Float32
     speculars: Float32
+    """Share in the denominator, and in the diffuse (times pi) and specular numerators, (N,)."""
     margins: Float32
     lit_margins: Float32
+    """Slope by which the viewer, and viewer and light, lie above the horizon; negative below it, (N,)."""
     undecided: Float32
+    """Share in the denominator, were the node visible, if the horizons beside a direction disagree; else 0, (N,)."""
 
 
 def no_shares(nodes: int) -> NodeShares:
@@ -156,21 +131,22 @@ class HorizonSlopes(NamedTuple):
 
 
 class FlakeLayer(NamedTuple):
-    """The layer of flakes on a piece of yarn.
-
-    Attributes
-    ----------
-    square : float32
-        alpha^2.
-    thickness : float32
-        Optical thickness.
-    scale : float32
-        alpha^3 / (4 pi), divided by the number of fine nodes in a node.
-    """
+    """The layer of flakes on a piece of yarn."""
 
     square: np.float32
+    """alpha^2."""
     thickness: np.float32
+    """Optical thickness."""
     scale: np.float32
+    """alpha^3 / (4 pi), divided by the number of fine nodes in a node."""
+
+
+@inlined_kernel
+def flake_layer(field: HeightField, family: int, places: int) -> FlakeLayer:
+    """Return the layer on yarns of a family, for sums over so many places a node."""
+    alpha = field.yarn[family, ALPHA]
+    scale = alpha**3 / (4.0 * math.pi * places)
+    return FlakeLayer(np.float32(alpha**2), np.float32(field.thickness), np.float32(scale))
 
 
 @fast_kernel
@@ -283,7 +259,7 @@ def _sigma(x: np.float32, y: np.float32, z: np.float32, along: np.float32, squar
 
 
 @fast_kernel
-def reflected(
+def scattered(
     normal: Normals,
     tangent: Tangents,
     light: Direction,
@@ -292,10 +268,12 @@ def reflected(
     layer: FlakeLayer,
     lit: Float32,
     speculars: Float32,
+    behind: Literal[True] | None,
 ) -> np.float32:
-    """Add each node's share of the reflected specular component to `speculars`; return the sum.
+    """Add each node's share of the specular component to `speculars`; return the sum.
 
-    `size` is 1 / |wi + wo|^2.
+    `size` is 1 / |wi + wo|^2. Light from `behind`, of which `light` is the opposite, -wi, is transmitted, other light
+    reflected; None, not False: the loop is compiled for each of the two alone.
     """
     total = _0
     for k in range(len(lit)):
@@ -304,44 +282,31 @@ def reflected(
         cos_i = max(light.x * nx + light.y * ny + light.z * nz, _0)
         # The half vector's products with the tangent are sums of those of wi and wo.
         ax, ay, az, along_i = _products(light, tangent.x[k], tangent.y[k], tangent.z[k])
+        if behind is not None:
+            ax, ay, az, along_i = -ax, -ay, -az, -along_i
         bx, by, bz, along_o = _products(viewer, tangent.x[k], tangent.y[k], tangent.z[k])
         vx, vy, vz, along = ax + bx, ay + by, az + bz, along_i + along_o
         q = size * (layer.square * (vx * vx + vy * vy + vz * vz) + along * along)
         sigma_i, sigma_o = _sigma(ax, ay, az, along_i, layer.square), _sigma(bx, by, bz, along_o, layer.square)
         flakes = lit[k] * layer.scale * normal.inverse[k]
-        value = reflection(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
+        if behind is not None:
+            value = transmission(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
+        else:
+            value = reflection(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
         speculars[k] += value
         total += value
     return total
 
 
-@fast_kernel
-def transmitted(
-    normal: Normals,
-    tangent: Tangents,
-    light: Direction,
-    viewer: Direction,
-    size: np.float32,
-    layer: FlakeLayer,
-    lit: Float32,
-    speculars: Float32,
+@inlined_kernel
+def scatter(
+    normal: Normals, tangent: Tangents, towards: NodeDirections, layer: FlakeLayer, lit: Float32, speculars: Float32
 ) -> np.float32:
-    """Do the same for light from behind, of which `light` is the opposite, -wi."""
-    total = _0
-    for k in range(len(lit)):
-        nx, ny, nz = normal.x[k], normal.y[k], normal.z[k]
-        cos_o = max(viewer.x * nx + viewer.y * ny + viewer.z * nz, _0)
-        cos_i = max(light.x * nx + light.y * ny + light.z * nz, _0)
-        ax, ay, az, along_i = _products(light, tangent.x[k], tangent.y[k], tangent.z[k])
-        bx, by, bz, along_o = _products(viewer, tangent.x[k], tangent.y[k], tangent.z[k])
-        vx, vy, vz, along = bx - ax, by - ay, bz - az, along_o - along_i
-        q = size * (layer.square * (vx * vx + vy * vy + vz * vz) + along * along)
-        sigma_i, sigma_o = _sigma(ax, ay, az, along_i, layer.square), _sigma(bx, by, bz, along_o, layer.square)
-        flakes = lit[k] * layer.scale * normal.inverse[k]
-        value = transmission(flakes, q * q, sigma_i, sigma_o, cos_i, cos_o, layer.thickness)
-        speculars[k] += value
-        total += value
-    return total
+    """Do what `scattered` does, for the directions of a query."""
+    light, viewer, size = towards.light, towards.viewer, towards.size
+    if towards.behind:
+        return scattered(normal, tangent, light, viewer, size, layer, lit, speculars, True)
+    return scattered(normal, tangent, light, viewer, size, layer, lit, speculars, None)
 
 
 @fast_kernel

@@ -42,28 +42,19 @@ _0 = np.float32(0.0)
 
 
 class RefineRoom(NamedTuple):
-    """Room for the refinement of a query.
-
-    Attributes
-    ----------
-    doubts : Doubts
-        What nodes may be wrong by.
-    row : RowRoom
-        Room for a row.
-    change : float64 (POINT_SUMS,)
-        Change of the sums.
-    variance : float64 (4,)
-        Squared error of the numerators.
-    first, second : float64 (POINT_SUMS,), float64 (4,)
-        Sums over a node's rows, and of the squares of their residuals.
-    """
+    """Room for the refinement of a query."""
 
     doubts: Doubts
+    """Possible errors of the nodes."""
     row: RowRoom
+    """Room for a row."""
     change: Float64
+    """Change of the sums, (POINT_SUMS,)."""
     variance: Float64
+    """Squared error of the numerators, (4,)."""
     first: Float64
     second: Float64
+    """Sums over a node's rows, and of the squares of their residuals, (POINT_SUMS,) and (4,)."""
 
 
 def refine_room(nodes: int) -> RefineRoom:

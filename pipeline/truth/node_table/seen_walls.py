@@ -10,19 +10,18 @@ import numpy as np
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.truth.cloth import ClothSide
-from pipeline.truth.geometry.heightfield import ALPHA, BLEND
+from pipeline.truth.geometry.heightfield import BLEND
 from pipeline.truth.node_table.build import ExactNodes
 from pipeline.truth.node_table.displaced import DensityRoom, read_density
 from pipeline.truth.node_table.kernels import (
     Direction,
-    FlakeLayer,
     HorizonSlopes,
     NodeDirections,
     Normals,
     Tangents,
     crossing,
-    reflected,
-    transmitted,
+    flake_layer,
+    scatter,
 )
 from pipeline.truth.node_table.walls import HEIGHTS
 
@@ -36,23 +35,17 @@ _OF_STEPS = np.float32(1.0 / (HEIGHTS - 1))
 
 
 class WallRoom(NamedTuple):
-    """Room for the walls of one query.
-
-    Attributes
-    ----------
-    seen, weight, areas, lit, speculars : float32 (W,)
-        Seen height, share of the footprint, share in the denominator, that of lit walls over the cosine of the rim, and
-        share in the specular numerator.
-    places : float32 (3, W)
-        The middle of what is seen.
-    """
+    """Room for the walls of one query."""
 
     seen: Float32
     weight: Float32
     areas: Float32
     lit: Float32
     speculars: Float32
+    """Seen height, share of the footprint, share in the denominator, that of lit walls over the cosine of the rim, and
+    share in the specular numerator, (W,)."""
     places: Float32
+    """The middle of what is seen, (3, W)."""
 
 
 def wall_room(table: ExactNodes) -> WallRoom:
@@ -99,18 +92,14 @@ def sum_walls(
         a, b = walls.starts[2 * family], walls.starts[2 * family + 2]
         if a == b:
             continue
-        yarn = cloth.front.yarn[family]
-        layer = FlakeLayer(
-            np.float32(yarn[ALPHA] ** 2), np.float32(cloth.front.thickness),
-            np.float32(yarn[ALPHA] ** 3 / (4.0 * math.pi)),
-        )  # fmt: skip
+        layer = flake_layer(cloth.front, family, 1)
         normal = Normals(walls.normal[0, a:b], walls.normal[1, a:b], walls.normal[2, a:b], walls.normal[3, a:b])
         tangent = Tangents(walls.tangent[0, a:b], walls.tangent[1, a:b], walls.tangent[2, a:b])
         areas, lit, speculars = room.areas[a:b], room.lit[a:b], room.speculars[a:b]
         own, diffuse = _weigh_walls(
             normal, walls.out[0, a:b], walls.out[1, a:b], light,
-            HorizonSlopes(slope[light.first, a:b], slope[light.second, a:b]), viewer, np.float32(yarn[BLEND]),
-            room.seen[a:b], weight[a:b], areas, lit,
+            HorizonSlopes(slope[light.first, a:b], slope[light.second, a:b]), viewer,
+            np.float32(cloth.front.yarn[family, BLEND]), room.seen[a:b], weight[a:b], areas, lit,
         )  # fmt: skip
         if own == _0:
             continue
@@ -119,10 +108,7 @@ def sum_walls(
         area_error += (_DOUBT * own) ** 2
         if diffuse > _0:
             speculars[:] = _0
-            if towards.behind:
-                specular = transmitted(normal, tangent, light, viewer, towards.size, layer, lit, speculars)
-            else:
-                specular = reflected(normal, tangent, light, viewer, towards.size, layer, lit, speculars)
+            specular = scatter(normal, tangent, towards, layer, lit, speculars)
             sums[family] += specular
             sums[2 + family] += diffuse / math.pi
             squares[family] += (_DOUBT * specular) ** 2

@@ -60,19 +60,10 @@ ALLOWED: Final = (
 class NodeTable:
     """Tables of one resolution.
 
-    Parameters
-    ----------
-    nodes : callable
-        Nodes per yarn spacing for a number of different cells.
-    azimuths : int
-        Directions in which horizons are known.
-    line : Line
-        Points of the mixture that a rotated footprint is.
-    stage : int
-        Stage of the answers that are not refined (pipeline.truth.calibration).
-    rays_resolved : float
-        Smallest deviation of footprints of view rays, over the distance of nodes as they are seen, if that is more than
-        `RAYS_RESOLVED`.
+    `nodes` gives the nodes per yarn spacing for a number of different cells, `azimuths` is the number of directions in
+    which horizons are known, `line` the points of the mixture that a rotated footprint is, `stage` that of the answers
+    that are not refined (pipeline.truth.calibration). `rays_resolved` is the smallest deviation of footprints of view
+    rays, over the distance of nodes as they are seen, if that is more than `RAYS_RESOLVED`.
     """
 
     def __init__(

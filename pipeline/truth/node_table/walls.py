@@ -36,43 +36,31 @@ _UNSEEN = 1e4
 
 
 class WallNodes(NamedTuple):
-    """Walls of one side of a cloth: those of warps, their deep ones, those of wefts, their deep ones.
-
-    Attributes
-    ----------
-    starts : (int, int, int, int, int)
-        First wall of each kind, and the number of all.
-    places : float32 (3, W)
-        Where each wall is in the repeat, and the height of its top.
-    height : float32 (W,)
-        From the foot to the top.
-    out : float32 (2, W)
-        Its horizontal normal.
-    normal : float32 (4, W)
-        Normal of the rim, and 1.
-    tangent : float32 (3, W)
-        Fibre tangent of the rim.
-    evenly : float32 (W,)
-        Length of a wall and its copies over the area of the repeat.
-    horizon : float32 (A, HEIGHTS, W)
-        Slope of the horizon at points of the wall, from the top down.
-    passing : float32 (A, HEIGHTS, W)
-        Slope above which a view ray to these points of deep walls clears the back; no rows without deep walls.
-    slope, slope_behind : float32 (A, W)
-        Slope of the rim's horizon, and of that at the back of the cloth; no rows if there is no need for them.
-    """
+    """Walls of one side of a cloth: those of warps, their deep ones, those of wefts, their deep ones."""
 
     starts: tuple[int, int, int, int, int]
+    """First wall of each kind, and the number of all."""
     places: Float32
+    """Where each wall is in the repeat, and the height of its top, (3, W)."""
     height: Float32
+    """From the foot to the top, (W,)."""
     out: Float32
+    """Its horizontal normal, (2, W)."""
     normal: Float32
+    """Normal of the rim, and 1, (4, W)."""
     tangent: Float32
+    """Fibre tangent of the rim, (3, W)."""
     evenly: Float32
+    """Length of a wall and its copies over the area of the repeat, (W,)."""
     horizon: Float32
+    """Slope of the horizon at points of the wall, from the top down, (A, HEIGHTS, W)."""
     passing: Float32
+    """Slope above which a view ray to these points of deep walls clears the back; no rows without deep walls,
+    (A, HEIGHTS, W)."""
     slope: Float32
     slope_behind: Float32
+    """Slope of the rim's horizon, and of that at the back of the cloth; no rows if there is no need for them,
+    (A, W)."""
 
 
 def no_walls() -> WallNodes:

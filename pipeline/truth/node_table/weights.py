@@ -28,21 +28,14 @@ _REACH = 5.5  # in standard deviations; what lies beyond is 4e-8
 
 
 class WeightRoom(NamedTuple):
-    """Room for the weights of one query.
-
-    Attributes
-    ----------
-    masses : float32 (2, cells, kinds, n)
-        Shares of the intervals along x and along y, by cell and kind of edges.
-    touched : bool (2, cells, kinds)
-        Whether any of them may be above 0.
-    points : float32 (2, P)
-        Places and shares of the points of a mixture.
-    """
+    """Room for the weights of one query."""
 
     masses: Float32
+    """Shares of the intervals along x and along y, by cell and kind of edges, (2, cells, kinds, n)."""
     touched: Mask
+    """True where any of them may be above 0, (2, cells, kinds)."""
     points: Float32
+    """Places and shares of the points of a mixture, (2, P)."""
 
 
 def weight_room(table: ExactNodes, line: Line) -> WeightRoom:

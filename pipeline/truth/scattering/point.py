@@ -24,38 +24,25 @@ Surface = tuple[int, int, float, float, float, float, float, float, float]
 
 
 class Choices(NamedTuple):
-    """The options of the model as kernels read them.
-
-    Attributes
-    ----------
-    macro : bool
-        Cosines in the slab and in A are taken to n_s instead of n_p.
-    shadows : bool
-        Whether points can hide one another.
-    rims : bool
-        Whether view rays that meet a wall see the yarn's rim above it.
-    """
+    """The options of the model as kernels read them."""
 
     macro: bool
+    """Cosines in the slab and in A are taken to n_s instead of n_p."""
     shadows: bool
+    """True if points can hide one another."""
     rims: bool = False
+    """True if view rays that meet a wall see the yarn's rim above it."""
 
 
 class Directions(NamedTuple):
-    """One query's light and viewer, both in front as the viewer sees it.
-
-    Attributes
-    ----------
-    light, viewer : Ray
-        wi and wo.
-    light_behind, viewer_behind : Ray
-        wi and -wo as the back of the cloth sees them, reflected in its plane.
-    """
+    """One query's light and viewer, both in front as the viewer sees it."""
 
     light: Ray
     viewer: Ray
+    """wi and wo."""
     light_behind: Ray
     viewer_behind: Ray
+    """wi and -wo as the back of the cloth sees them, reflected in its plane."""
 
 
 @kernel
@@ -82,12 +69,8 @@ def point_share(
 ) -> tuple[int, float, float, float, float]:
     """Return the shares of a point, 0 <= x < ends, 0 <= y < picks, in the numerators and the denominator.
 
-    Returns
-    -------
-    family : int
-        WARP, WEFT or GAP.
-    area, specular, diffuse, through : float
-        A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); the unscattered share, times A(wo).
+    First the family: WARP, WEFT or GAP; then A(wo); F_specular V(wi) A(wo); F_diffuse V(wi) A(wo); and the unscattered
+    share, times A(wo).
     """
     viewer = directions.viewer
     surface = surface_at(front, x, y, int(x), int(y))

@@ -32,35 +32,23 @@ from weaves.fabric import Fabric
 
 
 class ComponentColours(NamedTuple):
-    """Colours of the components of N queries, linear sRGB.
-
-    Attributes
-    ----------
-    mean : float64 (N, 4, 3)
-        Colour of each component, in the order of `pipeline.truth.conventions.COMPONENTS`.
-    standard_error : float64 (N, 3)
-        Standard error that the colours bring into the patch BSDF, 1/sr.
-    """
+    """Colours of the components of N queries, linear sRGB."""
 
     mean: Float64
+    """Colour of each component, in the order of `pipeline.truth.conventions.COMPONENTS`, (N, 4, 3)."""
     standard_error: Float64
+    """Standard error that the colours bring into the patch BSDF, 1/sr, (N, 3)."""
 
 
 class ThreadTable(NamedTuple):
-    """Colours of the threads as kernels read them.
-
-    Attributes
-    ----------
-    warp, weft : float64 (n, 2, 3)
-        Specular and diffuse colour of each end (pick) of the sequence.
-    ends, picks : int
-        Repeat of weave and colours together.
-    """
+    """Colours of the threads as kernels read them."""
 
     warp: Float64
     weft: Float64
+    """Specular and diffuse colour of each end (pick) of the sequence, (n, 2, 3)."""
     ends: int
     picks: int
+    """Repeat of weave and colours together."""
 
 
 def threads_of(fabric: Fabric, transmitted: bool) -> ThreadTable:

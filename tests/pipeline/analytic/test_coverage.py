@@ -7,12 +7,9 @@ from pipeline.analytic.coverage import quick_coverage, tabulate_coverage
 from pipeline.truth.geometry.opacity import coverage
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.truth.cloths import woven
+from tests.pipeline.truth.cloths import CORDUROY
 from tests.presets import PRESETS
 from weaves.fabric import load_fabric
-
-CORDUROY = woven("denim", ("#",))
-"""Warps alone: straight half cylinders of radius 1/2 side by side, for closed forms."""
 
 
 def looks(fabric, rows, sigma, curvature, seed=0, depth=0.6):

@@ -3,6 +3,7 @@ import pytest
 
 from pipeline.analytic.prefiltered import CHANNELS, LEAN, NONE, TOKSVIG, answer, tabulate
 from pipeline.truth.query import Queries
+from tests.directions import above
 from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 
@@ -10,10 +11,6 @@ PER_YARN = 16
 
 RTOL = 1e-4
 """Some forty roundings of 6e-8, and ten times that where a highlight's narrow denominator is a small difference."""
-
-
-def unit(x, y):
-    return np.float32([x, y, np.sqrt(1.0 - x * x - y * y)])
 
 
 @pytest.mark.parametrize(("wi", "wo"), [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5))], ids=["apart", "near"])
@@ -24,7 +21,7 @@ def test_a_texel_is_a_point(point_shares, wi, wo):
     columns, rows = (1 << int(np.ceil(np.log2(extent * PER_YARN))) for extent in (ends, picks))
     x, y = np.meshgrid((np.arange(columns) + 0.5) * ends / columns, (np.arange(rows) + 0.5) * picks / rows)
     x, y = (axis.ravel()[::7].astype(np.float32) for axis in (x, y))
-    wi, wo = (np.tile(unit(*w), (len(x), 1)) for w in (wi, wo))
+    wi, wo = (np.tile(np.float32(above(*w)), (len(x), 1)) for w in (wi, wo))
     queries = Queries.round(x, y, np.full(len(x), 1e-4, np.float32), wi, wo)
     tables = tabulate(fabric, PER_YARN, parallax=False)
     found = answer(tables, queries, NONE)
@@ -56,7 +53,7 @@ def test_each_level_is_the_mean_of_the_one_before(maps):
 
 def test_widening_lowers_highlights_and_leaves_the_diffuse_light(maps):
     """A texel of many tangents has a broader lobe: lower in its middle; diffuse light knows no roughness."""
-    middle = Queries.round([0.0], [0.0], [50.0], [unit(0.0, 0.3)], [unit(0.0, -0.3)])
+    middle = Queries.round([0.0], [0.0], [50.0], [above(0.0, 0.3)], [above(0.0, -0.3)])
     none, toksvig, lean = (answer(maps, middle, widening)[0] for widening in (NONE, TOKSVIG, LEAN))
     np.testing.assert_allclose(toksvig[2:], none[2:], rtol=1e-6)
     np.testing.assert_allclose(lean[2:], none[2:], rtol=1e-6)

@@ -17,6 +17,15 @@ def woven(name, rows=None, warp=(), weft=(), **changes):
     return fabric.model_copy(update=yarns | ({"draft": Matrix(rows=tuple(rows))} if rows else {}))
 
 
+def irregular(side, seed, **changes):
+    """Return a square draft that chance has drawn, with changes of the yarns of both families."""
+    over = np.random.default_rng(seed).random((side, side)) < 0.5
+    return woven("polyester_lining", Draft(over[::-1]).rows(), **changes)
+
+
+CORDUROY = woven("denim", ("#",))
+"""Warps alone: straight half cylinders of radius 1/2 side by side, for closed forms."""
+
 PALETTE = {"red": {"diffuse": [0.6, 0.1, 0.2], "specular": [0.4, 0.2, 0.1]}, "blue": {"diffuse": [0.1, 0.2, 0.5]}}
 
 

@@ -31,14 +31,8 @@ def points_of(fabric):
 
 def lobes_of(fabric, queries):
     """Return the lobes of points, and the densities of their wi."""
-    lobes = point.Lobes(
-        np.empty((COUNT, point.FLAKE_ROWS, 3), np.float32), np.empty((COUNT, point.STRAIGHT + 1), np.float32)
-    )
-    footprints = (queries.u, queries.v, queries.sigma, queries.sigma, np.zeros_like(queries.sigma))
-    scratch, pdf = np.empty((point.POINT_ROWS, 1), np.float32), np.empty(COUNT, np.float32)
-    point.find_rows(
-        tabulate_surface(fabric), footprints, queries.wo, point.point_places(1), np.float32(2.0), scratch, lobes
-    )
+    lobes = point.find_lobes(tabulate_surface(fabric), queries, point.point_places(1), 2.0)
+    pdf = np.empty(COUNT, np.float32)
     density_rows(lobes, queries.wi, queries.wo, pdf)
     return lobes, pdf
 

@@ -16,18 +16,10 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.truth.cloths import woven
+from tests.pipeline.models.against_truth import colour_error, truth_of
+from tests.pipeline.truth.cloths import irregular, woven
 from tests.presets import slow
-from weaves.draft import Matrix
 from weaves.fabric import load_fabric
-
-COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
-
-
-def relative_error(found, truth):
-    """Return the rms error of a grey fabric's colour over its mean."""
-    return math.sqrt(np.mean(((found - truth) @ COLOUR) ** 2)) / np.mean(truth @ COLOUR)
-
 
 SIZES = {"narrow": (0.05, 0.2), "middle": (0.3, 1.0), "wide": (3.0, 8.0)}
 
@@ -47,7 +39,7 @@ def test_without_shadows_they_are_the_truth(name, walls, bound):
         assert not gaps.any()
         found = np.concatenate([sums[:, :, OPEN_SPECULAR], sums[:, :, OPEN_DIFFUSE] / math.pi], axis=1)
         found /= sums[:, :, AREA].sum(axis=1, keepdims=True)
-        assert relative_error(found, estimate(fabric, queries, options, 1).mean) < bound, sigma
+        assert colour_error(found, estimate(fabric, queries, options, 1).mean) < bound, sigma
 
 
 CASES = {
@@ -69,8 +61,7 @@ def test_with_shadows_they_are_some_per_cent_off(case):
     table = tabulate(fabric)
     for sigma, bound in zip(((0.06, 0.24), (0.3, 1.0), (3.0, 8.0)), bounds, strict=True):
         queries = draw_queries(QueryOptions(sigma=sigma, max_angle=75.0), fabric.weave.repeat, 7, 0, 80)
-        truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
-        assert relative_error(read_queries(table, queries).components, truth) < bound
+        assert colour_error(read_queries(table, queries).components, truth_of(fabric, queries)) < bound
 
 
 @pytest.mark.slow
@@ -78,8 +69,8 @@ def test_each_level_errs_less_on_wide_footprints():
     """Measured on denim 2.1, 1.9, 1.2 and 1.1 %: twice the nodes across a yarn, from k = 2 to 4, count most."""
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=(0.8, 8.0)), fabric.weave.repeat, 12, 0, 160)
-    truth = estimate(fabric, queries, TruthOptions(relative_error=2e-3), 1).mean
-    errors = [relative_error(read_queries(tabulate(fabric, level=k), queries).components, truth) for k in DETAILS]
+    truth = truth_of(fabric, queries, relative_error=2e-3)
+    errors = [colour_error(read_queries(tabulate(fabric, level=k), queries).components, truth) for k in DETAILS]
     assert all(finer < coarser for coarser, finer in itertools.pairwise(errors)), errors
     assert errors[2] < 0.75 * errors[1]
 
@@ -93,8 +84,7 @@ def test_footprints_along_the_axes():
     turned = queries._replace(angle=np.full(60, math.pi / 2, np.float32))
     table = tabulate(fabric)
     for asked in (queries, turned):
-        truth = estimate(fabric, asked, TruthOptions(relative_error=0.01), 1).mean
-        assert relative_error(read_queries(table, asked).components, truth) < 0.04
+        assert colour_error(read_queries(table, asked).components, truth_of(fabric, asked)) < 0.04
     swapped = queries._replace(sigma=queries.sigma_minor, sigma_minor=queries.sigma)
     np.testing.assert_allclose(
         read_queries(table, turned).components, read_queries(table, swapped).components, rtol=1e-5
@@ -110,12 +100,12 @@ def test_footprints_at_an_angle(name, bound):
     groups = QueryOptions(sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
     queries = draw_queries(groups, fabric.weave.repeat, 9, 0, 96)
     assert np.abs(deviations(queries)[2]).max() > 0.7
-    table, truth = tabulate(fabric), estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean
+    table, truth = tabulate(fabric), truth_of(fabric, queries)
     size = np.sqrt(queries.sigma * queries.sigma_minor)
     rounded = queries._replace(sigma=size, sigma_minor=size)
-    wrong = relative_error(read_queries(table, queries).components, truth)
+    wrong = colour_error(read_queries(table, queries).components, truth)
     assert wrong < bound
-    assert relative_error(read_queries(table, rounded).components, truth) > 1.5 * wrong
+    assert colour_error(read_queries(table, rounded).components, truth) > 1.5 * wrong
 
 
 def test_long_footprints_and_low_viewers_are_cut():
@@ -153,12 +143,10 @@ def test_extremes_stay_finite_and_not_negative(width):
 @pytest.mark.parametrize("side", [7, 12])
 def test_irregular_drafts_of_many_floats(side):
     """Merged groups: wide footprints within 4 %."""
-    random = np.random.default_rng(side)
-    rows = tuple("".join("#" if over else "." for over in row) for row in random.random((side, side)) < 0.5)
-    fabric = woven("polyester_lining").model_copy(update={"draft": Matrix(rows=rows)})
+    fabric = irregular(side, seed=side)
     queries = draw_queries(QueryOptions(sigma=(2.0, 8.0), max_angle=75.0), fabric.weave.repeat, 7, 0, 40)
-    truth = estimate(fabric, queries, TruthOptions(estimator="r2", relative_error=0.01, max_count=1 << 14), 1).mean
-    assert relative_error(read_queries(tabulate(fabric), queries).components, truth) < 0.04
+    truth = truth_of(fabric, queries, estimator="r2", max_count=1 << 14)
+    assert colour_error(read_queries(tabulate(fabric), queries).components, truth) < 0.04
 
 
 @pytest.mark.parametrize("sigma", [(0.05, 0.2), (0.5, 1.2), (6.0, 9.0)], ids=["narrow", "middle", "wide"])

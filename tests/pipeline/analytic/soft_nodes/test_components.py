@@ -11,6 +11,7 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.analytic.methods import soft_table
+from tests.pipeline.models.against_truth import colour_error
 from tests.pipeline.truth.cloths import LOPSIDED
 from tests.presets import slow
 from weaves.draft import Matrix
@@ -37,9 +38,6 @@ def test_yarns_that_never_change_side(rows):
             assert np.isfinite(found).all()
 
 
-COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
-
-
 def asked(fabric, count=200, **options):
     queries = draw_queries(QueryOptions(behind=1.0, max_angle=75.0, **options), fabric.weave.repeat, 3, 0, count)
     assert (queries.wi[:, 2] < 0).all()
@@ -60,8 +58,7 @@ def test_it_is_near_the_truth(name, sigma, bound, clear):
     queries = asked(fabric, sigma=sigma)
     truth = estimate(fabric, queries, TruthOptions(relative_error=0.01, walls="left_out"), 1)
     found = read_behind(tabulate(fabric, behind=True, rims=False), queries)
-    wrong = (found[:, :4] - truth.mean) @ COLOUR
-    assert math.sqrt(np.mean(wrong**2)) < bound * np.mean(truth.mean @ COLOUR)
+    assert colour_error(found[:, :4], truth.mean) < bound
     assert math.sqrt(np.mean((found[:, 4] - truth.transparency) ** 2)) < clear
 
 

@@ -9,15 +9,8 @@ from pipeline.analytic.gauss_rules import gauss_rule
 from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL, gather, piece_rows
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, height_field, surface_at
 from pipeline.truth.geometry.pieces import cell_pieces
-from tests.pipeline.truth.cloths import woven
-from weaves.draft import Matrix
+from tests.pipeline.truth.cloths import irregular, woven
 from weaves.fabric import load_fabric
-
-
-def irregular(side):
-    random = np.random.default_rng(3)
-    rows = tuple("".join("#" if over else "." for over in row) for row in random.random((side, side)) < 0.5)
-    return load_fabric("polyester_lining").model_copy(update={"draft": Matrix(rows=rows)})
 
 
 def placed(fabric):
@@ -34,7 +27,7 @@ def test_regular_weaves_have_few_groups(name, groups):
 @pytest.mark.parametrize("level", DETAILS)
 @pytest.mark.parametrize("side", [8, 16])
 def test_many_different_floats_are_merged_and_no_cell_is_lost(side, level):
-    pieces, detail = placed(irregular(side)), DETAILS[level]
+    pieces, detail = placed(irregular(side, seed=3)), DETAILS[level]
     groups = gather(pieces, detail)
     nodes = [group.nodes for group in groups if group.piece.side == TOP]
     # Pieces that differ across are not merged: one group of each is left.

@@ -3,14 +3,8 @@ import pytest
 
 from pipeline.analytic.soft_nodes.nodes import AZIMUTHS, BLOCK_NODES, LEVELS, tabulate
 from pipeline.compiled.arrays import nbytes
-from tests.pipeline.truth.cloths import woven
+from tests.pipeline.truth.cloths import irregular
 from weaves.fabric import load_fabric
-
-
-def irregular(side, width):
-    random = np.random.default_rng(4)
-    rows = tuple("".join("#" if over else "." for over in row) for row in random.random((side, side)) < 0.5)
-    return woven("polyester_lining", rows, width=width)
 
 
 @pytest.mark.parametrize(
@@ -18,8 +12,8 @@ def irregular(side, width):
     [
         (load_fabric("polyester_lining"), 3.5e5),
         (load_fabric("satin_8"), 1e6),
-        (irregular(8, 1.0), 1.3e6),
-        (irregular(8, 0.8), 2e6),
+        (irregular(8, seed=4, width=1.0), 1.3e6),
+        (irregular(8, seed=4, width=0.8), 2e6),
     ],
     ids=["plain", "satin", "irregular", "irregular with gaps"],
 )

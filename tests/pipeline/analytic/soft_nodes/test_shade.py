@@ -8,6 +8,7 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, OPEN_DIFFUSE, OPEN_SPECULAR
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, WARP
 from pipeline.truth.scattering import slab
+from tests.directions import above
 from tests.pipeline.truth.cloths import woven
 
 DIRECTIONS = [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5)), ((0.2, 0.5), (0.2, -0.3))]
@@ -15,10 +16,6 @@ DIRECTIONS = [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5)), ((0.2, 0.5)
 RTOL = 1e-4
 """Some forty roundings of 6e-8, and ten times that where a highlight's narrow denominator is a small difference. A
 term that is wrong by 1 % changes a sum by 0.2 % at least."""
-
-
-def unit(x, y):
-    return np.float32([x, y, np.sqrt(1.0 - x * x - y * y)])
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +35,7 @@ def table(fabric):
 @pytest.mark.parametrize("pair", DIRECTIONS)
 def test_fixed_nodes(table, pair):
     """Area, diffuse and specular of whole boxes, from the normals and tangents that the table holds."""
-    wi, wo = (unit(*w) for w in pair)
+    wi, wo = (np.float32(above(*w)) for w in pair)
     nodes = table.nodes.transpose(1, 0, 2)
     towards = wo[:, None, None] * np.ones((1, *nodes.shape[1:]), np.float32)
     weft = slice(table.starts[1], table.starts[2])

@@ -11,15 +11,13 @@ from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA, OPEN_DIFFUSE, OPEN_SPECULAR
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side
-from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices, directions_of, ray_share
+from tests.pipeline.models.against_truth import colour_error, truth_of
 from tests.pipeline.truth.cloths import woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
-
-COLOUR = np.array([0.3, 0.3, 0.5, 0.5])
 
 
 @pytest.mark.parametrize("rims", [True, False])
@@ -91,6 +89,4 @@ def test_thin_footprints_are_near_the_truth(name, sigma, stretch, bound):
     options = QueryOptions(sigma=sigma, stretch=stretch, max_angle=80.0)
     queries = draw_queries(options, fabric.weave.repeat, 3, 0, 300)
     queries = queries.take(queries.sigma > 2.0 * queries.sigma_minor)
-    truth = estimate(fabric, queries, TruthOptions(relative_error=0.01), 1).mean @ COLOUR
-    found = read_queries(tabulate(fabric), queries).components @ COLOUR
-    assert math.sqrt(np.mean((found - truth) ** 2)) < bound * truth.mean()
+    assert colour_error(read_queries(tabulate(fabric), queries).components, truth_of(fabric, queries)) < bound

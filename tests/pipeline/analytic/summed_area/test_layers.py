@@ -6,7 +6,7 @@ import pytest
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.summed_area.clusters import sources
 from pipeline.analytic.summed_area.horizon_map import horizon_map
-from pipeline.analytic.summed_area.layers import MOST_LAYERS, HeightLayer, _share, layers_of
+from pipeline.analytic.summed_area.layers import MOST_LAYERS, HeightLayer, layer_share, layers_of
 from pipeline.analytic.summed_area.tables import GRID, LANES, tabulate
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP
@@ -27,7 +27,7 @@ def test_layers_have_all_of_a_cluster():
     apart = (highest - lowest) / (count - 1)
     middles = lowest + apart * np.arange(count)
     layers = [HeightLayer(np.float32(z), np.float32(0.5 * apart)) for z in middles]
-    shares = np.array([[_share(height, k, layer) for layer in layers] for k in range(LANES)])
+    shares = np.array([[layer_share(height, k, layer) for layer in layers] for k in range(LANES)])
     np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=2e-6)
     np.testing.assert_allclose(shares[: LANES // 2] @ middles, middle[: LANES // 2], atol=2e-6)
 

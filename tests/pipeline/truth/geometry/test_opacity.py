@@ -8,15 +8,13 @@ from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.opacity import coverage, grazing_cosine, hits, opacity
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.truth.cloths import fixed, woven
+from tests.pipeline.truth.cloths import CORDUROY, fixed, woven
 from tests.pipeline.truth.geometry.marches import leaves
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.surface import GAP, surface_at
 
 STEP = 0.0025
-CORDUROY = woven("denim", ("#",))
-"""Warps alone: straight half cylinders of radius 1/2 side by side, for closed forms."""
 
 
 def _wo(cosines, azimuth=0.0):

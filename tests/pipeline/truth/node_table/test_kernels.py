@@ -7,6 +7,7 @@ from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, height_field
 from pipeline.truth.node_table import kernels
 from pipeline.truth.node_table.build import FIRST_FINE, FIRST_NODE, NODES_X, NODES_Y, PIECE_FAMILY, tabulate
 from pipeline.truth.scattering import slab
+from tests.directions import above
 from tests.pipeline.truth.cloths import woven
 
 WI = [(0.3, -0.4), (-0.7, 0.3), (0.05, 0.02)]
@@ -17,10 +18,6 @@ RTOL = 1e-4
 """Some thirty roundings of 6e-8, and ten times that where a highlight's narrow denominator is a small difference. A
 term that is wrong by 1 % changes each share by 0.1 % at least: a layer is nowhere so thick that its depth plays no
 part."""
-
-
-def unit(x, y):
-    return np.array([x, y, math.sqrt(1.0 - x * x - y * y)])
 
 
 def direction(w):
@@ -71,15 +68,14 @@ def scattered(field, family, wi, wo, normal, tangent, inverse, **factors):
 def specular(cloth, case, behind, **factors):
     """Yield shares, their sum, and the shares in double precision, of every piece."""
     field, table = cloth
-    wi, wo = (unit(*w).astype(np.float32) for w in case)
+    wi, wo = (above(*w).astype(np.float32) for w in case)
     given = wi.astype(np.float64) * (-1 if behind else 1)
     size = np.float32(1.0 / ((given + wo) ** 2).sum())
     for family, _, fine in pieces(table):
         parts = [np.ascontiguousarray(row[fine]) for row in table.fine]
         lit, shares = np.ones_like(parts[0]), np.zeros_like(parts[0])
-        function = kernels.transmitted if behind else kernels.reflected
         surface, towards = (kernels.Normals(*parts[:4]), kernels.Tangents(*parts[4:])), (direction(wi), direction(wo))
-        total = function(*surface, *towards, size, layer(field, family), lit, shares)
+        total = kernels.scattered(*surface, *towards, size, layer(field, family), lit, shares, behind or None)
         wide = np.stack(parts).astype(np.float64)
         expected = scattered(field, family, given, wo.astype(np.float64), wide[:3], wide[4:], wide[3], **factors)
         yield shares, total, expected
@@ -108,7 +104,7 @@ def test_a_term_wrong_by_one_per_cent_is_seen(cloth, term, behind):
 def test_area_diffuse_and_unscattered(cloth, case):
     """The horizon lies below every direction, so that only cosines decide."""
     field, table = cloth
-    wi, wo = (unit(*w).astype(np.float32) for w in case)
+    wi, wo = (above(*w).astype(np.float32) for w in case)
     for family, nodes, fine in pieces(table):
         normal = kernels.Normals(*(np.ascontiguousarray(row[nodes]) for row in table.normal))
         count = len(normal.x)
