@@ -2,7 +2,7 @@
 
 The variant scalar_rgb works everywhere; the LLVM one is many times as fast.
 
-Mitsuba looks for LLVM itself (`DRJIT_LIBLLVM_PATH` names one). Versions before 16 end the process when a kernel is
+Mitsuba looks for LLVM itself (`DRJIT_LIBLLVM_PATH` names one). Versions up to 16 end the process when a kernel is
 compiled that they cannot, so another process tries the same kinds of kernel first.
 
 A plugin of Mitsuba is a library, ``plugins/<type>.so``, which it looks for in the current folder and beside a scene's
@@ -25,7 +25,6 @@ _TRIAL = """
 import drjit
 import mitsuba
 mitsuba.set_variant("llvm_ad_rgb")
-assert drjit.detail.llvm_version() >= (16,)
 scene = mitsuba.load_dict({
     "type": "scene",
     "ball": {"type": "sphere"},
