@@ -158,7 +158,6 @@ def shade_lines(
     rays: LineRays,
     light: GridHorizons,
     bent: Falls,
-    size: int,
     sharpness: np.float32,
     d: YarnDirections,
     yarn: Float32,
@@ -167,13 +166,14 @@ def shade_lines(
     behind: Behind,
     hidden_ends: bool = False,
 ) -> Six:
-    """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids of `size` cells.
+    """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids.
 
     With the light behind, `light` has the horizons of the back. With `hidden_ends` the back then shows, at the rim
     where a float ends, the upright edge of a crossing yarn: light from the float's side does not reach it.
     """
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
     layer = yarn_layer(yarn, thickness)
+    size = light.size
     step_a, step_b = (1, size) if family == WARP else (size, 1)
     level, sharp = (d.iz if behind is None else -d.iz) * _LEVELS, sharpness / _LEVELS
     near_end = _NEAR_END if hidden_ends else -_1

@@ -106,9 +106,10 @@ class NodeHorizons(NamedTuple):
 
 
 class GridHorizons(NamedTuple):
-    """Grids of horizons, and what leads from a node's cell to those at the azimuths around a direction."""
+    """Grids of `size` x `size` horizons, and what leads from a node's cell to those at the azimuths of a direction."""
 
     grid: npt.NDArray[np.uint8]
+    size: int
     low: np.uint32
     high: np.uint32
     turn: np.float32

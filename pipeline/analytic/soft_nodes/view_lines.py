@@ -418,7 +418,7 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
     rays = LineRays(run, np.float32(table.plane), np.float32(2.0) * look.bend_o * run * run, inverse)
     back, of_warp, size = look.iz < _0, table.kinds[0], table.grid.shape[2]
     grid = scratch.behind_grid if back else scratch.grid
-    light = GridHorizons(grid, *_offsets(table, look.low_i, look.high_i), look.turn_i)
+    light = GridHorizons(grid, size, *_offsets(table, look.low_i, look.high_i), look.turn_i)
     sharp, thickness = sharpness_of_points(min(look.narrowest, _BOX)), np.float32(table.thickness)
     bent = scratch.grid_falls, bend_of(look.bend_i)
     for kind in range(len(result)):
@@ -430,10 +430,10 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
         draft, firsts, yarn, own = scratch.drafts[kind], scratch.firsts[kind, :count], table.yarn[family], result[kind]
         if back:
             hidden = bool(table.heights[1 - family, RADIUS] >= 0.5)  # no gap beside the crossing yarn
-            sums = shade_lines(draft, firsts, rays, light, None, size, sharp, d, yarn, family, thickness, True, hidden)
+            sums = shade_lines(draft, firsts, rays, light, None, sharp, d, yarn, family, thickness, True, hidden)
         elif look.bend_i > _0:
-            sums = shade_lines(draft, firsts, rays, light, bent, size, sharp, d, yarn, family, thickness, None)
+            sums = shade_lines(draft, firsts, rays, light, bent, sharp, d, yarn, family, thickness, None)
         else:
-            sums = shade_lines(draft, firsts, rays, light, None, size, sharp, d, yarn, family, thickness, None)
+            sums = shade_lines(draft, firsts, rays, light, None, sharp, d, yarn, family, thickness, None)
         write_sums(sums, own)
     return gaps
