@@ -1,0 +1,1 @@
+"""A fabric from what was measured on a cloth."""
