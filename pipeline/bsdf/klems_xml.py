@@ -115,7 +115,7 @@ def read_klems(path: Path) -> Scattering:
             kind, side = _name(where, block, "WavelengthDataDirection", tuple(_BLOCKS)).lower().split()
             values = _values(where, block.findtext("{*}ScatteringData", ""), basis.patches)
             blocks = bands.setdefault(band, np.full((2, 2, basis.patches, basis.patches), np.nan))
-            blocks[SCATTERED.index(kind), FACES.index(side)] = values  # type: ignore[arg-type]
+            blocks[SCATTERED.index(kind), FACES.index(side)] = values
     return Scattering(basis, {band: mirrored(basis, blocks) for band, blocks in bands.items()}).checked(where)
 
 

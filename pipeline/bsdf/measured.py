@@ -8,10 +8,9 @@ patches, labels as in Klems files) and `value` (1/sr, without the cosine). Pairs
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-import pyarrow as pa
 
 from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Basis, Scattering
 from pipeline.bsdf.klems_xml import mirrored, read_klems
@@ -43,7 +42,9 @@ def _read_parquet(path: Path) -> Scattering:
     where = str(path)
     with open_queries(path) as file:
         if missing := [name for name in COLUMNS_NEEDED if name not in file.schema_arrow.names]:
-            raise BadInput(where, "", f"columns missing: {', '.join(missing)}", f"{', '.join(COLUMNS_NEEDED)} are needed")
+            raise BadInput(
+                where, "", f"columns missing: {', '.join(missing)}", f"{', '.join(COLUMNS_NEEDED)} are needed"
+            )
         if not 0 < file.metadata.num_rows <= _MOST_ROWS:
             raise BadInput(where, "rows", file.metadata.num_rows, f"1 to {_MOST_ROWS} are needed")
         table = file.read(columns=list(COLUMNS_NEEDED))
@@ -60,21 +61,21 @@ def _read_parquet(path: Path) -> Scattering:
     return Scattering(basis, {"visible": mirrored(basis, blocks)})
 
 
-def _numbers(where: str, table: pa.Table, name: str, known: tuple[str, str]) -> Index:
+def _numbers(where: str, table: Any, name: str, known: tuple[str, str]) -> Index:
     """Return the numbers of words of a column, (N,)."""
-    words = table[name].cast(pa.string()).to_pylist()
+    words = table[name].to_pylist()
     if strange := set(words) - set(known):
         raise BadInput(where, name, strange.pop(), f"must be {' or '.join(known)}")
     return np.array([known.index(word) for word in words])
 
 
-def _column(where: str, table: pa.Table, name: str) -> Float64:
-    if not (pa.types.is_floating(table.schema.field(name).type) or pa.types.is_integer(table.schema.field(name).type)):
+def _column(where: str, table: Any, name: str) -> Float64:
+    values = table[name].to_numpy()
+    if values.dtype.kind not in "fiu":
         raise BadInput(where, f"type of column {name}", str(table.schema.field(name).type), "numbers are needed")
-    values = np.asarray(table[name].to_numpy(), np.float64)
     if not np.isfinite(values).all():
         raise BadInput(where, name, "not a finite number", "finite numbers are needed")
-    return values
+    return np.asarray(values, np.float64)
 
 
 def _patches(basis: Basis, theta: Float64, phi: Float64) -> Index:

@@ -1,4 +1,4 @@
-"""Files of measured BSDFs: what is written is read, the shipped shade has the laboratory's numbers, faults are named."""
+"""Files of measured BSDFs: what is written is read, the shipped shade has the laboratory's numbers."""
 
 import re
 
@@ -46,7 +46,14 @@ def test_the_measured_shade_has_the_laboratory_s_numbers():
 
 
 def table(**columns):
-    rows = {"kind": "reflection", "side": "front", "theta_in": 0.0, "phi_in": 0.0, "theta_out": 9.0 + 9.0, "phi_out": 0.0}
+    rows = {
+        "kind": "reflection",
+        "side": "front",
+        "theta_in": 0.0,
+        "phi_in": 0.0,
+        "theta_out": 9.0 + 9.0,
+        "phi_out": 0.0,
+    }
     return pa.table({name: [value] for name, value in (rows | {"value": 0.1} | columns).items() if value is not None})
 
 
