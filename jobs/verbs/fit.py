@@ -34,9 +34,9 @@ def fit(
     held_out: Annotated[bool, Parameter(help="Print what fits predict of data that they were not given.")] = False,
 ) -> None:
     """Write a fabric that has the numbers of a measurement, and print these with intervals; BadInput for bad data."""
-    from pipeline.fitting.measured import SHIPPED
+    from pipeline.fitting.measured import MEASURED
 
-    path = SHIPPED.get(str(data), data)
+    path = MEASURED.get(str(data), data)
     if not held_out:
         if out is None or out.suffix != ".toml":
             raise BadInput("fit", "--out", "" if out is None else str(out), "a path that ends in .toml is needed")

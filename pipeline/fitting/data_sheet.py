@@ -19,8 +19,8 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, Strict, model_validator
 
-from pipeline.fitting.fitted import DRAFTS, Estimate
-from pipeline.fitting.layer import scattering_of, transmittance_of
+from pipeline.fitting.fitted import DRAFTS, Interval
+from pipeline.fitting.two_streams import scattering_of, transmittance_of
 from weaves.count import PerCm
 from weaves.errors import BadInput, nearest
 from weaves.reading import MOST_TEXT, read_text
@@ -121,8 +121,9 @@ def _csv_row(path: Path, product: str) -> dict[str, Any]:
     bands: dict[str, dict[str, Any]] = {}
     for line in _lines(path):
         if line.pop("product", None) == product:
+            band = line.pop("band", "visible")
             try:
-                bands[line.pop("band", "visible")] = {key: float(text) for key, text in line.items() if text}
+                bands[band] = {key: float(text) for key, text in line.items() if text}
             except ValueError as error:
                 raise BadInput(str(path), product, str(error), "numbers are needed") from error
     if "visible" not in bands:
@@ -130,7 +131,7 @@ def _csv_row(path: Path, product: str) -> dict[str, Any]:
     return {"name": product, **bands.pop("visible"), **bands}
 
 
-def dyed(band: SheetBand, white: SheetBand) -> Estimate:
+def dyed(band: SheetBand, white: SheetBand) -> Interval:
     """Return the transmittance of a band whose yarns scatter like white ones of a known transmittance.
 
     Both are a diffusing layer beside gaps; the interval has two errors of a sheet in the reflectance.
@@ -141,10 +142,10 @@ def dyed(band: SheetBand, white: SheetBand) -> Estimate:
         straight + (1.0 - straight) * transmittance_of((band.reflectance + step) / (1.0 - straight), scattering)
         for step in (0.0, -2.0 * SHEET_NOISE, 2.0 * SHEET_NOISE)
     ]
-    return Estimate(values[0], min(values), max(values))
+    return Interval(values[0], min(values), max(values))
 
 
-def other_band(sheet: DataSheet, white: DataSheet) -> Estimate:
+def other_band(sheet: DataSheet, white: DataSheet) -> Interval:
     """Return the solar transmittance of a sheet from its visible band and its solar reflectance.
 
     Two ways: what is scattered through grows as what is scattered back; or the infrared part is a layer with the
@@ -154,7 +155,7 @@ def other_band(sheet: DataSheet, white: DataSheet) -> Estimate:
     grown = sheet.solar.direct_transmittance + sheet.scattered * sheet.solar.reflectance / sheet.reflectance
     layered = dyed(_infrared(sheet), _infrared(white)).value
     ways = grown, VISIBLE_SHARE * (sheet.transmittance or 0.0) + (1.0 - VISIBLE_SHARE) * layered
-    return Estimate(sum(ways) / 2.0, min(ways) - SHEET_NOISE, max(ways) + SHEET_NOISE)
+    return Interval(sum(ways) / 2.0, min(ways) - SHEET_NOISE, max(ways) + SHEET_NOISE)
 
 
 def _infrared(sheet: DataSheet) -> SheetBand:
@@ -180,7 +181,7 @@ def completed(sheet: DataSheet, white: DataSheet | None) -> tuple[DataSheet, lis
             continue
         straight = band.direct_transmittance
         guess, way = (
-            Estimate(straight, straight, 1.0 - band.reflectance),
+            Interval(straight, straight, 1.0 - band.reflectance),
             "what goes straight: --like names white yarns",
         )
         if like is not None and like.transmittance is not None:

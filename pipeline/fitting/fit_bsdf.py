@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.bsdf.klems import Scattering
 from pipeline.compiled.arrays import Mask
-from pipeline.fitting.fitted import DRAFTS, LEAST_THICKNESS, Estimate, Fitted, cloth
+from pipeline.fitting.fitted import DRAFTS, LEAST_THICKNESS, Fitted, Interval, cloth
 from pipeline.fitting.geometry import (
     LEAST_STRAIGHT,
     STRAIGHT_NOISE,
@@ -22,9 +22,9 @@ from pipeline.fitting.geometry import (
     geometry_numbers,
     straight_of,
 )
-from pipeline.fitting.optics import SCATTERED_NOISE, fit_optics, optics_numbers
+from pipeline.fitting.optics import fit_optics, optics_numbers
 from pipeline.fitting.predicted import predict
-from pipeline.fitting.scattered import quick_tables, with_colours
+from pipeline.fitting.scattered import with_colours
 from weaves.errors import BadInput
 
 _RESAMPLINGS = 12
@@ -59,12 +59,12 @@ def fit_bsdf(
         geometries[draft] = _closed(draft) if closed else fit_geometry(scattering.basis, straight, draft)
         fabric = geometries[draft].fabric.model_copy(update={"optical_thickness": thickness})
         optics[draft] = fit_optics(scattering, band, lights, fabric)
-        scores[draft] = math.hypot(geometries[draft].error / STRAIGHT_NOISE, optics[draft].error / SCATTERED_NOISE)
+        scores[draft] = math.hypot(geometries[draft].error / STRAIGHT_NOISE, optics[draft].error)
         advance(2 * len(scores) / steps)
     best = min(scores, key=scores.__getitem__)
     fit, numbers = optics[best], {} if closed else geometry_numbers(geometries[best], len(straight.patches))
-    colours, of_optics = optics_numbers(fit, quick_tables(), resamplings)
-    numbers |= of_optics | {"optical_thickness": Estimate(thickness, least, 100.0)}
+    colours, of_optics = optics_numbers(fit, resamplings)
+    numbers |= of_optics | {"optical_thickness": Interval(thickness, least, 100.0)}
     fabric = with_colours(fit.scatterer.fabric, colours, fit.optics).model_copy(update={"name": name})
     errors = predict(fabric, scattering, band, lights).errors(scattering, band)
     advance(1.0)
@@ -90,7 +90,7 @@ def _assumed(closed: bool) -> list[str]:
     ]
 
 
-def _unknown(numbers: dict[str, Estimate], drafts: dict[str, float]) -> list[str]:
+def _unknown(numbers: dict[str, Interval], drafts: dict[str, float]) -> list[str]:
     near = [draft for draft, score in drafts.items() if score <= 1.1 * min(drafts.values())]
     wide = [
         f"{key} ({number.low:.3g} to {number.high:.3g})"
@@ -99,4 +99,4 @@ def _unknown(numbers: dict[str, Estimate], drafts: dict[str, float]) -> list[str
     ]
     sentences = [f"Hardly determined: {', '.join(wide)}."] if wide else []
     sentences += [f"Drafts within a tenth of the best: {', '.join(near)}."] if len(near) > 1 else []
-    return [*sentences, "The optical thickness has a lower bound only; right and left of a twill are not told apart."]
+    return [*sentences, "The optical thickness has a lower bound only; right and left of a twill are one."]

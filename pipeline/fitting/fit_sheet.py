@@ -16,12 +16,12 @@ from scipy.optimize import least_squares
 from pipeline.bsdf.klems import BASES
 from pipeline.compiled.arrays import Float64
 from pipeline.fitting.data_sheet import SHEET_NOISE, DataSheet, SheetBand
-from pipeline.fitting.fitted import DRAFTS, Estimate, Fitted, cloth
-from pipeline.fitting.scattered import Optics, Pairs, Scatterer, quick_tables, with_colours, within_energy
+from pipeline.fitting.fitted import DRAFTS, Fitted, Interval, cloth
+from pipeline.fitting.scattered import Pairs, Scatterer, YarnOptics, with_colours, within_energy
 from weaves.count import with_widths
 from weaves.errors import BadInput
 
-_OPTICS: Final = Optics((0.4, 0.4), 0.5)
+_OPTICS: Final = YarnOptics((0.4, 0.4), 0.5)
 _SPECULAR, _BEND = 0.04, 25.0
 _EQUAL = 0.01  # reflectances that differ by less are one
 _NARROW = 0.02, 0.5  # by which the openness of counts may differ, and as a part of the stated one
@@ -45,12 +45,12 @@ def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
     fabric = fabric.model_copy(update={"name": name, "yarns_per_cm": sheet.sett})
     basis = BASES["LBNL/Klems Quarter"]
     kind, side, out = (index.ravel() for index in np.indices((2, 2, basis.patches)))
-    scatterer, tables = Scatterer(fabric, basis, Pairs(kind, side, out, np.zeros_like(kind))), quick_tables()
+    scatterer = Scatterer(fabric, basis, Pairs(kind, side, out, np.zeros_like(kind)))
     unit, size = scatterer.components(_OPTICS), basis.projected_solid_angle
 
     def shares(colours: Float64) -> Float64:
         """Return reflectances and scattered transmittances of both faces, (2, 2)."""
-        values = unit @ colours + scatterer.bounced(within_energy(fabric, colours), tables)
+        values = unit @ colours + scatterer.bounced(colours)
         return np.asarray(values.reshape(2, 2, -1) @ size)
 
     gap, fits = (1.0 - widths[0]) * (1.0 - widths[1]), []
@@ -59,7 +59,7 @@ def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
         numbers = {"openness": (gap, SHEET_NOISE)}
         keys = [f"{yarn}.{key}" for key in ("diffuse", "diffuse_transmission") for yarn in ("warp", "weft")]
         numbers |= {key: (float(v), float(e)) for key, v, e in zip(keys, colours[2:], errors, strict=True)}
-        estimates = {key: Estimate(v, max(v - e, 0.0), v + e) for key, (v, e) in numbers.items()}
+        estimates = {key: Interval(v, max(v - e, 0.0), v + e) for key, (v, e) in numbers.items()}
         coloured = with_colours(fabric, within_energy(fabric, colours), _OPTICS)
         unknown = ["Normal incidence determines no bend, roughness, twist or optical thickness."]
         fits.append(Fitted(coloured, estimates, {"shares": left}, {draft: left / SHEET_NOISE}, assumed, unknown))

@@ -1,4 +1,4 @@
-"""What a fit returns: a fabric, its numbers with intervals, errors, and sentences on what is assumed and not told."""
+"""Fabrics that were fitted: numbers with intervals, errors, sentences on what is assumed and what is not known."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LEAST_THICKNESS: Final = 8.0
 """Optical thickness that is assumed if the data state no larger one: nothing goes straight through a yarn."""
 
 
-class Estimate(NamedTuple):
+class Interval(NamedTuple):
     """A number with its interval."""
 
     value: float
@@ -46,7 +46,7 @@ class Fitted(NamedTuple):
     ----------
     fabric : Fabric
         With grey colours.
-    numbers : mapping of str to Estimate
+    numbers : mapping of str to Interval
         By their keys in a fabric file.
     errors : mapping of str to float
         Of what was fitted, relative to its mean.
@@ -57,7 +57,7 @@ class Fitted(NamedTuple):
     """
 
     fabric: Fabric
-    numbers: Mapping[str, Estimate]
+    numbers: Mapping[str, Interval]
     errors: Mapping[str, float]
     drafts: Mapping[str, float]
     assumed: Sequence[str]

@@ -16,7 +16,7 @@ from scipy.optimize import differential_evolution
 
 from pipeline.bsdf.klems import Basis, Scattering
 from pipeline.compiled.arrays import Float64, Index, Mask
-from pipeline.fitting.fitted import Estimate, cloth
+from pipeline.fitting.fitted import Interval, cloth
 from pipeline.fitting.straight import gap_rays, straight_share
 from weaves.fabric import Fabric
 
@@ -27,7 +27,7 @@ LEAST_STRAIGHT: Final = 1e-4
 """Share of light that goes straight through a cloth with gaps, at least."""
 
 _RAYS = 256  # of a patch
-_GENERATIONS, _MEMBERS = 30, 6  # members for each number
+_GENERATIONS, _MEMBERS = 45, 7  # members for each number
 _SPREAD = 0.8, 1.6  # of the openness, over the largest share that goes straight through
 _BOUNDS = [(0.1, 0.9), (0.0, 60.0), (0.0, 60.0), (math.log(0.05), math.log(2.0)), (math.log(0.05), math.log(2.0))]
 
@@ -105,7 +105,7 @@ def _columns(numbers: Float64) -> Float64:
     return np.stack([openness, *widths, *numbers[:, 2:4].T, *np.exp(numbers[:, 4:]).T])
 
 
-def geometry_numbers(geometry: Geometry, patches: int) -> dict[str, Estimate]:
+def geometry_numbers(geometry: Geometry, patches: int) -> dict[str, Interval]:
     """Return the numbers of a cloth that was fitted to so many patches, with intervals."""
     least = geometry.error**2
     noise = max(least * patches / max(patches - geometry.tried.shape[1], 1), STRAIGHT_NOISE**2)
@@ -113,6 +113,6 @@ def geometry_numbers(geometry: Geometry, patches: int) -> dict[str, Estimate]:
     best = _columns(geometry.tried[[geometry.errors.argmin()]])[:, 0]
     keys = ("openness", *(f"{yarn}.{name}" for name in ("width", "bend", "relief") for yarn in ("warp", "weft")))
     return {
-        key: Estimate(float(value), float(tried.min()), float(tried.max()))
+        key: Interval(float(value), float(tried.min()), float(tried.max()))
         for key, value, tried in zip(keys, best, good, strict=True)
     }

@@ -1,4 +1,4 @@
-"""What a fit predicts of what it was not given, beside rivals and the error of the measurement.
+"""Predictions of what a fit was not given, beside rivals.
 
 Rings of a BSDF are left out in turn: all light of one angle to the normal is predicted by a fit to the others.
 """
@@ -15,7 +15,7 @@ from pipeline.bsdf.klems import Scattering
 from pipeline.compiled.arrays import Mask
 from pipeline.fitting.data_sheet import dyed, other_band, products, read_sheet
 from pipeline.fitting.fit_bsdf import fit_bsdf, known_lights
-from pipeline.fitting.fitted import DRAFTS, Estimate
+from pipeline.fitting.fitted import DRAFTS, Interval
 from pipeline.fitting.geometry import straight_of
 from pipeline.fitting.predicted import Errors, Predicted, predict
 from pipeline.fitting.rivals import RIVALS
@@ -28,7 +28,7 @@ class SheetRow(NamedTuple):
     product: str
     band: str
     stated: float
-    predicted: Estimate
+    predicted: Interval
 
 
 def held_out_rings(

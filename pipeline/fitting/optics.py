@@ -9,26 +9,28 @@ from scipy.optimize import least_squares
 
 from pipeline.bsdf.klems import Scattering
 from pipeline.compiled.arrays import Float64, Mask
-from pipeline.fitting.fitted import Estimate
-from pipeline.fitting.scattered import COLOURS, Optics, Pairs, Scatterer, solve, solve_with_bounces
+from pipeline.fitting.fitted import Interval
+from pipeline.fitting.scattered import COLOURS, Pairs, Scatterer, YarnOptics, solve, solve_with_bounces
 from pipeline.fitting.straight import middles
-from pipeline.scenes.bounces import Tables
 from weaves.fabric import Fabric
 
 SCATTERED_NOISE: Final = 0.13
 """Error of a measured BSDF below 65 degrees, RMS over the mean: two laboratories."""
 
-_PAIRS = 6000
+FACE_NOISE: Final = 0.014
+"""Relative error of a measured reflectance: two laboratories."""
+
+_PAIRS = 4000
 _NEAR_STRAIGHT = np.cos(np.radians(16.0))
 _BOUNDS = [np.log(0.03), np.log(0.03), 0.0], [0.0, 0.0, 1.0]  # log roughnesses, blend
 _STEP = 0.02  # of differences
 
 
 class OpticsFit(NamedTuple):
-    """Optics and colours (6,) that were fitted without bounces, their error, and what is needed to go on."""
+    """YarnOptics and colours (6,) that were fitted without bounces, their error, and what is needed to go on."""
 
     scatterer: Scatterer
-    optics: Optics
+    optics: YarnOptics
     colours: Float64
     error: float
     values: Float64
@@ -62,8 +64,13 @@ def fit_optics(scattering: Scattering, band: str, lights: Mask, fabric: Fabric) 
     start = np.log(0.35), np.log(0.35), 0.5
     numbers = _refined(scatterer, values, weights, start, 12)
     colours = solve(scatterer.components(optics := _optics(numbers)), values, weights)
-    error = np.linalg.norm((scatterer.values(optics, colours) - values) * weights)
-    return OpticsFit(scatterer, optics, colours, float(error), values, weights)
+    once = scatterer.components(optics) @ colours
+    error = float(np.linalg.norm((once - values) * weights)) / SCATTERED_NOISE
+    ours, theirs = (np.bincount(pairs.block, part, 4)[:2] for part in (once, values))
+    off = np.abs(ours / np.maximum(theirs, 1e-9) - 1.0)[theirs > 0.0]
+    return OpticsFit(
+        scatterer, optics, colours, float(np.hypot(error, off.max(initial=0.0) / FACE_NOISE)), values, weights
+    )
 
 
 def _refined(
@@ -78,13 +85,13 @@ def _refined(
     return np.asarray(least_squares(residuals, start, bounds=_BOUNDS, diff_step=_STEP, max_nfev=evaluations).x)
 
 
-def _optics(numbers: Float64) -> Optics:
-    return Optics((float(np.exp(numbers[0])), float(np.exp(numbers[1]))), float(numbers[2]))
+def _optics(numbers: Float64) -> YarnOptics:
+    return YarnOptics((float(np.exp(numbers[0])), float(np.exp(numbers[1]))), float(numbers[2]))
 
 
-def optics_numbers(fit: OpticsFit, tables: Tables, resamplings: int) -> tuple[Float64, dict[str, Estimate]]:
+def optics_numbers(fit: OpticsFit, resamplings: int) -> tuple[Float64, dict[str, Interval]]:
     """Return the six colours with all bounces, and all numbers with intervals: 90 % of resamplings of the lights."""
-    colours = solve_with_bounces(fit.scatterer, fit.optics, fit.values, fit.weights, tables)
+    colours = solve_with_bounces(fit.scatterer, fit.optics, fit.values, fit.weights)
     roughness, blend = fit.optics
     start = float(np.log(roughness[0])), float(np.log(roughness[1])), blend
     random, samples = np.random.default_rng(1), []
@@ -101,4 +108,4 @@ def optics_numbers(fit: OpticsFit, tables: Tables, resamplings: int) -> tuple[Fl
     keys = ["warp.roughness", "weft.roughness", "blend"]
     keys += [f"{yarn}.{colour}" for colour in COLOURS for yarn in ("warp", "weft")]
     rows = zip(keys, best, np.minimum(low, best), np.maximum(high, best), strict=True)
-    return colours, {key: Estimate(*map(float, row)) for key, *row in rows}
+    return colours, {key: Interval(*map(float, row)) for key, *row in rows}

@@ -8,13 +8,13 @@ import numpy as np
 
 from pipeline.bsdf.klems import Scattering
 from pipeline.compiled.arrays import Float64, Mask
-from pipeline.fitting.geometry import LEAST_STRAIGHT, straight_of
+from pipeline.fitting.geometry import LEAST_STRAIGHT, images, straight_of
 from pipeline.fitting.optics import pairs_of
-from pipeline.fitting.scattered import COLOURS, Optics, Scatterer, quick_tables
+from pipeline.fitting.scattered import COLOURS, Scatterer, YarnOptics
 from pipeline.fitting.straight import gap_rays, straight_share
 from weaves.fabric import Fabric
 
-STEEPEST: Final = 65.0
+BRDF_ANGLE: Final = 65.0
 """Angle to the normal, degrees, up to which patches count in the error of a BSDF."""
 
 _RAYS = 1024  # of a patch
@@ -48,13 +48,15 @@ class Predicted(NamedTuple):
 
     def errors(self, scattering: Scattering, band: str) -> Errors:
         """Return the errors; NaN where nothing is predicted, or no light goes straight through."""
-        basis, lights = scattering.basis, np.isfinite(self.straight)
+        basis, lights = scattering.basis, np.zeros(scattering.basis.patches, np.bool_)
+        for patch in np.flatnonzero(np.isfinite(self.straight)):
+            lights[images(basis, patch)] = True
         straight, passed = straight_of(scattering, band, lights), np.nan
         if len(straight.patches) and straight.share.max() >= LEAST_STRAIGHT:
             passed = straight.error(self.straight[straight.patches])
         measured = np.where(np.isfinite(self.reflected), scattering.bands[band][0], np.nan)
         predicted = np.where(np.isfinite(measured), self.reflected, np.nan)
-        low = np.array(basis.bounds[1:])[basis.ring] <= STEEPEST
+        low = np.array(basis.bounds[1:])[basis.ring] <= BRDF_ANGLE
         low = np.isfinite(measured) & low[:, None] & low
         faces = [
             float(np.sqrt(np.mean((predicted - measured)[face][low[face]] ** 2)) / measured[face][low[face]].mean())
@@ -77,6 +79,6 @@ def predict(fabric: Fabric, scattering: Scattering, band: str, lights: Mask) -> 
     pairs = pairs_of(scattering, band, lights)
     pairs = pairs.take(np.flatnonzero(pairs.kind == 0))
     colours = np.array([getattr(y, f"{name}_rgb")[1] for name in COLOURS for y in (fabric.warp, fabric.weft)])
-    values = Scatterer(fabric, scattering.basis, pairs).values(Optics.of(fabric), colours, quick_tables())
+    values = Scatterer(fabric, scattering.basis, pairs).values(YarnOptics.of(fabric), colours)
     predicted.reflected[pairs.side, pairs.out, pairs.into] = values
     return predicted

@@ -32,9 +32,14 @@ from weaves.fabric import Fabric
 COLOURS: Final = ("specular", "diffuse", "diffuse_transmission")
 """Colours of a yarn; in vectors of six, of warp and weft each."""
 
-_LEVEL: Final = 4  # of detail of soft nodes
+_LEVEL: Final = 2  # of detail of soft nodes
 _WALKS: Final = 1 << 13  # of a table of bounces
 _PASSES: Final = 6
+
+_TABLES: Final[Tables] = (
+    PerFabric(partial(bounce_table, walks=_WALKS)),
+    PerFabric(partial(bounce_table, walks=_WALKS, through=True)),
+)
 
 
 class Pairs(NamedTuple):
@@ -55,14 +60,14 @@ class Pairs(NamedTuple):
         return Pairs(*(column[index] for column in self))
 
 
-class Optics(NamedTuple):
+class YarnOptics(NamedTuple):
     """Numbers of both yarns that shape the unit components."""
 
     roughness: tuple[float, float]
     blend: float
 
     @classmethod
-    def of(cls, fabric: Fabric) -> Optics:
+    def of(cls, fabric: Fabric) -> YarnOptics:
         """Return those of a fabric; its blend is the warp's."""
         return cls((fabric.warp.roughness, fabric.weft.roughness), fabric.warp.blend)
 
@@ -94,7 +99,7 @@ class Scatterer:
         self.queries = queries._replace(wi=queries.wi * mirror, wo=queries.wo * mirror)
         self._cosine = np.abs(self.queries.wi[:, 2]).astype(np.float64)
 
-    def components(self, optics: Optics) -> Float64:
+    def components(self, optics: YarnOptics) -> Float64:
         """Return the BSDF of each of the six colours, without bounces, (N, 6), 1/sr."""
         unit = np.zeros((len(self._cosine), 4))
         for side, table in enumerate(self.tables):
@@ -113,16 +118,16 @@ class Scatterer:
             [unit[:, :2], np.where(through, 0.0, unit[:, 2:]), np.where(through, unit[:, 2:], 0.0)], 1
         )
 
-    def bounced(self, colours: Float64, tables: Tables) -> Float64:
+    def bounced(self, colours: Float64) -> Float64:
         """Return the light of all bounces after the first for six colours, (N,), 1/sr."""
-        fabric = with_colours(self.fabric, colours)
-        light = seen_light(light_between(fabric, self.queries, tables), colours_of(fabric, self.queries))
+        # The tables know no roughness: one number of it lets all fits of a geometry share them.
+        fabric = with_colours(self.fabric, within_energy(self.fabric, colours), YarnOptics((0.4, 0.4), 0.5))
+        light = seen_light(light_between(fabric, self.queries, _TABLES), colours_of(fabric, self.queries))
         return np.asarray(light[:, :, 0].sum(axis=1) / self._cosine)
 
-    def values(self, optics: Optics, colours: Float64, tables: Tables | None = None) -> Float64:
-        """Return the BSDF of each pair, (N,), 1/sr; bounces need their tables."""
-        once = self.components(optics) @ colours
-        return once if tables is None else once + self.bounced(colours, tables)
+    def values(self, optics: YarnOptics, colours: Float64) -> Float64:
+        """Return the BSDF of each pair with all bounces, (N,), 1/sr."""
+        return np.asarray(self.components(optics) @ colours + self.bounced(colours))
 
 
 def solve(components: Float64, values: Float64, weights: Float64) -> Float64:
@@ -132,22 +137,13 @@ def solve(components: Float64, values: Float64, weights: Float64) -> Float64:
     return np.asarray(lsq_linear(triangle[:, :6], triangle[:, 6], bounds=(0.0, 1.0)).x)
 
 
-def solve_with_bounces(
-    scatterer: Scatterer, optics: Optics, values: Float64, weights: Float64, tables: Tables
-) -> Float64:
+def solve_with_bounces(scatterer: Scatterer, optics: YarnOptics, values: Float64, weights: Float64) -> Float64:
     """Return the six colours of which the light of all bounces has the least sum of squares, (6,)."""
     components = scatterer.components(optics)
     colours = solve(components, values, weights)
     for _ in range(_PASSES):
-        colours = solve(
-            components, values - scatterer.bounced(within_energy(scatterer.fabric, colours), tables), weights
-        )
+        colours = solve(components, values - scatterer.bounced(colours), weights)
     return within_energy(scatterer.fabric, colours)
-
-
-def quick_tables() -> Tables:
-    """Return tables of bounces of few walks, made at their first use."""
-    return PerFabric(partial(bounce_table, walks=_WALKS)), PerFabric(partial(bounce_table, walks=_WALKS, through=True))
 
 
 def within_energy(fabric: Fabric, colours: Float64) -> Float64:
@@ -161,7 +157,7 @@ def within_energy(fabric: Fabric, colours: Float64) -> Float64:
     return colours
 
 
-def with_colours(fabric: Fabric, colours: Float64, optics: Optics | None = None) -> Fabric:
+def with_colours(fabric: Fabric, colours: Float64, optics: YarnOptics | None = None) -> Fabric:
     """Return the fabric in six grey colours and, if given, with other optics."""
     yarns = {}
     for family, name in enumerate(("warp", "weft")):

@@ -9,8 +9,8 @@ from typing import Final
 
 SHADE: Final = Path(__file__).with_name("shade_6216.parquet")
 """A roller shade by a goniophotometer; light at 0, 10, 30, 50 and 70 degrees."""
-FABRICS: Final = Path(__file__).with_name("fabrics.csv")
+SCREENS: Final = Path(__file__).with_name("fabrics.csv")
 """Screens and awnings at normal incidence, two bands; empty cells were kept back."""
 
-SHIPPED: Final[Mapping[str, Path]] = MappingProxyType({path.stem: path for path in (SHADE, FABRICS)})
+MEASURED: Final[Mapping[str, Path]] = MappingProxyType({path.stem: path for path in (SHADE, SCREENS)})
 """Files by the names that the command line takes."""

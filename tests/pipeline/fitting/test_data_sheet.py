@@ -8,7 +8,7 @@ from pipeline.bsdf.of_fabric import fabric_bsdf
 from pipeline.fitting.data_sheet import completed, read_sheet
 from pipeline.fitting.fit_sheet import fit_sheet
 from pipeline.fitting.held_out import predicted_transmittances
-from pipeline.fitting.measured import FABRICS
+from pipeline.fitting.measured import SCREENS
 from tests.presets import slow
 from weaves.errors import BadInput
 
@@ -49,10 +49,10 @@ def test_the_truth_finds_these_shares_in_the_fabric(sheet, front):
 
 
 def test_counts_give_widths_and_thickness_reliefs(sheet):
-    counts = "sett = [18.0, 20.0]\ntex = [100.0, 80.0]\nthickness = 0.5\n"
+    counts = "sett = [18.0, 20.0]\ntex = [140.0, 115.0]\nthickness = 0.5\n"
     path = sheet(counts)
     # By weaves.count: 4 tex / (1000 pi 1.52 0.6) is the squared diameter in mm.
-    widths = [np.sqrt(4.0 * tex / (1e3 * np.pi * 1.52 * 0.6)) * n / 10.0 for tex, n in ((100.0, 18.0), (80.0, 20.0))]
+    widths = [np.sqrt(4.0 * tex / (1e3 * np.pi * 1.52 * 0.6)) * n / 10.0 for tex, n in ((140.0, 18.0), (115.0, 20.0))]
     fabric = fit_sheet(read_sheet(path), "screen")[0].fabric
     assert [fabric.warp.width, fabric.weft.width] == pytest.approx(widths)
     assert fabric.yarns_per_cm == (18.0, 20.0)
@@ -82,7 +82,7 @@ def test_a_sheet_that_contradicts_itself_is_refused_in_one_sentence(sheet, text,
 
 def test_second_bands_are_predicted_where_sheets_state_them():
     """Products whose two bands are stated: the interval has the stated transmittance, the value is within .02."""
-    rows = [row for row in predicted_transmittances(FABRICS) if np.isfinite(row.stated)]
+    rows = [row for row in predicted_transmittances(SCREENS) if np.isfinite(row.stated)]
     assert len(rows) == 3
     for row in rows:
         assert row.predicted.low <= row.stated <= row.predicted.high
@@ -91,7 +91,7 @@ def test_second_bands_are_predicted_where_sheets_state_them():
 
 def test_white_yarns_scatter_like_white_yarns():
     """NET 5 % white by the yarns of NET 1 % white: more than NET 1 % white by about the gaps, and no light is made."""
-    white = read_sheet(FABRICS, "Alkenz 3000 NET 1 % white")
-    sheet, remarks = completed(read_sheet(FABRICS, "Alkenz 3000 NET 5 % white"), white)
+    white = read_sheet(SCREENS, "Alkenz 3000 NET 1 % white")
+    sheet, remarks = completed(read_sheet(SCREENS, "Alkenz 3000 NET 5 % white"), white)
     assert len(remarks) == 2
     assert white.transmittance + 0.03 < sheet.transmittance < 1.0 - sheet.reflectance

@@ -8,12 +8,12 @@ from pipeline.bsdf.of_fabric import fabric_bsdf
 from pipeline.fitting.fit_bsdf import fit_bsdf
 from pipeline.fitting.fitted import cloth
 from pipeline.fitting.optics import fit_optics, optics_numbers
-from pipeline.fitting.scattered import Optics, Pairs, Scatterer, quick_tables, solve, with_colours
+from pipeline.fitting.scattered import Pairs, Scatterer, YarnOptics, solve, with_colours
 from weaves.errors import BadInput
 
 QUARTER = BASES["LBNL/Klems Quarter"]
 COLOURS = np.array([0.2, 0.1, 0.5, 0.15, 0.1, 0.05])
-OPTICS = Optics((0.3, 0.5), 0.7)
+OPTICS = YarnOptics((0.3, 0.5), 0.7)
 EVERYTHING = np.ones(QUARTER.patches, bool)
 
 
@@ -31,11 +31,11 @@ def test_colours_are_linear_without_bounces(geometry):
 def test_optics_are_found_again_from_light_of_all_bounces(geometry):
     """Other viewers within the patches, and 3 % of noise: numbers within their intervals, widened by a tenth."""
     pairs = Pairs(*(index.ravel() for index in np.indices((2, 2, QUARTER.patches, QUARTER.patches))))
-    values = Scatterer(geometry, QUARTER, pairs).values(OPTICS, COLOURS, tables := quick_tables())
+    values = Scatterer(geometry, QUARTER, pairs).values(OPTICS, COLOURS)
     values *= 1.0 + 0.03 * np.random.default_rng(4).standard_normal(len(values))
     data = Scattering(QUARTER, {"visible": values.reshape(2, 2, QUARTER.patches, QUARTER.patches)})
     fit = fit_optics(data, "visible", EVERYTHING, geometry)
-    colours, numbers = optics_numbers(fit, tables, 6)
+    colours, numbers = optics_numbers(fit, 6)
     truth = dict(zip(list(numbers), [*OPTICS.roughness, OPTICS.blend, *COLOURS], strict=True))
     for key in ("warp.roughness", "warp.diffuse", "weft.diffuse"):
         assert numbers[key].low - 0.1 * truth[key] <= truth[key] <= numbers[key].high + 0.1 * truth[key]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.fitting.layer import layer, scattering_of, transmittance_of
+from pipeline.fitting.two_streams import layer, scattering_of, transmittance_of
 
 
 @pytest.mark.parametrize("scattering", [0.3, 2.0, 8.0])
