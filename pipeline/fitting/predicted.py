@@ -50,7 +50,7 @@ class Predicted(NamedTuple):
         """Return the errors; NaN where nothing is predicted, or no light goes straight through."""
         basis, lights = scattering.basis, np.zeros(scattering.basis.patches, np.bool_)
         for patch in np.flatnonzero(np.isfinite(self.straight)):
-            lights[images(basis, patch)] = True
+            lights[images(basis, int(patch))] = True
         straight, passed = straight_of(scattering, band, lights), np.nan
         if len(straight.patches) and straight.share.max() >= LEAST_STRAIGHT:
             passed = straight.error(self.straight[straight.patches])
