@@ -97,8 +97,16 @@ class Scattering(NamedTuple):
     and `FACES`; NaN where nothing is known, (2, 2, P, P)."""
 
     def hemispherical(self, band: str) -> Float64:
-        """Return reflectance and transmittance of each face and patch of the light, (2, 2, P)."""
-        return np.asarray(np.einsum("ksoi,o->ksi", self.bands[band], self.basis.projected_solid_angle))
+        """Return reflectance and transmittance of each face and patch of the light, (2, 2, P).
+
+        Viewers of whom nothing is known count as the mean of the others; NaN if there are none.
+        """
+        known = np.einsum("ksoi,o->ksi", np.isfinite(self.bands[band]), self.basis.projected_solid_angle) / np.pi
+        return np.asarray(np.divide(self._sums(band), known, out=np.full(known.shape, np.nan), where=known > 0.0))
+
+    def _sums(self, band: str) -> Float64:
+        """Return the same without the viewers of whom nothing is known."""
+        return np.asarray(np.einsum("ksoi,o->ksi", np.nan_to_num(self.bands[band]), self.basis.projected_solid_angle))
 
     def direct(self, band: str) -> Float64:
         """Return the share of light that keeps its patch in transmission, (2, P), what is scattered there included."""
@@ -116,7 +124,7 @@ class Scattering(NamedTuple):
         for band, blocks in self.bands.items():
             if (blocks < 0.0).any():
                 raise BadInput(where, band, float(np.nanmin(blocks)), "values of a BSDF are at least 0")
-            most = float(np.nanmax(self.hemispherical(band).sum(axis=0), initial=0.0))
+            most = float(self._sums(band).sum(axis=0).max())
             if most > LARGEST_SUM:
                 allowed = f"reflectance and transmittance of a direction are at most {LARGEST_SUM} together"
                 raise BadInput(where, band, round(most, 4), allowed)

@@ -13,14 +13,18 @@ from xml.etree import ElementTree
 import numpy as np
 
 from pipeline.atomic import atomic_write
-from pipeline.bsdf.klems import FACES, SCATTERED, Basis, Scattering
+from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Basis, Scattering
 from pipeline.compiled.arrays import Float64
+from weaves.errors import BadInput, nearest, one_line
+from weaves.reading import MIB, read_bytes
 
 NAMESPACE: Final = "http://windows.lbl.gov"
+_NEEDED = "a BSDF file in XML"
 _BANDS: Final = {  # name in files, source and detector
     "visible": ("Visible", "CIE Illuminant D65 1nm.ssp", "ASTM E308 1931 Y.dsp"),
     "solar": ("Solar", "CIE Illuminant D65 1nm.ssp", "None"),
 }
+_BLOCKS = [f"{kind.capitalize()} {side.capitalize()}" for kind in SCATTERED for side in FACES]
 
 
 class LayerFacts(NamedTuple):
@@ -78,6 +82,53 @@ def write_klems(path: Path, scattering: Scattering, facts: LayerFacts) -> None:
                 _add(block, "ScatteringData", "\n".join(rows))
     ElementTree.indent(root)
     atomic_write(path, b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root))
+
+
+def read_klems(path: Path) -> Scattering:
+    """Read a file: its bands, in lower case, with NaN in the blocks that it lacks.
+
+    FileNotFoundError if there is none; BadInput if it has another basis, form or number of values, or makes light.
+    """
+    where = str(path)
+    try:
+        root = ElementTree.fromstring(read_bytes(path, 64 * MIB, _NEEDED))
+    except ElementTree.ParseError as error:
+        raise BadInput(where, "", f"broken XML ({one_line(error)})", f"{_NEEDED} is needed") from error
+    form = root.findtext(".//{*}IncidentDataStructure", "").strip()
+    if form != "Columns":
+        raise BadInput(where, "IncidentDataStructure", form, "must be Columns: matrices in a Klems basis are read")
+    bands: dict[str, Float64] = {}
+    basis = BASES[_name(where, root, "ColumnAngleBasis", tuple(BASES))]
+    for data in root.iterfind(".//{*}WavelengthData"):
+        band = data.findtext("{*}Wavelength", "").strip().lower()
+        for block in data.iterfind("{*}WavelengthDataBlock"):
+            for key in ("ColumnAngleBasis", "RowAngleBasis"):
+                _name(where, block, key, (basis.name,))
+            kind, side = _name(where, block, "WavelengthDataDirection", tuple(_BLOCKS)).lower().split()
+            values = _values(where, block.findtext("{*}ScatteringData", ""), basis.patches)
+            blocks = bands.setdefault(band, np.full((2, 2, basis.patches, basis.patches), np.nan))
+            blocks[SCATTERED.index(kind), FACES.index(side)] = values
+    return Scattering(basis, {band: mirrored(basis, blocks) for band, blocks in bands.items()}).checked(where)
+
+
+def _name(where: str, element: ElementTree.Element, key: str, known: tuple[str, ...]) -> str:
+    """Return the text of the first part of a name, which has to be known."""
+    text = element.findtext(f".//{{*}}{key}", "").strip()
+    if text not in known:
+        raise BadInput(where, key, text, nearest(text, known))
+    return text
+
+
+def _values(where: str, text: str, patches: int) -> Float64:
+    try:
+        values = np.array(text.replace(",", " ").split(), np.float64)
+    except ValueError as error:
+        raise BadInput(where, "ScatteringData", one_line(error, 60), "numbers are needed") from error
+    if len(values) != patches * patches:
+        raise BadInput(where, "values of ScatteringData", len(values), f"{patches} x {patches} are needed")
+    if not np.isfinite(values).all():
+        raise BadInput(where, "ScatteringData", "not a finite number", "finite numbers are needed")
+    return values.reshape(patches, patches)
 
 
 def mirrored(basis: Basis, blocks: Float64) -> Float64:

@@ -75,7 +75,7 @@ def fabric_bsdf(
         for side in (0, 1):
             seen, lit = (np.repeat(patch, points) for patch in (out, into))
             u, v, s, t = place.reshape(-1, 4).T
-            queries = _queries(fabric, basis, (lit, s, t), (seen, u, v), side, side ^ kind)
+            queries = pair_queries(fabric, basis, (lit, s, t), (seen, u, v), side, side ^ kind)
             answers = estimate(fabric, queries, truth, 4 * kind + side)
             for band, (cloth, weights) in cloths.items():
                 value = shade(cloth, answers.mean, queries) @ weights / np.abs(queries.wi[:, 2])
@@ -106,11 +106,14 @@ def _places(basis: Basis, points: int) -> Float64:
     return np.asarray(np.where(later[..., None, None], other, place) % 1.0)
 
 
-_Points = tuple[Index, Float64, Float64]
+PatchPoints = tuple[Index, Float64, Float64]
+"""Patches and where in them points lie, as `Basis.directions` takes them."""
 
 
-def _queries(fabric: Fabric, basis: Basis, lit: _Points, seen: _Points, lit_from: int, seen_from: int) -> Queries:
-    """Return queries of N pairs of points in patches; 0 is the front."""
+def pair_queries(
+    fabric: Fabric, basis: Basis, lit: PatchPoints, seen: PatchPoints, lit_from: int | Index, seen_from: int | Index
+) -> Queries:
+    """Return queries about the whole cloth of N pairs of points in patches; sides are 0, the front, or 1."""
     wi, wo = basis.directions(*_below(basis, lit)) * _LABELS, basis.directions(*_below(basis, seen))
     wi[:, 2] *= 1 - 2 * lit_from
     wo[:, 2] *= 1 - 2 * seen_from
@@ -118,7 +121,7 @@ def _queries(fabric: Fabric, basis: Basis, lit: _Points, seen: _Points, lit_from
     return Queries.round(nothing, nothing, nothing + max(EVEN_SIGMA, *fabric.weave.repeat), _float32(wi), _float32(wo))
 
 
-def _below(basis: Basis, points: _Points) -> _Points:
+def _below(basis: Basis, points: PatchPoints) -> PatchPoints:
     """Return points no lower than the lowest view of the truth."""
     patch, u, v = points
     square = np.sin(np.radians(basis.bounds)) ** 2
@@ -131,7 +134,7 @@ def _direct(fabric: Fabric, basis: Basis, truth: TruthOptions) -> Float64:
     place = qmc.Sobol(2, scramble=False).random(_OF_DIRECT)
     patch, (u, v) = np.repeat(np.arange(basis.patches), len(place)), np.tile(place, (basis.patches, 1)).T
     # The light plays no part in the transparency; in front it is cheap.
-    through = estimate(fabric, _queries(fabric, basis, (patch, u, v), (patch, u, v), 0, 0), truth, 9).transparency
+    through = estimate(fabric, pair_queries(fabric, basis, (patch, u, v), (patch, u, v), 0, 0), truth, 9).transparency
     share = through.reshape(basis.patches, -1).mean(axis=1).astype(np.float64)
     return np.asarray(0.5 * (share + share[basis.opposite]))
 

@@ -11,8 +11,8 @@ from tests.lint.tree import DOORS, MODULES, PACKAGES, ROOT, TESTS, Source, bound
 # Imports point to the left (upwards in this list) only.
 ORDER = [
     "weaves", "pipeline", "pipeline.compiled", "pipeline.truth", "pipeline.analytic", "pipeline.materials",
-    "pipeline.shards", "pipeline.scenes", "pipeline.bsdf", "pipeline.models", "pipeline.shader",
-    "pipeline.mitsuba", "pipeline.training",
+    "pipeline.shards", "pipeline.scenes", "pipeline.bsdf", "pipeline.fitting", "pipeline.models",
+    "pipeline.shader", "pipeline.mitsuba", "pipeline.training",
     "reports", "reports.images", "reports.viewer", "reports.exports", "reports.measure", "reports.truth",
     "reports.tables", "reports.page",
     "jobs", "jobs.recipe", "jobs.plan", "jobs.run", "jobs.verbs", "jobs.cli", "jobs.entry",

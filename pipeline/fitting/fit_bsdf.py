@@ -1,0 +1,102 @@
+"""A fabric from a measured BSDF: light straight through gives the geometry, what is scattered the optics of the yarns.
+
+Each of `DRAFTS` has its own best geometry and optics. The draft is the one whose errors, in units of those of
+laboratories, are least.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pipeline.bsdf.klems import Scattering
+from pipeline.compiled.arrays import Mask
+from pipeline.fitting.fitted import DRAFTS, LEAST_THICKNESS, Fitted, Interval, cloth
+from pipeline.fitting.geometry import (
+    LEAST_STRAIGHT,
+    STRAIGHT_NOISE,
+    Geometry,
+    fit_geometry,
+    geometry_numbers,
+    straight_of,
+)
+from pipeline.fitting.optics import fit_optics, optics_numbers
+from pipeline.fitting.predicted import predict
+from pipeline.fitting.scattered import with_colours
+from weaves.errors import BadInput
+
+_RESAMPLINGS = 12
+_USUAL_BEND = 25.0
+_WIDE = 0.6  # part of a number's range, beyond which the data are said not to determine it
+_RANGES = {"bend": 60.0, "relief": 1.95, "roughness": 0.97, "blend": 1.0, "width": 0.9}
+
+
+def fit_bsdf(
+    scattering: Scattering,
+    band: str,
+    name: str,
+    advance: Callable[[float], None],
+    lights: Mask | None = None,
+    drafts: Sequence[str] = tuple(DRAFTS),
+    resamplings: int = _RESAMPLINGS,
+) -> Fitted:
+    """Fit a fabric of a name to a band of a BSDF; BadInput if nothing of it is known.
+
+    `lights` (P,) are the patches of the light that are fitted, if not all. `advance` takes the share that is done.
+    """
+    known = known_lights(scattering, band)
+    lights = known if lights is None else lights & known
+    if not lights.any():
+        raise BadInput(name, band, "nothing", "the BSDF of some directions of the light is needed")
+    straight = straight_of(scattering, band, lights & (scattering.basis.ring > 0))
+    closed = not len(straight.patches) or straight.share.max() < LEAST_STRAIGHT
+    least = 0.0 if closed else -math.log(max(straight.share.min(), 1e-6))
+    thickness, steps = max(LEAST_THICKNESS, least), 2 * len(drafts) + 4
+    geometries, optics, scores = {}, {}, {}
+    for draft in drafts:
+        geometries[draft] = _closed(draft) if closed else fit_geometry(scattering.basis, straight, draft)
+        fabric = geometries[draft].fabric.model_copy(update={"optical_thickness": thickness})
+        optics[draft] = fit_optics(scattering, band, lights, fabric)
+        scores[draft] = math.hypot(geometries[draft].error / STRAIGHT_NOISE, optics[draft].error)
+        advance(2 * len(scores) / steps)
+    best = min(scores, key=scores.__getitem__)
+    fit, numbers = optics[best], {} if closed else geometry_numbers(geometries[best], len(straight.patches))
+    colours, of_optics = optics_numbers(fit, resamplings)
+    numbers |= of_optics | {"optical_thickness": Interval(thickness, least, 100.0)}
+    fabric = with_colours(fit.scatterer.fabric, colours, fit.optics).model_copy(update={"name": name})
+    errors = predict(fabric, scattering, band, lights).errors(scattering, band)
+    advance(1.0)
+    ranked = dict(sorted(scores.items(), key=lambda item: item[1]))
+    return Fitted(fabric, numbers, errors._asdict(), ranked, _assumed(closed), _unknown(numbers, ranked))
+
+
+def known_lights(scattering: Scattering, band: str) -> Mask:
+    """Return the patches of the light of which something is known, (P,)."""
+    return np.asarray(np.isfinite(scattering.bands[band]).any(axis=(0, 1, 2)))
+
+
+def _closed(draft: str) -> Geometry:
+    return Geometry(cloth(draft, (1.0, 1.0), (_USUAL_BEND,) * 2, (1.0, 1.0)), 0.0, np.empty((0, 6)), np.empty(0))
+
+
+def _assumed(closed: bool) -> list[str]:
+    geometry = [f"No light goes straight through: widths are 1, bends {_USUAL_BEND:g} degrees, reliefs 1."]
+    return [
+        *(geometry if closed else []),
+        "A cloth and its mirror image count as one; fibres are not twisted; both yarns have one blend.",
+        "Yarns are opaque to light straight through; colours are grey.",
+    ]
+
+
+def _unknown(numbers: dict[str, Interval], drafts: dict[str, float]) -> list[str]:
+    near = [draft for draft, score in drafts.items() if score <= 1.1 * min(drafts.values())]
+    wide = [
+        f"{key} ({number.low:.3g} to {number.high:.3g})"
+        for key, number in numbers.items()
+        if number.high - number.low > _WIDE * _RANGES.get(key.rpartition(".")[2], math.inf)
+    ]
+    sentences = [f"Hardly determined: {', '.join(wide)}."] if wide else []
+    sentences += [f"Drafts within a tenth of the best: {', '.join(near)}."] if len(near) > 1 else []
+    return [*sentences, "The optical thickness has a lower bound only; right and left of a twill are one."]

@@ -1,0 +1,172 @@
+"""Scattered light of a cloth for pairs of patches: linear in the colours but for the bounces between yarns.
+
+    f = k_s,w S_w + k_s,f S_f + k_d,w C_w + k_d,f C_f + bounces(k)       (in transmission k_dt in place of k_d)
+
+The unit components come from soft nodes (pipeline.analytic): roughnesses and blend change their sums, not their tables.
+So colours follow from roughnesses by linear least squares (separable least squares, [Golub2003Separable]), with the
+bounces of the colours before subtracted, until they agree.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from pipeline.analytic.bounces.table import bounce_table
+from pipeline.analytic.soft_nodes.components import read_behind, read_queries
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.bsdf.klems import Basis
+from pipeline.bsdf.of_fabric import pair_queries
+from pipeline.compiled.arrays import Float64, Index
+from pipeline.fitting.straight import middles
+from pipeline.per_fabric import PerFabric
+from pipeline.scenes.bounces import Tables, light_between, seen_light
+from pipeline.scenes.shade import colours_of
+from pipeline.truth.geometry.heightfield import ALPHA, BLEND
+from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+COLOURS: Final = ("specular", "diffuse", "diffuse_transmission")
+"""Colours of a yarn; in vectors of six, of warp and weft each."""
+
+_LEVEL: Final = 2  # of detail of soft nodes
+_WALKS: Final = 1 << 13  # of a table of bounces
+_PASSES: Final = 6
+
+_TABLES: Final[Tables] = (
+    PerFabric(partial(bounce_table, walks=_WALKS)),
+    PerFabric(partial(bounce_table, walks=_WALKS, through=True)),
+)
+
+
+class Pairs(NamedTuple):
+    """N pairs of patches: 0 reflection or 1 transmission, face that the light meets, patches scattered to and lit."""
+
+    kind: Index
+    side: Index
+    out: Index
+    into: Index
+
+    @property
+    def block(self) -> Index:
+        """Kind and face as one number from 0 to 3, (N,)."""
+        return 2 * self.kind + self.side
+
+    def take(self, index: Index) -> Pairs:
+        """Return the pairs at `index`."""
+        return Pairs(*(column[index] for column in self))
+
+
+class YarnOptics(NamedTuple):
+    """Numbers of both yarns that shape the unit components."""
+
+    roughness: tuple[float, float]
+    blend: float
+
+    @classmethod
+    def of(cls, fabric: Fabric) -> YarnOptics:
+        """Return those of a fabric; its blend is the warp's."""
+        return cls((fabric.warp.roughness, fabric.weft.roughness), fabric.warp.blend)
+
+
+class Scatterer:
+    """A cloth's scattered light for N pairs.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        Its geometry and optical thickness.
+    basis : Basis
+        Patches.
+    pairs : Pairs
+        Light comes from the middle of its patch, where a goniophotometer's lamp stands. Each pair has one viewer,
+        chosen at random in its patch, and is mirrored at random, because cloth and mirror image count as one.
+    """
+
+    def __init__(self, fabric: Fabric, basis: Basis, pairs: Pairs) -> None:
+        self.fabric, self.pairs = fabric, pairs
+        self.tables = [tabulate(side, behind=True, level=_LEVEL) for side in (fabric, fabric.back())]
+        random = np.random.default_rng(0)
+        place = np.concatenate([middles(pairs.into), random.random((2, len(pairs.kind)))])
+        queries = pair_queries(
+            fabric, basis, (pairs.into, *place[:2]), (pairs.out, *place[2:]), pairs.side, pairs.side ^ pairs.kind
+        )
+        mirror = np.where(random.random((len(pairs.kind), 2)) < 0.5, -1.0, 1.0).astype(np.float32)
+        mirror = np.column_stack([mirror, np.ones(len(mirror), np.float32)])
+        self.queries = queries._replace(wi=queries.wi * mirror, wo=queries.wo * mirror)
+        self._cosine = np.abs(self.queries.wi[:, 2]).astype(np.float64)
+
+    def components(self, optics: YarnOptics) -> Float64:
+        """Return the BSDF of each of the six colours, without bounces, (N, 6), 1/sr."""
+        unit = np.zeros((len(self._cosine), 4))
+        for side, table in enumerate(self.tables):
+            yarn = table.yarn.copy()
+            yarn[:, ALPHA], yarn[:, BLEND] = optics.roughness, optics.blend
+            table = table._replace(yarn=yarn)
+            for behind in (False, True):
+                viewed = (self.queries.wo[:, 2] < 0.0) == bool(side)
+                rows = np.flatnonzero(viewed & ((self.pairs.kind == 1) == behind))
+                if rows.size:
+                    seen = _in_front(self.queries.take(rows), side)
+                    unit[rows] = read_behind(table, seen)[:, :4] if behind else read_queries(table, seen).components
+        unit /= self._cosine[:, None]
+        through = self.pairs.kind[:, None] == 1
+        return np.concatenate(
+            [unit[:, :2], np.where(through, 0.0, unit[:, 2:]), np.where(through, unit[:, 2:], 0.0)], 1
+        )
+
+    def bounced(self, colours: Float64) -> Float64:
+        """Return the light of all bounces after the first for six colours, (N,), 1/sr."""
+        # The tables know no roughness: one number of it lets all fits of a geometry share them.
+        fabric = with_colours(self.fabric, within_energy(self.fabric, colours), YarnOptics((0.4, 0.4), 0.5))
+        light = seen_light(light_between(fabric, self.queries, _TABLES), colours_of(fabric, self.queries))
+        return np.asarray(light[:, :, 0].sum(axis=1) / self._cosine)
+
+    def values(self, optics: YarnOptics, colours: Float64) -> Float64:
+        """Return the BSDF of each pair with all bounces, (N,), 1/sr."""
+        return np.asarray(self.components(optics) @ colours + self.bounced(colours))
+
+
+def solve(components: Float64, values: Float64, weights: Float64) -> Float64:
+    """Return the six colours in [0, 1] with the least sum of squares, (6,)."""
+    # The triangle of a QR decomposition has the same sums of squares in seven rows.
+    triangle = np.linalg.qr(np.column_stack([components, values]) * weights[:, None])[1]
+    return np.asarray(lsq_linear(triangle[:, :6], triangle[:, 6], bounds=(0.0, 1.0)).x)
+
+
+def solve_with_bounces(scatterer: Scatterer, optics: YarnOptics, values: Float64, weights: Float64) -> Float64:
+    """Return the six colours of which the light of all bounces has the least sum of squares, (6,)."""
+    components = scatterer.components(optics)
+    colours = solve(components, values, weights)
+    for _ in range(_PASSES):
+        colours = solve(components, values - scatterer.bounced(colours), weights)
+    return within_energy(scatterer.fabric, colours)
+
+
+def within_energy(fabric: Fabric, colours: Float64) -> Float64:
+    """Return six colours whose diffuse ones are lowered to what no yarn exceeds (weaves.yarn)."""
+    colours = np.array(colours)
+    for family, yarn in enumerate((fabric.warp, fabric.weft)):
+        grey = yarn.model_copy(update={"specular": (float(colours[family]),) * 3})
+        most = 0.999 * min(grey.most_diffuse(fabric.optical_thickness))
+        diffuse = colours[[2 + family, 4 + family]].sum()
+        colours[[2 + family, 4 + family]] *= min(1.0, most / max(diffuse, 1e-12))
+    return colours
+
+
+def with_colours(fabric: Fabric, colours: Float64, optics: YarnOptics | None = None) -> Fabric:
+    """Return the fabric in six grey colours and, if given, with other optics."""
+    yarns = {}
+    for family, name in enumerate(("warp", "weft")):
+        update: dict[str, object] = {key: (float(colours[2 * k + family]),) * 3 for k, key in enumerate(COLOURS)}
+        if optics is not None:
+            update |= {"roughness": float(optics.roughness[family]), "blend": float(optics.blend)}
+        yarns[name] = getattr(fabric, name).model_copy(update=update)
+    return fabric.model_copy(update=yarns)
+
+
+def _in_front(queries: Queries, side: int) -> Queries:
+    return queries.turned() if side else queries

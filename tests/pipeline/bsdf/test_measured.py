@@ -1,0 +1,91 @@
+"""Files of measured BSDFs: what is written is read, and faults are named in one sentence."""
+
+import re
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Scattering
+from pipeline.bsdf.klems_xml import LayerFacts, write_klems
+from pipeline.bsdf.measured import read_bsdf
+from weaves.errors import BadInput
+
+QUARTER = BASES["LBNL/Klems Quarter"]
+
+
+def layer(basis, most=0.5):
+    shape = (2, 2, basis.patches, basis.patches)
+    return Scattering(basis, {"visible": most / np.pi * np.random.default_rng(5).random(shape)})
+
+
+@pytest.mark.parametrize("basis", BASES.values())
+def test_a_file_that_was_written_is_read_again(basis, tmp_path):
+    write_klems(tmp_path / "layer.xml", layer(basis), LayerFacts("cloth", 0.05, 0.9, 1e-3))
+    again = read_bsdf(tmp_path / "layer.xml")
+    assert again.basis == basis and set(again.bands) == {"visible", "solar"}
+    assert again.bands["visible"] == pytest.approx(layer(basis).bands["visible"], rel=1e-5)
+
+
+def table(**columns):
+    rows = {
+        "kind": "reflection",
+        "side": "front",
+        "theta_in": 0.0,
+        "phi_in": 0.0,
+        "theta_out": 9.0 + 9.0,
+        "phi_out": 0.0,
+    }
+    return pa.table({name: [value] for name, value in (rows | {"value": 0.1} | columns).items() if value is not None})
+
+
+@pytest.mark.parametrize(
+    ("columns", "sentence"),
+    [
+        ({"value": None, "side": None}, "columns missing: side, value"),
+        ({"kind": "absorption"}, "kind = 'absorption': must be reflection or transmission"),
+        ({"theta_out": 17.0}, "theta_in, phi_in = 'no patch': middles of patches are needed: LBNL/Klems Full"),
+        ({"value": "much"}, "type of column value = 'string'"),
+        ({"value": float("nan")}, "value = 'not a finite number'"),
+        ({"value": 40.0}, "visible = .*: reflectance and transmittance of a direction are at most 1.005 together"),
+        ({"value": -1.0}, "visible = -1.0: values of a BSDF are at least 0"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_refused_in_one_sentence(columns, sentence, tmp_path):
+    pq.write_table(table(**columns), tmp_path / "rows.parquet")
+    with pytest.raises(BadInput, match=rf"rows\.parquet: {sentence}"):
+        read_bsdf(tmp_path / "rows.parquet")
+
+
+def test_one_row_is_one_pair(tmp_path):
+    pq.write_table(table(), tmp_path / "rows.parquet")
+    blocks = read_bsdf(tmp_path / "rows.parquet").bands["visible"]
+    assert np.isfinite(blocks).sum() == 1 and blocks.shape == (2, 2, 41, 41)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("Columns<", "TensorTree3<", "IncidentDataStructure = 'TensorTree3': must be Columns"),
+        ("LBNL/Klems Quarter</ColumnAngleBasis", "Own</ColumnAngleBasis", "ColumnAngleBasis = 'Own': known"),
+        ("Transmission Front", "Transmission", "WavelengthDataDirection = 'Transmission'"),
+        ("</WindowElement>", "", "broken XML"),
+        ("<ScatteringData>", "<ScatteringData>1, ", "values of ScatteringData = 1682: 41 x 41 are needed"),
+        ("<ScatteringData>", "<ScatteringData>much, ", "ScatteringData = "),
+    ],
+)
+def test_an_xml_file_that_cannot_be_used_is_refused_in_one_sentence(old, new, sentence, tmp_path):
+    write_klems(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(BadInput, match=re.escape(sentence)):
+        read_bsdf(path)
+
+
+def test_blocks_that_a_file_lacks_are_not_known(tmp_path):
+    write_klems(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
+    path.write_text(path.read_text().replace("Reflection Back", "Reflection Front"))
+    blocks = read_bsdf(path).bands["visible"]
+    assert np.isnan(blocks[SCATTERED.index("reflection"), FACES.index("back")]).all()
+    with pytest.raises(BadInput, match="no such file"):
+        read_bsdf(tmp_path / "none.xml")
