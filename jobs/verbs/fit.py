@@ -37,6 +37,8 @@ def fit(
     from pipeline.fitting.measured import MEASURED
 
     path = MEASURED.get(str(data), data)
+    if held_out and out is not None:
+        raise BadInput("fit", "--out", str(out), "is not written with --held-out: leave one of them out")
     if not held_out:
         if out is None or out.suffix != ".toml":
             raise BadInput("fit", "--out", "" if out is None else str(out), "a path that ends in .toml is needed")
