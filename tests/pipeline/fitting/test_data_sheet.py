@@ -48,6 +48,7 @@ def test_the_truth_finds_these_shares_in_the_fabric(sheet, front):
     assert shares[1].mean() == pytest.approx(0.1, abs=0.01)
 
 
+@pytest.mark.slow
 def test_counts_give_widths_and_thickness_reliefs(sheet):
     counts = "sett = [18.0, 20.0]\ntex = [140.0, 115.0]\nthickness = 0.5\n"
     path = sheet(counts)

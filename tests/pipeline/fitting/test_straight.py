@@ -38,6 +38,7 @@ def test_a_patch_has_its_mirror_images():
     assert [len(images(KLEMS_FULL, patch)) for patch in (0, 9, 10)] == [1, 2, 4]
 
 
+@pytest.mark.slow
 def test_a_geometry_is_found_again():
     """Shares of a known cloth with an error of 2 %: what they determine is within the stated intervals."""
     known = cloth("plain", (0.7, 0.85), (30.0, 15.0), (0.6, 0.3))
