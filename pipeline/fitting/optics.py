@@ -90,7 +90,7 @@ def _optics(numbers: Float64) -> YarnOptics:
 
 
 def optics_numbers(fit: OpticsFit, resamplings: int) -> tuple[Float64, dict[str, Interval]]:
-    """Return the six colours with all bounces, and all numbers with intervals: 90 % of resamplings of the lights."""
+    """Return the six colours with all bounces, and all numbers with intervals: 95 % of resamplings of the lights."""
     colours = solve_with_bounces(fit.scatterer, fit.optics, fit.values, fit.weights)
     roughness, blend = fit.optics
     start = float(np.log(roughness[0])), float(np.log(roughness[1])), blend
@@ -104,7 +104,7 @@ def optics_numbers(fit: OpticsFit, resamplings: int) -> tuple[Float64, dict[str,
         moved = solve(fit.scatterer.components(_optics(numbers)), fit.values, weights) - fit.colours
         samples.append([*np.exp(numbers[:2]), numbers[2], *(colours + moved)])
     best = np.array([*roughness, blend, *colours])
-    low, high = np.clip(np.quantile([best, *samples], (0.05, 0.95), axis=0), 0.0, 1.0)
+    low, high = np.clip(np.quantile([best, *samples], (0.025, 0.975), axis=0), 0.0, 1.0)
     keys = ["warp.roughness", "weft.roughness", "blend"]
     keys += [f"{yarn}.{colour}" for colour in COLOURS for yarn in ("warp", "weft")]
     rows = zip(keys, best, np.minimum(low, best), np.maximum(high, best), strict=True)
