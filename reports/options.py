@@ -196,8 +196,9 @@ StudyName = Literal[
     "footprint_colours",
     "sampling",
     "path_traced",
+    "measured_cloth",
 ]
-"""Modules of `reports.truth` that measure the truth, importance sampling, or frames in Mitsuba."""
+"""Modules of `reports.truth` that measure the truth, importance sampling, frames in Mitsuba, or fits to real cloth."""
 
 LEAST_TILE: Final = 8
 MOST_TILE: Final = 512
@@ -225,7 +226,8 @@ class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
     live: LiveOptions = LiveOptions()
     """Fabrics that the page shows live."""
     studies: tuple[StudyName, ...] = ()
-    """Measurements of the truth itself, of importance sampling, and of path-traced frames; they read no data set."""
+    """Measurements of the truth itself, of importance sampling, of path-traced frames, and of fits to measured cloth; they
+    read no data set."""
     edge: EdgeOptions = EdgeOptions()
     """The silhouette, measured where the data set's queries are of curved cloth."""
 

@@ -39,7 +39,17 @@ from reports.tables.table import (
     text,
 )
 from reports.tables.tradeoff import tradeoff_table
-from reports.truth import accuracy, bias, calibration, effort, finding, footprint_colours, path_traced, sampling
+from reports.truth import (
+    accuracy,
+    bias,
+    calibration,
+    effort,
+    finding,
+    footprint_colours,
+    measured_cloth,
+    path_traced,
+    sampling,
+)
 from reports.truth.row_records import RowRecords
 
 Frames = Mapping[str, pd.DataFrame]
@@ -333,7 +343,7 @@ def _extremes(frames: Frames, values: Values) -> list[ResultTable]:
 
 
 def _truth_tables(records: Sequence[Record], values: Values) -> dict[str, list[ResultTable]]:
-    """Return the tables of the ground truth itself, of its sampler and of path-traced frames, by section."""
+    """Return the tables of the ground truth itself, of its sampler, of path-traced frames and of fits, by section."""
     whole: dict[str, float] = {}
     for row in effort.RECORDS.from_records(records):
         whole[row.fabric] = whole.get(row.fabric, 0.0) + row.share * row.seconds
@@ -393,8 +403,9 @@ _KEPT: Final[Mapping[str, RowRecords[Any]]] = {
     "truth_colours": footprint_colours.RECORDS,
     "sampler": sampling.RECORDS,
     "traced": path_traced.RECORDS,
+    "measured": measured_cloth.RECORDS,
 }
-"""Measurements of the truth itself, of its sampler and of path tracing, by the names of their tables."""
+"""Measurements of the truth itself, of its sampler, of path tracing and of fits, by the names of their tables."""
 
 _RATES: Final = (
     text("measurement", lambda row: row.setting),

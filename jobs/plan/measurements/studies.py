@@ -15,7 +15,7 @@ from reports.options import StudyName
 if TYPE_CHECKING:
     from reports.record import Record
 
-_UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced")
+_UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced", "measured_cloth")
 
 
 class Study(Measurement):

@@ -45,9 +45,9 @@ def test_every_kind_is_planned_and_read_back_from_its_own_dump(tasks):
 
 
 def test_every_study_is_in_a_shipped_recipe():
-    named = {name: load_recipe(name).bench.studies for name in ("truth", "mitsuba")}
-    assert sorted(named["truth"] + named["mitsuba"]) == sorted(get_args(StudyName))
-    for name in named["truth"] + named["mitsuba"]:
+    named = {name: load_recipe(name).bench.studies for name in ("truth", "mitsuba", "real")}
+    assert sorted(sum(named.values(), ())) == sorted(get_args(StudyName))
+    for name in sum(named.values(), ()):
         module = import_module(f"reports.truth.{name}")
         assert callable(module.measure) and module.RECORDS
 
