@@ -6,6 +6,7 @@ import pytest
 from pipeline.shards.queries import QueryOptions, draw_queries
 from tests.pipeline.analytic import methods
 from tests.pipeline.truth.cloths import IMAGES, LOPSIDED, OVER, moved_far, on_lattice, redrawn, reversed_axes, woven
+from tests.presets import slow
 
 MEAN, WORST = 2e-4, 0.05
 """Of the largest answer: a node on the border of two cells of a grid may read either, which moves few answers."""
@@ -24,7 +25,7 @@ def assert_equal(one, other, worst=WORST):
 QUERIES = asked(stretch=4.0)
 
 
-@pytest.mark.parametrize("method", methods.PLACED)
+@pytest.mark.parametrize("method", [slow(m) if m is methods.summed_area else m for m in methods.PLACED])
 def test_a_cloth_drawn_in_another_way_has_the_same_answers(method):
     """A mirror reverses the sense of the twists: without that the mirrored cloth answers otherwise. Twice the repeat
     has the same longest period: waves and means over all cells are not others. Maps of mean normals begin somewhere."""

@@ -22,6 +22,7 @@ def geometry():
     return cloth("twill 3/1", (0.8, 0.9), (25.0, 20.0), (0.6, 0.5))
 
 
+@pytest.mark.slow
 def test_colours_are_linear_without_bounces(geometry):
     pairs = Pairs(*(index.ravel()[::7] for index in np.indices((2, 2, QUARTER.patches, QUARTER.patches))))
     components = Scatterer(geometry, QUARTER, pairs).components(OPTICS)

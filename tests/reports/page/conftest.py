@@ -18,7 +18,7 @@ from reports.options import BenchOptions, SceneBenchOptions
 from reports.page.content import ModelNote, PageInput, PictureFile
 from reports.page.page import write_page
 from reports.record import Record, this_machine
-from reports.truth import accuracy, bias, effort, finding, path_traced, sampling
+from reports.truth import accuracy, bias, effort, finding, measured_cloth, path_traced, sampling
 from weaves.fabric import load_fabric
 
 VOID = {"meta", "img", "source", "link", "br"}
@@ -104,6 +104,7 @@ def of_truth():
         *bias.RECORDS.to_records(biases),
         *effort.RECORDS.to_records(effort.Effort(kind, "denim", *numbers, 900) for kind, *numbers in efforts),
         *path_traced.RECORDS.to_records([path_traced.Traced("soft_nodes:2", "drape", "4", 2.5e-3, 1.5, 4, 3.25)]),
+        *measured_cloth.RECORDS.to_records([measured_cloth.Prediction("cosine", "shade", "reflectance", error=0.25)]),
         *sampling.RECORDS.to_records([sampling.VarianceSaving("lobes", "denim", 20.5, 12.25, 210.0, 900.0, 40)]),
         Record(method="truth", setting="everything", note="fast").of("rate", 4.5e8, 1),
     ]

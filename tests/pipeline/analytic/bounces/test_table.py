@@ -19,11 +19,13 @@ LIGHTS, VIEWERS = (np.float32(w) for w in (np.repeat(WAYS, 4, axis=0), np.tile(W
 
 @pytest.fixture(scope="module")
 def closed():
-    return bounce_table(CLOSED)
+    return bounce_table(CLOSED, 1 << 13)
 
 
-def test_a_table_has_the_second_bounce_of_walks(closed):
+@pytest.mark.slow
+def test_a_table_has_the_second_bounce_of_walks():
     """Dark colours leave the second bounce alone; other walks, between the nodes of the grid, and of each family."""
+    closed = bounce_table(CLOSED)
     sums = transport(height_field(CLOSED), 1 << 17, WAYS.astype(float), WAYS.astype(float))
     expected = (sums.second / sums.seen[:, None, None, None]).transpose(3, 0, 1, 2).reshape(16, 2, 2)
     scale = expected.sum(axis=(1, 2)).mean()
@@ -49,8 +51,12 @@ def test_bounces_grow_with_every_colour(closed):
 
 @pytest.mark.parametrize(
     ("fabric", "least"),
-    [(CLOSED, 0.98), (woven("silk_charmeuse", width=1.0, blend=1.0), 0.98), (LOPSIDED, 0.3), (woven("voile"), 0.2)],
-    ids=["closed", "satin", "narrow", "open"],
+    [
+        pytest.param(CLOSED, 0.98, id="closed"),
+        pytest.param(woven("silk_charmeuse", width=1.0, blend=1.0), 0.98, id="satin", marks=pytest.mark.slow),
+        pytest.param(LOPSIDED, 0.3, id="narrow", marks=pytest.mark.slow),
+        pytest.param(woven("voile"), 0.2, id="open"),
+    ],
 )
 def test_white_cloth_in_a_furnace_makes_no_light(fabric, least):
     """All bounces of white diffuse yarns: closed Lambertian cloth returns all light, others return less."""
@@ -69,7 +75,7 @@ def test_white_cloth_in_a_furnace_makes_no_light(fabric, least):
 @pytest.mark.parametrize(("name", "blend"), [("gauze", 1.0), slow("voile", 0.5), slow("organza", 0.0)])
 def test_white_cloth_that_lets_light_through_makes_none(name, blend):
     """Light from all around, k_d + k_dt = 1: what yarns return and what comes through gaps is at most 1."""
-    fabric, around = woven(name, blend=blend), np.float32(sphere(48, 32))
+    fabric, around = woven(name, blend=blend), np.float32(sphere(32, 20))
     table, ones = bounce_table(fabric, 1 << 13, through=True), np.ones(len(around))
     for viewer in np.float32([unit(0.1, 0), unit(35, 100), unit(65, 250)]):
         wo = np.tile(viewer, (len(around), 1))

@@ -24,6 +24,7 @@ def asked(sigma):
     return queries, truth_of(fabric, queries, walls="left_out")
 
 
+@pytest.mark.slow
 def test_more_clusters_err_less(denim):
     fabric, tables = denim
     queries, truth = asked((0.8, 8.0))

@@ -42,13 +42,12 @@ def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
 @pytest.mark.parametrize(
     ("fabric", "behind"),
     [
-        (load_fabric("polyester_lining"), False),
-        (load_fabric("denim"), True),
-        (load_fabric("satin_8"), False),
-        (woven("cotton_twill", width=0.8), False),
-        (woven("polyester_lining", width=0.8), True),
+        pytest.param(load_fabric("polyester_lining"), False, id="plain"),
+        pytest.param(load_fabric("denim"), True, id="twill_behind"),
+        pytest.param(load_fabric("satin_8"), False, id="satin", marks=pytest.mark.slow),
+        pytest.param(woven("cotton_twill", width=0.8), False, id="narrow_twill", marks=pytest.mark.slow),
+        pytest.param(woven("polyester_lining", width=0.8), True, id="narrow_plain_behind", marks=pytest.mark.slow),
     ],
-    ids=["plain", "twill_behind", "satin", "narrow_twill", "narrow_plain_behind"],
 )
 @pytest.mark.parametrize(
     "choices", [({}, {"parallax": False}), slow(({"parallax": False, "footprint": "box"},))], ids=["gaussian", "box"]
