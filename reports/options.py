@@ -226,8 +226,8 @@ class BenchOptions(RunOptions, TimingOptions, FrameOptions, PictureOptions):
     live: LiveOptions = LiveOptions()
     """Fabrics that the page shows live."""
     studies: tuple[StudyName, ...] = ()
-    """Measurements of the truth itself, of importance sampling, of path-traced frames, and of fits to measured cloth; they
-    read no data set."""
+    """Measurements of the truth itself, of importance sampling, of path-traced frames, and of fits to measured cloth.
+    They read no data set."""
     edge: EdgeOptions = EdgeOptions()
     """The silhouette, measured where the data set's queries are of curved cloth."""
 
