@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -29,8 +30,8 @@ MOST_RECIPES: Final = 32
 def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:
     """Read a recipe of the package by its name, or a TOML file by its path, which ends in ``.toml``.
 
-    Methods and metrics from outside the package are in `add` (`jobs.recipe.added`). BadInput if there is no such
-    recipe, or anything in it, in its fabrics or among `add` cannot be used.
+    Methods, metrics and answers from outside the package are in `add` (`jobs.recipe.added`). BadInput if there is no
+    such recipe, or anything in it, in its fabrics or among `add` cannot be used.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -80,7 +81,7 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
     )
     validate_recipe(recipe, where)
     check_trained_by(recipe, where)
-    return recipe
+    return recipe if chain else replace(recipe, entries=tuple(added.entries(recipe)))
 
 
 def _beside(recipe: Path, name: object, key: str) -> Path:

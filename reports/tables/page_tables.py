@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from reports.catalogue import METRICS, OTHER, metric_row
+from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.over_seeds import MOST
 from reports.record import Record, to_table
@@ -56,6 +56,11 @@ _FRAMES: Final = {
     "scenes": summary.scene_table,
     "by_size": size_table,
 }
+CLASSES: Final = (4_000, 16_000, 100_000)
+"""Most multiply-adds of a query, and most bytes of a fabric, in each class of entries but the last, which is open."""
+
+_STATED: Final = columns_of("entries")
+_NOTES: Final = {"machine": "stated_time", "trained on": "stated_bytes", "code": "stated_tries"}
 _WHERE_MEASURED: Final = {"between": summary.path_table, OTHER: summary.other_table, "extremes": summary.extremes_table}
 
 
@@ -144,6 +149,7 @@ def result_tables(
         "latents": _latents(records, frames, values),
         "silhouettes": [of_methods("silhouettes", frames["silhouettes"], values)],
         "time": [_timing(frames["timing"], values)],
+        "entries": [_entries(records, values)],
         "other": _other(frames, values),
         "stability": _extremes(frames, values),
     }
@@ -304,6 +310,22 @@ def _timing(frame: pd.DataFrame, values: Values) -> ResultTable:
     fewer = f", {few:.0f} threads" if few > 1 else ""
     more = f", {many:.0f} threads" if many > 1 else ", more threads"
     return of_methods("timing", frame, {**values, "fewer": fewer, "more": more})
+
+
+def _entries(records: Sequence[Record], values: Values) -> ResultTable:
+    """Return what entries state, and the classes that follow."""
+    stated: dict[str, dict[str, Record]] = {}
+    for record in records:
+        if metric_row(record.metric).table == "entries":
+            stated.setdefault(record.method, {})[record.metric] = record
+    lines = []
+    for method, of in stated.items():
+        largest = max(of["stated_bytes"].value, of["stated_multiply_adds"].value)
+        size = next((limit for limit in CLASSES if largest <= limit), None)
+        cells = [f"≤ {size // 1000} k" if size else "open", *(shown(name, of[name].value) for name in _STATED)]
+        lines.append(method_row(method, "", map(TableCell, [*cells, *(of[name].note for name in _NOTES.values())])))
+    titles = [metric_row(name).title for name in _STATED]
+    return table("entries", ["method", "class", *titles, *_NOTES], lines, values)
 
 
 def _other(frames: Frames, values: Values) -> list[ResultTable]:
