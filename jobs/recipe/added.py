@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from jobs.recipe.entry import FORM, Entry, read_entry
+from jobs.recipe.entry import FORM
 from pipeline.models.added.added_code import ADDED_MODEL, GROUP, AddedFunction, AddedMethod
 from pipeline.models.added.describe import describe
 from pipeline.models.added.source import ADD
@@ -20,9 +20,6 @@ from pipeline.models.catalogue import CLASSES, REPLACED_MODELS
 from reports.catalogue import AddedMetric
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
-
-if TYPE_CHECKING:
-    from jobs.recipe.recipe import Recipe
 
 _BESIDE: Final = ("model", "name", "version", "limit", "training", "seeds", "runtimes")
 """Keys of a recipe's entry that are no options of the method."""
@@ -40,7 +37,8 @@ class Added:
         self._given: dict[str, AddedMethod] = {}
         self.metrics: list[AddedMetric] = []
         """The metrics from outside."""
-        self._forms = [Path(text) for text in given if text.endswith(FORM)]
+        self.forms = [Path(text) for text in given if text.endswith(FORM)]
+        """The forms of entries."""
         for text in (text for text in given if not text.endswith(FORM)):
             source = text if ":" in text else _installed().get(text)
             if source is None:
@@ -73,16 +71,6 @@ class Added:
             named = [entry.get("model", entry.get("name")) for entry in entries if isinstance(entry, Mapping)]
             models += [method.model_dump() for name, method in self._given.items() if name not in named]
         return {**content, "models": models} if models else dict(content)
-
-    def entries(self, recipe: Recipe) -> Iterator[Entry]:
-        """Yield the entries, which answer the questions of a recipe; BadInput as `read_entry`, or for a name twice."""
-        names = set[str]()
-        for path in self._forms:
-            entry = read_entry(path, recipe)
-            if entry.form.name in names:
-                raise BadInput(str(path), "name", entry.form.name, "is the name of another entry")
-            names.add(entry.form.name)
-            yield entry
 
     def model_of(self, method: AddedMethod) -> str:
         """Return the value of `model` by which a recipe names a method: the name that its code states."""

@@ -9,24 +9,18 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 from pydantic import AfterValidator, Field, StrictBool, StrictInt
 
-from pipeline import versions
-from pipeline.fingerprint import fingerprint
-from pipeline.models.domain import PHYSICS
 from pipeline.models.options import Name
 from weaves.errors import BadInput
 from weaves.validation import Frozen, read_toml, validated
 
-if TYPE_CHECKING:
-    from jobs.recipe.recipe import Recipe
-
 FORM: Final = "entry.toml"
 """File of the form."""
 
-ANSWERS: Final = ("answers.parquet", "answers.csv")
+ANSWER_FILES: Final = ("answers.parquet", "answers.csv")
 """Files of the answers, of which one lies beside the form."""
 
 
@@ -91,7 +85,7 @@ class Entry:
 
 def blank_form(questions: str) -> str:
     """Return the form to fill in, each field below what is allowed; as it is, it is refused."""
-    lines = [f"# Form of an entry: fill it in and hand it in beside {' or '.join(ANSWERS)}."]
+    lines = [f"# Form of an entry: fill it in and hand it in beside {' or '.join(ANSWER_FILES)}."]
     for name, field in EntryForm.model_fields.items():
         blank = '""' if field.annotation is str else "false" if field.annotation is bool else "-1"
         value = f'"{questions}"' if name == "questions" else blank
@@ -99,34 +93,18 @@ def blank_form(questions: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def read_entry(path: Path, recipe: Recipe) -> Entry:
-    """Read the form at a path and the answers beside it.
+def read_entry(path: Path, questions: str, count: int) -> Entry:
+    """Read the form at a path and the answers beside it, to so many questions of a fingerprint.
 
-    BadInput if it is of other questions, has the name of a model, or anything in it, or in the answers, cannot be used.
+    BadInput if it is of other questions, or anything in it, or in the answers, cannot be used.
     """
     from pipeline.shards.answer_file import answers_sha256, read_answers
 
     form = validated(EntryForm, read_toml(path), str(path))
-    if form.questions != (known := questions_id(recipe)):
-        raise BadInput(str(path), "questions", form.questions, f"those of {recipe.name} and this version are {known}")
-    if form.name in [model.options.name for model in recipe.models]:
-        raise BadInput(str(path), "name", form.name, f"is the name of a model of the recipe {recipe.name}")
-    files = [file for name in ANSWERS if (file := path.absolute().with_name(name)).exists()]
+    if form.questions != questions:
+        raise BadInput(str(path), "questions", form.questions, f"those of this recipe and version are {questions}")
+    files = [file for name in ANSWER_FILES if (file := path.absolute().with_name(name)).exists()]
     if len(files) != 1:
-        both = " and ".join(ANSWERS)
+        both = " and ".join(ANSWER_FILES)
         raise BadInput(str(path.parent), "", f"holds {both}" if files else f"lacks {both}", "one of them is needed")
-    return Entry(form, answers_sha256(read_answers(files[0], questions(recipe))), str(files[0]))
-
-
-def questions(recipe: Recipe) -> int:
-    """Return the number of questions."""
-    return len(recipe.tested) * recipe.dataset.rows.test
-
-
-def questions_id(recipe: Recipe) -> str:
-    """Return the fingerprint of all that the questions and the right answers depend on, whatever their precision."""
-    dataset = recipe.dataset
-    drawn = [versions.TRUTH, dataset.seed, dataset.rows.test, dataset.queries.model_dump(mode="json")]
-    physics = {name: getattr(dataset.truth, name) for name in PHYSICS}
-    fabrics = [fabric.model_dump(mode="json", exclude={"source"}) for fabric, _ in recipe.tested]
-    return fingerprint(["questions", *drawn, physics, fabrics])
+    return Entry(form, answers_sha256(read_answers(files[0], count)), str(files[0]))

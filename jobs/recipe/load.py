@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from jobs.recipe.added import Added
+from jobs.recipe.entry import Entry, read_entry
 from jobs.recipe.recipe import Recipe, RecipeFile
 from jobs.recipe.shipped import RECIPES, recipe_names
 from jobs.recipe.trained_by import check_trained_by, with_trained_by
@@ -81,7 +82,18 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
     )
     validate_recipe(recipe, where)
     check_trained_by(recipe, where)
-    return recipe if chain else replace(recipe, entries=tuple(added.entries(recipe)))
+    return recipe if chain else replace(recipe, entries=tuple(_entries(recipe, added.forms)))
+
+
+def _entries(recipe: Recipe, forms: Sequence[Path]) -> Iterator[Entry]:
+    """Read entries, which answer the questions of a recipe."""
+    taken = [model.options.name for model in recipe.models]
+    for path in forms:
+        entry = read_entry(path, recipe.questions, len(recipe.tested) * recipe.dataset.rows.test)
+        if entry.form.name in taken:
+            raise BadInput(str(path), "name", entry.form.name, "is the name of a model or of another entry")
+        taken.append(entry.form.name)
+        yield entry
 
 
 def _beside(recipe: Path, name: object, key: str) -> Path:

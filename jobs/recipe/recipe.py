@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import AfterValidator, Field, StrictInt, StrictStr, model_validator
 
+from pipeline import versions
+from pipeline.fingerprint import fingerprint
 from pipeline.models.catalogue import ModelOptions
+from pipeline.models.domain import PHYSICS
 from pipeline.shards.queries import QueryOptions
 from pipeline.training.options import TrainingOptions
 from pipeline.truth.options import TruthOptions
@@ -200,6 +203,15 @@ class Recipe:
         """The fabrics that are measured, each as seen or unseen: the named ones, then the random ones."""
         unseen = (*self.unseen, *self.unseen_population)
         return (*((fabric, "seen") for fabric in self.seen), *((fabric, "unseen") for fabric in unseen))
+
+    @property
+    def questions(self) -> str:
+        """Fingerprint of all that held-out queries and their right answers depend on, whatever their precision."""
+        dataset = self.dataset
+        drawn = [versions.TRUTH, dataset.seed, dataset.rows.test, dataset.queries.model_dump(mode="json")]
+        physics = {name: getattr(dataset.truth, name) for name in PHYSICS}
+        fabrics = [fabric.model_dump(mode="json", exclude={"source"}) for fabric, _ in self.tested]
+        return fingerprint(["questions", *drawn, physics, fabrics])
 
     @property
     def own_models(self) -> list[ModelRecipe]:

@@ -34,7 +34,7 @@ def _added(type_: object, tokens: Sequence[Token]) -> list[str]:
     """Return what is added; of the folder of an entry the path of its form."""
     from jobs.recipe.entry import FORM
 
-    return [str(Path(one.value) / FORM) if one.keyword == "--answers" else one.value for one in tokens]
+    return [str(Path(each.value) / FORM) if each.keyword == "--answers" else each.value for each in tokens]
 
 
 def _whole(type_: object, tokens: Sequence[Token]) -> int:

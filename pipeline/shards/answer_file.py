@@ -26,7 +26,7 @@ from weaves.errors import BadInput
 from weaves.reading import refuse_irregular
 
 ID: Final = "id"
-RGB: Final = ("red", "green", "blue")
+RGB_COLUMNS: Final = ("red", "green", "blue")
 """Columns of answers in colour."""
 
 _MOST_BYTES: Final = 1024  # of a row of CSV
@@ -50,7 +50,7 @@ def read_answers(path: Path, count: int) -> Float32:
 
 def write_answers(path: Path, answers: Float32) -> None:
     """Write answers in the order of their questions; the same answers give the same bytes."""
-    names = COMPONENTS if answers.shape[1] == len(COMPONENTS) else RGB
+    names = COMPONENTS if answers.shape[1] == len(COMPONENTS) else RGB_COLUMNS
     columns = {ID: np.arange(len(answers))} | dict(zip(names, np.ascontiguousarray(answers.T), strict=True))
     table = pa.table(columns)
     with atomic_path(path) as temporary, parquet_writer(temporary, table.schema, []) as writer:
@@ -97,10 +97,10 @@ def _csv(path: Path, count: int) -> pa.Table:
 
 def _columns(path: Path, names: Sequence[str]) -> list[str]:
     """Return the columns of an answer that a file has."""
-    answer = RGB if set(RGB) <= set(names) and not set(COMPONENTS) <= set(names) else COMPONENTS
+    answer = RGB_COLUMNS if set(RGB_COLUMNS) <= set(names) and not set(COMPONENTS) <= set(names) else COMPONENTS
     for name in (ID, *answer):
         if name not in names:
-            allowed = f"needed are {ID} and {', '.join(COMPONENTS)}, or {ID} and {', '.join(RGB)}"
+            allowed = f"needed are {ID} and {', '.join(COMPONENTS)}, or {ID} and {', '.join(RGB_COLUMNS)}"
             raise BadInput(str(path), "", f"column {name} missing", allowed)
         if Counter(names)[name] > 1:
             raise BadInput(str(path), "column", name, "is there more than once")

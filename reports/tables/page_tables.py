@@ -56,7 +56,7 @@ _FRAMES: Final = {
     "scenes": summary.scene_table,
     "by_size": size_table,
 }
-CLASSES: Final = (4_000, 16_000, 100_000)
+ENTRY_CLASSES: Final = (4_000, 16_000, 100_000)
 """Most multiply-adds of a query, and most bytes of a fabric, in each class of entries but the last, which is open."""
 
 _STATED: Final = columns_of("entries")
@@ -321,7 +321,7 @@ def _entries(records: Sequence[Record], values: Values) -> ResultTable:
     lines = []
     for method, of in stated.items():
         largest = max(of["stated_bytes"].value, of["stated_multiply_adds"].value)
-        size = next((limit for limit in CLASSES if largest <= limit), None)
+        size = next((limit for limit in ENTRY_CLASSES if largest <= limit), None)
         cells = [f"≤ {size // 1000} k" if size else "open", *(shown(name, of[name].value) for name in _STATED)]
         lines.append(method_row(method, "", map(TableCell, [*cells, *(of[name].note for name in _NOTES.values())])))
     titles = [metric_row(name).title for name in _STATED]

@@ -11,7 +11,7 @@ import tomli_w
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects
 from jobs.plan.task import Coloured, Place, Progress
-from jobs.recipe.entry import ANSWERS, FORM, EntryForm
+from jobs.recipe.entry import ANSWER_FILES, FORM, EntryForm
 from pipeline.atomic import atomic_write
 from reports.options import ErrorOptions, Role, select
 from weaves.errors import BadInput
@@ -62,7 +62,7 @@ class OfAnswers(Measurement):
     def products(self) -> tuple[str, ...]:
         """Records, the machine, and the copy of the entry."""
         copy = f"entries/{self.form.name}-{self.id[:8]}"
-        return (*super().products, f"{copy}/{FORM}", f"{copy}/{ANSWERS[0]}")
+        return (*super().products, f"{copy}/{FORM}", f"{copy}/{ANSWER_FILES[0]}")
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure the answers, and copy the entry; BadInput if they are no longer those that were planned."""

@@ -14,7 +14,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from jobs.plan.dataset import DataSet
-from jobs.recipe.entry import ANSWERS, FORM, blank_form, questions_id
+from jobs.recipe.entry import ANSWER_FILES, FORM, blank_form
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import Recipe
 from jobs.terminal import print_lines
@@ -23,9 +23,9 @@ from pipeline import versions
 from pipeline.folders import own_files
 from pipeline.models.domain import PHYSICS
 from pipeline.scenes.shade import colours
-from pipeline.shards.answer_file import RGB
+from pipeline.shards.answer_file import RGB_COLUMNS
 from pipeline.shards.generate import ShardTask
-from pipeline.shards.question_file import COLUMNS, CSV, PARQUET, write_questions
+from pipeline.shards.question_file import QUESTION_COLUMNS, QUESTION_FILES, write_questions
 from pipeline.truth import conventions
 from reports.images.draft import drawdown
 from reports.tables.table import markdown_table
@@ -33,8 +33,7 @@ from weaves.draft_files.write import wif_text
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-LISTING: Final = "questions.json"
-"""File that lists the fabrics, and all files with their hashes."""
+_LISTING: Final = "questions.json"  # lists the fabrics, and all files with their hashes
 
 _TEMPLATE: Final = Path(__file__).with_name("questions.md")
 
@@ -49,13 +48,13 @@ def questions(
     BadInput if the recipe cannot be used, or the folder holds anything else.
     """
     loaded = load_recipe(recipe)
-    if to.is_dir() and any(to.iterdir()) and not (to / LISTING).is_file():
+    if to.is_dir() and any(to.iterdir()) and not (to / _LISTING).is_file():
         raise BadInput("questions", "--to", str(to), "is not empty; name another folder, or empty it")
     shards = [part.shard for part in DataSet(loaded).shards if part.shard.split == "test"]
-    with own_files(to, LISTING) as folder:
+    with own_files(to, _LISTING) as folder:
         count = write_questions(folder, (shard for shard in shards if isinstance(shard, ShardTask)))
         about = _about(loaded)
-        texts = {LISTING: json.dumps(about), FORM: blank_form(about["questions"]), "README.md": _readme(loaded, count)}
+        texts = {_LISTING: json.dumps(about), FORM: blank_form(about["questions"]), "README.md": _readme(loaded, count)}
         for fabric, _ in loaded.tested:
             texts[f"fabrics/{fabric.name}.toml"] = fabric.to_toml()
             with suppress(BadInput):  # its colours need more threads than a draft file can have
@@ -73,7 +72,7 @@ def _about(recipe: Recipe) -> dict[str, Any]:
     dataset, rows = recipe.dataset, recipe.dataset.rows.test
     return {
         "recipe": recipe.name,
-        "questions": questions_id(recipe),
+        "questions": recipe.questions,
         "truth_version": versions.TRUTH,
         "queries": dataset.queries.model_dump(mode="json"),
         "truth": {name: getattr(dataset.truth, name) for name in PHYSICS},
@@ -97,7 +96,7 @@ def _of_fabric(fabric: Fabric) -> dict[str, Any]:
 
 def _readme(recipe: Recipe, count: int) -> str:
     """Return what an entrant reads."""
-    columns = [(f"`{field.name}`", field.metadata[b"meaning"].decode()) for field in COLUMNS]
+    columns = [(f"`{field.name}`", field.metadata[b"meaning"].decode()) for field in QUESTION_COLUMNS]
     fabrics = [
         (f"`{fabric.name}`", role, f"{fabric.weave.name}, {' × '.join(map(str, fabric.weave.repeat))}")
         for fabric, role in recipe.tested
@@ -107,15 +106,14 @@ def _readme(recipe: Recipe, count: int) -> str:
         recipe=recipe.name,
         count=f"{count:,}",
         last=f"{count - 1:,}",
-        parquet=PARQUET,
-        csv=CSV,
+        files=", ".join(f"`{name}`" for name in QUESTION_FILES),
         form=FORM,
-        listing=LISTING,
-        answers=" or ".join(f"`{name}`" for name in ANSWERS),
+        listing=_LISTING,
+        answers=" or ".join(f"`{name}`" for name in ANSWER_FILES),
         columns=markdown_table(("column", "meaning"), columns),
         fabrics=markdown_table(("fabric", "role", "weave, ends × picks"), fabrics),
         components=", ".join(f"`{name}`" for name in conventions.COMPONENTS),
-        rgb=", ".join(f"`{name}`" for name in RGB),
+        rgb=", ".join(f"`{name}`" for name in RGB_COLUMNS),
         physics=", ".join(f"`{name} = {value}`" for name, value in physics.items()),
         conventions=str(conventions.__doc__).rstrip(),
     )

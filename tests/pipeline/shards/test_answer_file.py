@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pyarrow import csv
 
-from pipeline.shards.answer_file import ID, RGB, answers_sha256, read_answers, write_answers
+from pipeline.shards.answer_file import ID, RGB_COLUMNS, answers_sha256, read_answers, write_answers
 from pipeline.truth.conventions import COMPONENTS
 from tests.refusals import refusal
 
@@ -91,7 +91,7 @@ def test_columns_that_are_missing_empty_or_of_another_type_are_named(tmp_path, e
         )
         gap = pa.array([0, 1, 2, None] * 10, pa.int64() if name == ID else pa.float64())
         assert f"row 3, column {name} = None: a number is needed" in refused(path, columns() | {name: gap})
-    assert "column specular_warp missing" in refused(path, columns(RGB[:2]))
+    assert "column specular_warp missing" in refused(path, columns(RGB_COLUMNS[:2]))
     often = refused(path, {name: np.tile(values, 5) for name, values in columns().items()})
     assert ("more than once" if ending == ".csv" else "has 200 rows: there are 40 questions") in often
 

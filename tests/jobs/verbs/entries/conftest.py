@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from jobs.recipe.entry import FORM
+from jobs.recipe.entry import FORM, blank_form
 from jobs.recipe.load import load_recipe
 from pipeline.shards.answer_file import write_answers
 from tests.jobs import made_up
@@ -27,16 +27,16 @@ def recipe(tmp_path):
 
 
 @pytest.fixture
-def entry(tmp_path, call, recipe):
-    """Return a function that writes an entry of the recipe from the form of its questions, and returns its folder."""
-    assert call("questions", recipe, "--to", tmp_path / "questions")[0] == 0
-    blank = tomllib.loads((tmp_path / "questions" / FORM).read_text(encoding="utf-8"))
+def entry(tmp_path, recipe):
+    """Return a function that writes an entry of the recipe from its blank form, and returns the folder."""
+    loaded = load_recipe(recipe)
+    blank = tomllib.loads(blank_form(loaded.questions))
 
     def entry(answers=None, name="theirs", **form):
         folder = tmp_path / name
         folder.mkdir(exist_ok=True)
         (folder / FORM).write_text(tomli_w.dumps(blank | FILLED | {"name": name} | form), encoding="utf-8")
-        count = 64 * len(load_recipe(recipe).tested)
+        count = 64 * len(loaded.tested)
         write_answers(folder / "answers.parquet", np.full((count, 4), 0.1, np.float32) if answers is None else answers)
         return folder
 

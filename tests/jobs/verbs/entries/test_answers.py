@@ -7,7 +7,6 @@ import jobs.verbs.run
 from jobs.plan.measurements.answers import OfAnswers
 from jobs.plan.page import Page
 from jobs.plan.plan import plan
-from jobs.recipe.entry import questions_id
 from jobs.recipe.load import load_recipe
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.scenes.shade import coloured, colours_of
@@ -150,7 +149,7 @@ def test_bad_entries_are_refused_before_anything_is_written(recipe, entry, refus
         folder = entry(**{"name": "theirs", key: value} if key == "name" else {key: value})
         assert f"{key} = " in sentence()
     folder = entry()
-    assert "is the name of another entry" in sentence("--answers", folder)
+    assert "is the name of a model or of another entry" in sentence("--answers", folder)
     (folder / "entry.toml").unlink()
     assert "entry.toml" in sentence()
     assert not (tmp_path / "out").exists()
@@ -158,7 +157,7 @@ def test_bad_entries_are_refused_before_anything_is_written(recipe, entry, refus
 
 def test_questions_change_with_what_is_right_and_not_with_how_exactly_it_is_known(tmp_path):
     def known(**dataset):
-        return questions_id(load_recipe(made_up.write_recipe(tmp_path, "tiny", **dataset)))
+        return load_recipe(made_up.write_recipe(tmp_path, "tiny", **dataset)).questions
 
     first, plane = known(), {"parallax": False}
     assert known(truth={"relative_error": 0.5}) == known(rows={"train": 1, "test": 64}) == first
