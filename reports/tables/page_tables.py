@@ -312,6 +312,11 @@ def _timing(frame: pd.DataFrame, values: Values) -> ResultTable:
     return of_methods("timing", frame, {**values, "fewer": fewer, "more": more})
 
 
+def entry_class(largest: float) -> str:
+    """Return the class of an entry, from the larger of its multiply-adds for a query and its bytes for a fabric."""
+    return next((f"≤ {limit // 1000} k" for limit in ENTRY_CLASSES if largest <= limit), "open")
+
+
 def _entries(records: Sequence[Record], values: Values) -> ResultTable:
     """Return what entries state, and the classes that follow."""
     stated: dict[str, dict[str, Record]] = {}
@@ -321,8 +326,7 @@ def _entries(records: Sequence[Record], values: Values) -> ResultTable:
     lines = []
     for method, of in stated.items():
         largest = max(of["stated_bytes"].value, of["stated_multiply_adds"].value)
-        size = next((limit for limit in ENTRY_CLASSES if largest <= limit), None)
-        cells = [f"≤ {size // 1000} k" if size else "open", *(shown(name, of[name].value) for name in _STATED)]
+        cells = [entry_class(largest), *(shown(name, of[name].value) for name in _STATED)]
         lines.append(method_row(method, "", map(TableCell, [*cells, *(of[name].note for name in _NOTES.values())])))
     titles = [metric_row(name).title for name in _STATED]
     return table("entries", ["method", "class", *titles, *_NOTES], lines, values)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class OfAnswers(Measurement):
-    """The answers of an entry; a copy of it stays in the output folder, so that its page can be made again."""
+    """The answers of an entry; a copy of it lies beside its Records, so that these can be made again."""
 
     kind: Literal["answers"] = "answers"
     form: EntryForm
@@ -59,10 +59,15 @@ class OfAnswers(Measurement):
         return (self.form.name,)
 
     @property
+    def stem(self) -> str:
+        """Path of its Records without the ending, in a folder of its own."""
+        return f"entries/{self.form.name}-{self.id[:8]}/records"
+
+    @property
     def products(self) -> tuple[str, ...]:
-        """Records, the machine, and the copy of the entry."""
-        copy = f"entries/{self.form.name}-{self.id[:8]}"
-        return (*super().products, f"{copy}/{FORM}", f"{copy}/{ANSWER_FILES[0]}")
+        """Records, the machine, and a copy of the entry."""
+        folder = self.stem.removesuffix("records")
+        return (*super().products, folder + FORM, folder + ANSWER_FILES[0])
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure the answers, and copy the entry; BadInput if they are no longer those that were planned."""

@@ -18,7 +18,7 @@ from jobs.recipe.entry import ANSWER_FILES, FORM, blank_form
 from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import Recipe
 from jobs.terminal import print_lines
-from jobs.verbs.parameters import Local, RecipeName
+from jobs.verbs.parameters import NOTHING, Add, Local, RecipeName
 from pipeline import versions
 from pipeline.folders import own_files
 from pipeline.models.domain import PHYSICS
@@ -42,12 +42,13 @@ def questions(
     recipe: RecipeName,
     *,
     to: Annotated[Local, Parameter(help="Folder to write: empty, not there, or with the questions of before.")],
+    add: Add = NOTHING,
 ) -> None:
     """Write the questions of a recipe, its fabrics, and the form of an entry.
 
     BadInput if the recipe cannot be used, or the folder holds anything else.
     """
-    loaded = load_recipe(recipe)
+    loaded = load_recipe(recipe, add)
     if to.is_dir() and any(to.iterdir()) and not (to / _LISTING).is_file():
         raise BadInput("questions", "--to", str(to), "is not empty; name another folder, or empty it")
     shards = [part.shard for part in DataSet(loaded).shards if part.shard.split == "test"]

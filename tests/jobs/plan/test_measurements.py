@@ -28,7 +28,7 @@ def tasks():
     words = {"name": "theirs", "title": "theirs", "definition": "Theirs.", "unit": "1"}
     words |= {"better": "lower", "format": "percent", "stated": "1"}
     recipes[0] = replace(recipes[0], metrics=(AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words),))
-    filled = {name: "theirs" for name in ("name", "authors", "version", "machine", "training")} | {"source": ""}
+    filled = dict.fromkeys(("name", "authors", "version", "machine", "training"), "theirs") | {"source": ""}
     filled |= {"questions": "0" * 16, "nanoseconds": 1, "threads": 1, "tries": 1, "each_fabric": False}
     entry = Entry(EntryForm(**filled, bytes_stored=0, multiply_adds=0), "0" * 64, "/records/answers.csv")
     recipes[0] = replace(recipes[0], entries=(entry,))

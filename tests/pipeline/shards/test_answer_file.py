@@ -8,7 +8,7 @@ from pyarrow import csv
 
 from pipeline.shards.answer_file import ID, RGB_COLUMNS, answers_sha256, read_answers, write_answers
 from pipeline.truth.conventions import COMPONENTS
-from tests.refusals import refusal
+from tests.refusals import accepted, refusal
 
 COUNT = 40
 RIGHT = np.random.default_rng(0).random((COUNT, 4)).astype(np.float32)
@@ -78,6 +78,19 @@ def test_missing_repeated_and_foreign_ids_are_named(tmp_path, one, other, ending
     for foreign in (-1 - one, COUNT + other, 2**62):
         right[ID][one] = foreign
         assert f"row {one}, column id = {foreign}: is no question: ids are 0 to 39" in refused(path, right)
+
+
+@bounded
+@given(st.sampled_from(ENDINGS), st.lists(st.tuples(st.integers(0, 10**6), st.binary(max_size=4)), max_size=4))
+def test_a_damaged_file_is_read_or_one_sentence(tmp_path, ending, changes):
+    path = write(tmp_path / f"a{ending}", columns())
+    content = bytearray(path.read_bytes())
+    for place, new in changes:
+        start = place % len(content)
+        content[start : start + 2] = new or b"\0"
+    path.write_bytes(content)
+    answers = accepted(read_answers, path, COUNT)
+    assert answers is None or (answers.shape[0] == COUNT and np.isfinite(answers).all() and (answers >= 0).all())
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
