@@ -1,7 +1,8 @@
 """`twillight challenge`: a secret seed with a public hash, and the recipe whose cloths and queries it draws.
 
 A round is the recipe `challenge` with the seeds of the round in place of its own. So the population and the queries are
-those of the code that all recipes share, and whoever has the seed generates the same bytes.
+those of the code that all recipes share, and whoever has the seed generates the same bytes. A text that is public only
+after the hash, such as a hash of all frozen versions, enters too: nobody can draw seeds until one suits.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ _WHERE: Final = "challenge"
 _SEED: Final = "seed"
 _MOST: Final = 1024  # bytes of a file with a seed
 _DIGITS: Final = 8  # of the hash, in the name of a round
+_MOST_LETTERS: Final = 100
 
 Folder = Annotated[Local, Parameter(help="Folder to write to.")]
 
@@ -50,18 +52,21 @@ def reveal(
     seed: Annotated[str, Parameter(help="The seed, or the file that holds it.")],
     *,
     to: Folder,
+    public: Annotated[str, Parameter(help="Text that nobody knew when the hash was published; at most 100 letters.")],
     commitment: Annotated[str | None, Parameter(help="SHA-256 that was published; another seed is refused.")] = None,
 ) -> None:
-    """Write the recipe of a round; BadInput if there is no seed, or not that of the commitment."""
+    """Write the recipe of a round; BadInput if the seed or the text cannot be used, or the commitment is of another."""
     text = _read(seed)
     sha256 = _sha256(text)
     if commitment is not None and commitment.strip().lower() != sha256:
         raise BadInput(_WHERE, "--commitment", commitment, f"the seed has the SHA-256 {sha256}")
+    if not public or len(public) > _MOST_LETTERS or not public.isprintable():
+        raise BadInput(_WHERE, "--public", public, f"a line of at most {_MOST_LETTERS} letters is needed")
     content = tomllib.loads((RECIPES / f"{_WHERE}.toml").read_text(encoding="utf-8"))
     content["name"] = f"{_WHERE}-{sha256[:_DIGITS]}"
-    content["about"] = f"Round of the seed with the SHA-256 {sha256}."
+    content["about"] = f"Round of the seed with the SHA-256 {sha256} and of the text {public}"
     for table, purpose in ((content["dataset"], "queries"), (content["dataset"]["unseen_population"], "cloths")):
-        table["seed"] = stream_seed(f"{_WHERE} {purpose}", [text]) >> 1  # TOML has signed integers
+        table["seed"] = stream_seed(f"{_WHERE} {purpose}", [text, public]) >> 1  # TOML has signed integers
     path = to / f"{content['name']}.toml"
     atomic_write(path, tomli_w.dumps(content).encode())
     print_lines(f"{path}: `twillight questions {path} --to FOLDER` writes its questions")
