@@ -29,7 +29,7 @@ _WHERE: Final = "challenge"
 _SEED: Final = "seed"
 _MOST: Final = 1024  # bytes of a file with a seed
 _DIGITS: Final = 8  # of the hash, in the name of a round
-_MOST_LETTERS: Final = 100
+_MOST_LETTERS: Final = 80  # of a text: `about` of a recipe has 200
 
 Folder = Annotated[Local, Parameter(help="Folder to write to.")]
 
@@ -52,7 +52,7 @@ def reveal(
     seed: Annotated[str, Parameter(help="The seed, or the file that holds it.")],
     *,
     to: Folder,
-    public: Annotated[str, Parameter(help="Text that nobody knew when the hash was published; at most 100 letters.")],
+    public: Annotated[str, Parameter(help="Text that nobody knew when the hash was published; at most 80 letters.")],
     commitment: Annotated[str | None, Parameter(help="SHA-256 that was published; another seed is refused.")] = None,
 ) -> None:
     """Write the recipe of a round; BadInput if the seed or the text cannot be used, or the commitment is of another."""

@@ -12,7 +12,7 @@ def test_a_round_is_drawn_from_its_seed_and_only_from_it(call, tmp_path):
     seed, (sha256,) = file.read_text(), re.findall(r"\b[0-9a-f]{64}\b", said)
     assert code == 0 and stat.S_IMODE(file.stat().st_mode) == 0o600
     assert hashlib.sha256(seed.encode()).hexdigest() == sha256 and seed not in said
-    rounds = {"a": (seed, "x"), "b": (file, "x"), "c": ("0" * 64, "x"), "d": (seed, "y")}
+    rounds = {"a": (seed, "x"), "b": (file, "x"), "c": ("0" * 64, "x"), "d": (seed, "y" * 80)}
     for folder, (given, public) in rounds.items():
         checked = ("--commitment", sha256) if folder != "c" else ()
         reveal = ("challenge", "reveal", given, "--public", public, "--to", tmp_path / folder, *checked)
@@ -33,7 +33,7 @@ def test_seeds_are_never_replaced_and_another_one_is_refused(call, refused, tmp_
     assert "holds a seed, which is never replaced" in refused("challenge", "new", "--to", tmp_path)
     assert (tmp_path / "seed").read_text() == before
     reveal = ("challenge", "reveal", "--to", tmp_path / "round", "--public", "x")
-    assert "--public" in refused(*reveal[:-1], "x" * 101, tmp_path / "seed")
+    assert "--public" in refused(*reveal[:-1], "x" * 81, tmp_path / "seed")
     assert "the seed has the SHA-256" in refused(*reveal, tmp_path / "seed", "--commitment", "0" * 64)
     for seed in ("12", "g" * 64, tmp_path, "x" * 5000):
         refused(*reveal, seed)
