@@ -240,7 +240,8 @@ def _equal_time(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
         for (method, setting, rival), group in part.groupby(["method", "setting", "rival"], sort=False):
             line = [TableCell(display(str(rival)))]
             for row in rows(group.set_index("size").loc[sizes]):
-                other = "too slow" if missing(row.rival_error) else times(row.ratio)
+                slow = NONE if missing(row.ns) else "too slow"
+                other = slow if missing(row.rival_error) else times(row.ratio)
                 line.append(TableCell(f"{percent(row.error)} · {other}", strong=row.ratio < 1.0))
             lines.append(method_row(str(method), str(setting), line))
         known = {**values, "measure": measure.capitalize()}

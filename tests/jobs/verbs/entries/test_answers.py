@@ -13,7 +13,8 @@ from pipeline.scenes.shade import coloured, colours_of
 from pipeline.shards.answer_file import write_answers
 from reports.measure.by_size import measure_errors_by_size
 from reports.measure.held_out import held_out, measure_errors
-from reports.record import read_records
+from reports.record import Record, read_records
+from reports.tables.number_format import percent
 from reports.tables.page_tables import page_frames, result_tables
 from tests.jobs import made_up
 
@@ -97,6 +98,21 @@ def test_an_entry_is_a_row_of_the_page_and_what_it_states_is_marked(recipe, entr
         "| theirs | ≤ 16 k | 120 | 5.0 kB | 900 | 1 | an old laptop, threads: 2 | none | https://example.org/code, "
         "version 3f2a |"
     )
+
+
+def test_errors_by_size_of_an_entry_are_shown_without_a_time(recipe, entry, out):
+    records = measured(recipe, entry(), out)
+    (own,) = (record for record in records if record.metric == "size_colour")
+    for setting, ns in (("k = 1", 100.0), ("k = 2", 200.0)):
+        rival = Record(method="point_sampled", setting=setting)
+        curve = tuple((edge, ns) for edge, _ in own.curve)
+        records += [rival.of("size_time", ns, 1, curve=curve)]
+        records += [rival.of(f"size_{part}", 0.5, 1, curve=own.curve) for part in ("colour", "specular", "diffuse")]
+    colour, _ = result_tables(records, page_frames(records), {})["equal-time"]
+    (row,) = colour.rows
+    errors = [cell.text.split(" · ") for cell in row.cells[1:]]
+    assert (row.method, str(row.cells[0])) == ("theirs", "points") and {other for _, other in errors} == {"–"}
+    assert [error for error, _ in errors] == [percent(value) for value in (*dict(own.curve).values(), own.value)]
 
 
 def test_an_entry_changes_no_other_task_but_the_page_and_goes_when_it_is_not_named(
