@@ -152,11 +152,6 @@ class Subjects:
         """The named fabrics with their roles: the seen ones, then the unseen ones."""
         return list(self.recipe.tested[: len(self.recipe.seen) + len(self.recipe.unseen)])
 
-    @property
-    def unseen_population(self) -> list[tuple[Fabric, Role]]:
-        """The random unseen fabrics."""
-        return list(self.recipe.tested[len(self.fabrics) :])
-
     @cached_property
     def models(self) -> list[ModelSubject]:
         """The models in the order of the recipe, once for each seed that they are trained with."""

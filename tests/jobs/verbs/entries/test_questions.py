@@ -18,6 +18,7 @@ from weaves.draft_files.read import read_draft
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.validation import validated
+from weaves.yarn import Yarn
 
 
 @pytest.fixture
@@ -64,7 +65,8 @@ def test_a_folder_has_all_that_is_known_of_the_fabrics_and_no_other_file(folder)
         colours = [fabric.warp.specular_rgb, fabric.weft.specular_rgb, fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb]
         np.testing.assert_allclose(about["colours"], colours, atol=1e-8)
     words = (folder / "README.md").read_text(encoding="utf-8")
-    assert "f_P ALREADY CONTAINS" in words.replace("`", "") and "Ids are 0 to 255" in words and "{" not in words
+    assert "f_P ALREADY CONTAINS" in words.replace("`", "") and "Ids are 0 to 255" in words
+    assert all(f"`{key}`" in words for key in Yarn.model_fields) and "{" not in words
 
 
 def test_the_same_recipe_gives_the_same_bytes_and_other_files_are_refused(folder, recipe, refused, call, tmp_path):
