@@ -18,7 +18,7 @@ from jobs.exits import run_to_exit
 from jobs.verbs.parameters import OUT
 
 VERBS: Final[dict[str, Any]] = tomllib.loads(Path(__file__).with_name("verbs.toml").read_text(encoding="utf-8"))
-"""The verbs by their names: `function`, `help` and `examples`."""
+"""The verbs by their names: `function`, `help` and `examples`; of the first of two words also the help, `group`."""
 
 
 def _version() -> str:
@@ -37,13 +37,14 @@ app = App(
     group_commands="Verbs, in the order of work",
     default_parameter=Parameter(negative=()),
 )
+groups = {"": app}
 for order, (verb, entry) in enumerate(VERBS.items()):
     parent, _, name = verb.rpartition(" ")
-    group = app
-    if parent:
-        app.command(group := App(name=parent, help="Join Records of several machines.", sort_key=order))
+    if parent not in groups:
+        app.command(group := App(name=parent, help=entry["group"], sort_key=order))
+        groups[parent] = group
     calls = "\n".join(f"    twillight {verb} {tokens}".rstrip() for tokens in entry["examples"])
-    group.command(
+    groups[parent].command(
         f"jobs.verbs.{entry['function']}",
         name=name,
         help=entry["help"],

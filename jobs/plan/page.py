@@ -15,7 +15,7 @@ from jobs.plan.measurements.truth_images import LivePage
 from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
-from pipeline.models.added.added_code import AddedMethod
+from pipeline.models.added.added_code import ADDED_MODEL, AddedMethod
 from reports import catalogue
 from reports.catalogue import AddedMetric, enter
 from reports.options import BenchOptions, Role
@@ -62,10 +62,16 @@ class Page(Task):
             recipe=recipe.name,
             about=recipe.about,
             dataset=f"{recipe.name}, {subjects.dataset.fingerprint}",
-            fabrics=(*subjects.fabrics, *subjects.unseen_population),
-            models=tuple(
-                _note(recipe, model, first.trainings, shots)
-                for model, first in zip(recipe.models, subjects.first_models, strict=True)
+            fabrics=recipe.tested,
+            models=(
+                *(
+                    _note(recipe, model, first.trainings, shots)
+                    for model, first in zip(recipe.models, subjects.first_models, strict=True)
+                ),
+                *(
+                    ModelNote(form.name, form.about, per_material=form.each_fabric, kind=ADDED_MODEL)
+                    for form in (entry.form for entry in recipe.entries)
+                ),
             ),
             options=recipe.bench,
             metrics=recipe.metrics,

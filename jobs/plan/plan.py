@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from jobs.plan.dataset import DataSet, Shard
+from jobs.plan.measurements.answers import OfAnswers
 from jobs.plan.measurements.fabrics import ErrorsBySize, OfAddedMetric, OnFabric, OnUnseenPopulation, TruthNoise
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.models import AtExtremes, Latents
@@ -39,6 +40,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     TimeOfMethods,
     ErrorsBySize,
     OfAddedMetric,
+    OfAnswers,
     LivePage,
     Study,
 )

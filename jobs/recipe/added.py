@@ -1,4 +1,4 @@
-"""Methods and metrics from outside in a recipe: given with `--add`, or installed and named by the recipe.
+"""Methods, metrics and answers from outside in a recipe: given with `--add`, or installed and named by the recipe.
 
 A recipe names such a method as it names any other, ``[[models]] model = "its_name"``; the keys beside are its options.
 `--add` enters it with its defaults if the recipe does not name it. A function is a metric, which is measured of
@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any, Final
 
+from jobs.recipe.entry import FORM
 from pipeline.models.added.added_code import ADDED_MODEL, GROUP, AddedFunction, AddedMethod
 from pipeline.models.added.describe import describe
 from pipeline.models.added.source import ADD
@@ -26,15 +28,18 @@ _BESIDE: Final = ("model", "name", "version", "limit", "training", "seeds", "run
 class Added:
     """The methods from outside that a recipe may name, by the values of `--add`.
 
-    A value is ``module:name``, ``file.py:name``, or the name of an installed method. BadInput if one cannot be used, is
-    given twice, or has the name of a method of the package.
+    A value is ``module:name``, ``file.py:name``, the name of an installed method, or the path of an entry's form, which
+    the command line makes of ``--answers FOLDER``. BadInput if one cannot be used, is given twice, or has the name of a
+    method of the package.
     """
 
     def __init__(self, given: Sequence[str] = ()) -> None:
         self._given: dict[str, AddedMethod] = {}
         self.metrics: list[AddedMetric] = []
         """The metrics from outside."""
-        for text in given:
+        self.forms = [Path(text) for text in given if text.endswith(FORM)]
+        """The forms of entries."""
+        for text in (text for text in given if not text.endswith(FORM)):
             source = text if ":" in text else _installed().get(text)
             if source is None:
                 known = f"installed: {', '.join(sorted(_installed()))}" if _installed() else "none is installed"

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from jobs.recipe.added import Added
+from jobs.recipe.entry import Entry, read_entry
 from jobs.recipe.recipe import Recipe, RecipeFile
 from jobs.recipe.shipped import RECIPES, recipe_names
 from jobs.recipe.trained_by import check_trained_by, with_trained_by
@@ -29,8 +31,8 @@ MOST_RECIPES: Final = 32
 def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:
     """Read a recipe of the package by its name, or a TOML file by its path, which ends in ``.toml``.
 
-    Methods and metrics from outside the package are in `add` (`jobs.recipe.added`). BadInput if there is no such
-    recipe, or anything in it, in its fabrics or among `add` cannot be used.
+    Methods, metrics and answers from outside the package are in `add` (`jobs.recipe.added`). BadInput if there is no
+    such recipe, or anything in it, in its fabrics or among `add` cannot be used.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -80,7 +82,18 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
     )
     validate_recipe(recipe, where)
     check_trained_by(recipe, where)
-    return recipe
+    return recipe if chain else replace(recipe, entries=tuple(_entries(recipe, added.forms)))
+
+
+def _entries(recipe: Recipe, forms: Sequence[Path]) -> Iterator[Entry]:
+    """Read entries, which answer the questions of a recipe."""
+    taken = [model.options.name for model in recipe.models]
+    for path in forms:
+        entry = read_entry(path, recipe.questions, len(recipe.tested) * recipe.dataset.rows.test)
+        if entry.form.name in taken:
+            raise BadInput(str(path), "name", entry.form.name, "is the name of a model or of another entry")
+        taken.append(entry.form.name)
+        yield entry
 
 
 def _beside(recipe: Path, name: object, key: str) -> Path:

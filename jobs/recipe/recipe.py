@@ -14,17 +14,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import AfterValidator, Field, StrictInt, StrictStr, model_validator
 
+from pipeline import versions
+from pipeline.fingerprint import fingerprint
 from pipeline.models.catalogue import ModelOptions
+from pipeline.models.domain import PHYSICS
 from pipeline.shards.queries import QueryOptions
 from pipeline.training.options import TrainingOptions
 from pipeline.truth.options import TruthOptions
 from reports.catalogue import AddedMetric
 from reports.options import BenchOptions, RuntimeName
+from reports.options import Role as MeasuredAs
 from weaves.fabric import Fabric
 from weaves.population import Population
 from weaves.validation import Frozen
 
 if TYPE_CHECKING:
+    from jobs.recipe.entry import Entry
     from pipeline.shards.extra_rows import ExtraRows
     from pipeline.shards.manifest import Role, Split
 
@@ -175,6 +180,8 @@ class Recipe:
     """From the names of models that another recipe trains to that recipe."""
     metrics: tuple[AddedMetric, ...] = ()
     """Metrics from outside (`jobs.recipe.added`)."""
+    entries: tuple[Entry, ...] = ()
+    """Answers that were computed elsewhere."""
 
     @property
     def by_role(self) -> dict[Role, tuple[Fabric, ...]]:
@@ -190,6 +197,21 @@ class Recipe:
     def fabrics(self) -> tuple[Fabric, ...]:
         """All fabrics."""
         return tuple(fabric for fabrics in self.by_role.values() for fabric in fabrics)
+
+    @property
+    def tested(self) -> tuple[tuple[Fabric, MeasuredAs], ...]:
+        """The fabrics that are measured, each as seen or unseen: the named ones, then the random ones."""
+        unseen = (*self.unseen, *self.unseen_population)
+        return (*((fabric, "seen") for fabric in self.seen), *((fabric, "unseen") for fabric in unseen))
+
+    @property
+    def questions(self) -> str:
+        """Fingerprint of all that held-out queries and their right answers depend on, whatever their precision."""
+        dataset = self.dataset
+        drawn = [versions.TRUTH, dataset.seed, dataset.rows.test, dataset.queries.model_dump(mode="json")]
+        physics = {name: getattr(dataset.truth, name) for name in PHYSICS}
+        fabrics = [fabric.model_dump(mode="json", exclude={"source"}) for fabric, _ in self.tested]
+        return fingerprint(["questions", *drawn, physics, fabrics])
 
     @property
     def own_models(self) -> list[ModelRecipe]:

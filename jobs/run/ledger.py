@@ -67,13 +67,14 @@ class Ledger:
     def places(self, receipt: Receipt) -> Iterator[str]:
         """Yield the paths of the existing files that a receipt is about, relative to the output folder."""
         folders = {
-            "generate": f"{DATASETS}/*",
-            "train": f"models/*-{receipt.task[:8]}",
-            "bench": "records",
-            "report": f"report/{glob.escape(receipt.title.removeprefix('page of '))}",
+            "generate": (f"{DATASETS}/*",),
+            "train": (f"models/*-{receipt.task[:8]}",),
+            "bench": ("records", f"entries/*-{receipt.task[:8]}"),
+            "report": (f"report/{glob.escape(receipt.title.removeprefix('page of '))}",),
         }
         for name in receipt.files:
-            yield from self.store.named(folders.get(receipt.stage, "none"), name)
+            for folder in folders.get(receipt.stage, ()):
+                yield from self.store.named(folder, name)
 
     def receipt_path(self, task: Task) -> str:
         """Return the path of a task's receipt, relative to the output folder."""

@@ -28,7 +28,7 @@ from weaves.errors import BadInput, WorkFailed
 LEDGER: Final = "ledger"
 """Folder of the receipts, relative to the output folder."""
 
-_FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "report")
+_FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "entries", "report")
 
 
 class Store:

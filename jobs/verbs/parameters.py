@@ -30,6 +30,13 @@ def _local(type_: object, tokens: Sequence[Token]) -> Path:
     return path
 
 
+def _added(type_: object, tokens: Sequence[Token]) -> list[str]:
+    """Return what is added; of the folder of an entry the path of its form."""
+    from jobs.recipe.entry import FORM
+
+    return [str(Path(each.value) / FORM) if each.keyword == "--answers" else each.value for each in tokens]
+
+
 def _whole(type_: object, tokens: Sequence[Token]) -> int:
     """Return an integer as it is written; cyclopts itself rounds 1.5 to 2."""
     return int(tokens[0].value)
@@ -45,7 +52,12 @@ RecipeName = Annotated[str, Parameter(help="Name of a recipe of the package, or 
 SceneName = Annotated[str, Parameter(help="Name of a scene of the package, or path of an .xml or .toml file.")]
 Add = Annotated[
     list[str],
-    Parameter(help="Method or metric from outside: MODULE:NAME, FILE.py:NAME, or an installed method; runs its code."),
+    Parameter(
+        name=("--add", "--answers"),
+        converter=_added,
+        help="Method or metric from outside: MODULE:NAME, FILE.py:NAME, or an installed method; runs its code. "
+        "--answers: the folder of an entry, with answers to the recipe's questions; runs no code.",
+    ),
 ]
 NOTHING: Final[list[str]] = []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, NamedTuple
 
@@ -57,14 +58,20 @@ def print_plan(
     add: Add = NOTHING,
     out: Out = OUT,
     workers: Annotated[Whole, Parameter(help="Show how long so many workers take, and where it stops scaling.")] = 0,
+    price: Annotated[float, Parameter(help="Price of a core-hour: show what the work that is left costs.")] = 0.0,
 ) -> None:
-    """Print the plan of a recipe; nothing is computed. BadInput if the recipe or the workers cannot be used."""
+    """Print the plan of a recipe; nothing is computed. BadInput if the recipe, workers or price cannot be used."""
     if not 0 <= workers <= _MOST_WORKERS:
         raise BadInput("--workers", "", workers, f"must be from 1 to {_MOST_WORKERS}")
+    if not 0 <= price < math.inf:
+        raise BadInput("--price", "", price, "must be at least 0")
     tasks = plan(load_recipe(recipe, add))
     facts = facts_of(tasks, Ledger(out))
     _print_plan(tasks, facts)
     print_lines(*_details(tasks, facts))
+    if price:
+        hours = sum(facts.seconds[task.id] for task in facts.left(tasks)) / 3600
+        print_lines(f"to do: {hours:,.2f} core-hours, {hours * price:,.2f} at {price:g} each")
     if workers:
         print_lines("")
         _print_schedule(tasks, facts, workers)

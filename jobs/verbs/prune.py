@@ -25,7 +25,7 @@ from jobs.verbs.parameters import NOTHING, OUT, Add, Out
 from pipeline.storage import is_local, listing, remove_all
 from weaves.errors import BadInput
 
-_FOLDERS: Final = (DATASETS, "models", "records", "report", "ledger")
+_FOLDERS: Final = (DATASETS, "models", "records", "entries", "report", "ledger")
 """Folders of the products of each stage, and of the receipts."""
 
 _RECEIPT: Final = re.compile(r"ledger/([0-9a-f]{16})(\.failed)?\.json")

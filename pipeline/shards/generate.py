@@ -13,6 +13,7 @@ from pipeline.fingerprint import stream_seed
 from pipeline.shards.extra_rows import ExtraRows, set_name
 from pipeline.shards.queries import Kind, QueryOptions, answered, draw_queries
 from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 from weaves.validation import Frozen
 
@@ -47,6 +48,14 @@ class ShardTask(_AnyTask):
     truth: TruthOptions = TruthOptions()
     """How they are answered."""
 
+    def stream(self, purpose: str) -> int:
+        """Return the seed of its queries or points."""
+        return stream_seed(purpose, [self.fabric.optics(), self.split, self.seed])
+
+    def drawn(self) -> Queries:
+        """Return its queries."""
+        return draw_queries(self.queries, self.fabric.weave.repeat, self.stream("queries"), self.start, self.rows)
+
 
 class ExtraShardTask(_AnyTask):
     """Everything that a shard of extra rows depends on, and the fabric's name."""
@@ -77,11 +86,7 @@ def generate_shard(task: AnyShardTask, path: Path, progress: Callable[[float], N
         progress(rows / task.rows)
 
     if isinstance(task, ShardTask):
-        stream = [task.fabric.optics(), task.split, task.seed]
-        queries = draw_queries(
-            task.queries, task.fabric.weave.repeat, stream_seed("queries", stream), task.start, task.rows
-        )
-        points = stream_seed("points", stream)
+        queries, points = task.drawn(), task.stream("points")
         columns = columns_of(queries, answered(task.fabric, queries, task.truth, points, task.start, finished))
     else:
         columns = task.extra.answer(task.fabric, task.start, task.rows, finished)

@@ -134,10 +134,10 @@ def read_columns(path: Path, kind: Kind) -> dict[str, npt.NDArray[Any]]:
     return numbers_of(read_table(path, kind))
 
 
-def columns_of(queries: Queries, answers: Answers) -> dict[str, npt.NDArray[Any]]:
-    """Return queries and answers by column."""
+def columns_of(*rows: Queries | Answers) -> dict[str, npt.NDArray[Any]]:
+    """Return queries, answers or both by column."""
     columns: dict[str, npt.NDArray[Any]] = {}
-    for field, values in (queries._asdict() | answers._asdict()).items():
+    for field, values in (item for part in rows for item in part._asdict().items()):
         names = _STACKED.get(field)
         columns |= dict(zip(names, values.T, strict=True)) if names else {field: values}
     return columns

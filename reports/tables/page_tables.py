@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from reports.catalogue import METRICS, OTHER, metric_row
+from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.measure.extremes import FOOTPRINTS, error_name
 from reports.over_seeds import MOST
 from reports.record import Record, to_table
@@ -66,6 +66,11 @@ _FRAMES: Final = {
     "scenes": summary.scene_table,
     "by_size": size_table,
 }
+ENTRY_CLASSES: Final = (4_000, 16_000, 100_000)
+"""Most multiply-adds of a query, and most bytes of a fabric, in each class of entries but the last, which is open."""
+
+_STATED: Final = columns_of("entries")
+_NOTES: Final = {"machine": "stated_time", "trained on": "stated_bytes", "code": "stated_tries"}
 _WHERE_MEASURED: Final = {"between": summary.path_table, OTHER: summary.other_table, "extremes": summary.extremes_table}
 
 
@@ -154,6 +159,7 @@ def result_tables(
         "latents": _latents(records, frames, values),
         "silhouettes": [of_methods("silhouettes", frames["silhouettes"], values)],
         "time": [_timing(frames["timing"], values)],
+        "entries": [_entries(records, values)],
         "other": _other(frames, values),
         "stability": _extremes(frames, values),
     }
@@ -244,7 +250,8 @@ def _equal_time(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
         for (method, setting, rival), group in part.groupby(["method", "setting", "rival"], sort=False):
             line = [TableCell(display(str(rival)))]
             for row in rows(group.set_index("size").loc[sizes]):
-                other = "too slow" if missing(row.rival_error) else times(row.ratio)
+                slow = NONE if missing(row.ns) else "too slow"
+                other = slow if missing(row.rival_error) else times(row.ratio)
                 line.append(TableCell(f"{percent(row.error)} · {other}", strong=row.ratio < 1.0))
             lines.append(method_row(str(method), str(setting), line))
         known = {**values, "measure": measure.capitalize()}
@@ -314,6 +321,26 @@ def _timing(frame: pd.DataFrame, values: Values) -> ResultTable:
     fewer = f", {few:.0f} threads" if few > 1 else ""
     more = f", {many:.0f} threads" if many > 1 else ", more threads"
     return of_methods("timing", frame, {**values, "fewer": fewer, "more": more})
+
+
+def entry_class(largest: float) -> str:
+    """Return the class of an entry, from the larger of its multiply-adds for a query and its bytes for a fabric."""
+    return next((f"≤ {limit // 1000} k" for limit in ENTRY_CLASSES if largest <= limit), "open")
+
+
+def _entries(records: Sequence[Record], values: Values) -> ResultTable:
+    """Return what entries state, and the classes that follow."""
+    stated: dict[str, dict[str, Record]] = {}
+    for record in records:
+        if metric_row(record.metric).table == "entries":
+            stated.setdefault(record.method, {})[record.metric] = record
+    lines = []
+    for method, of in stated.items():
+        largest = max(of["stated_bytes"].value, of["stated_multiply_adds"].value)
+        cells = [entry_class(largest), *(shown(name, of[name].value) for name in _STATED)]
+        lines.append(method_row(method, "", map(TableCell, [*cells, *(of[name].note for name in _NOTES.values())])))
+    titles = [metric_row(name).title for name in _STATED]
+    return table("entries", ["method", "class", *titles, *_NOTES], lines, values)
 
 
 def _other(frames: Frames, values: Values) -> list[ResultTable]:

@@ -239,7 +239,7 @@ class OfAddedMetric(_OnHeldOut):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a metric, fabric, model that answers for it, and seed."""
         for metric in subjects.recipe.metrics:
-            for fabric, role in (*subjects.fabrics, *subjects.unseen_population):
+            for fabric, role in subjects.recipe.tested:
                 for _, trained in subjects.answering([fabric.name]):
                     yield cls.of(subjects, fabric, role, metric=metric, model=trained)
 

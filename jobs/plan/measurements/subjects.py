@@ -150,12 +150,7 @@ class Subjects:
     @property
     def fabrics(self) -> list[tuple[Fabric, Role]]:
         """The named fabrics with their roles: the seen ones, then the unseen ones."""
-        return [(fabric, "seen") for fabric in self.recipe.seen] + [(fabric, "unseen") for fabric in self.recipe.unseen]
-
-    @property
-    def unseen_population(self) -> list[tuple[Fabric, Role]]:
-        """The random unseen fabrics."""
-        return [(fabric, "unseen") for fabric in self.recipe.unseen_population]
+        return list(self.recipe.tested[: len(self.recipe.seen) + len(self.recipe.unseen)])
 
     @cached_property
     def models(self) -> list[ModelSubject]:

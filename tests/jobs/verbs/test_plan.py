@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,17 @@ def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, call):
     assert code == 0
     for part in ("3 workers: ", "workers save less than 5%", "durations are measured"):
         assert part in told
+
+
+def test_a_price_is_of_each_core_hour_that_is_left(files, out, call):
+    costs = []
+    for price in (1000, 2000):
+        told = call("plan", files.write(), "--price", price)[1]
+        hours, cost = re.search(rf"to do: ([\d,.]+) core-hours, ([\d,.]+) at {price} each", told).groups()
+        costs.append(float(cost.replace(",", "")))
+        assert costs[-1] == pytest.approx(price * float(hours), abs=0.005 * price)
+    assert costs[1] == pytest.approx(2 * costs[0], abs=0.02) and costs[0] > 0
+    assert "core-hours" not in call("plan", files.write())[1]
 
 
 def test_a_plan_of_a_folder_that_is_not_there_is_one_of_new_tasks(files, tmp_path, call):

@@ -1,0 +1,87 @@
+"""`twillight challenge`: a secret seed with a public hash, and the recipe whose cloths and queries it draws.
+
+A round is the recipe `challenge` with the seeds of the round in place of its own. So the population and the queries are
+those of the code that all recipes share, and whoever has the seed generates the same bytes. A text that is public only
+after the hash, such as a hash of all frozen versions, enters too: nobody can draw seeds until one suits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import tomllib
+from pathlib import Path
+from typing import Annotated, Final
+
+import tomli_w
+from cyclopts import Parameter
+
+from jobs.recipe.shipped import RECIPES
+from jobs.terminal import print_lines
+from jobs.verbs.parameters import Local
+from pipeline.atomic import atomic_write, disk_errors
+from pipeline.fingerprint import stream_seed
+from weaves.errors import BadInput
+from weaves.reading import read_text
+
+_WHERE: Final = "challenge"
+_SEED: Final = "seed"
+_MOST: Final = 1024  # bytes of a file with a seed
+_DIGITS: Final = 8  # of the hash, in the name of a round
+_MOST_LETTERS: Final = 80  # of a text: `about` of a recipe has 200
+
+Folder = Annotated[Local, Parameter(help="Folder to write to.")]
+
+
+def new(*, to: Folder) -> None:
+    """Write a new seed that only its owner can read, and print its hash; BadInput if there is one already."""
+    path, seed = to / _SEED, secrets.token_hex(32)
+    with disk_errors(path):
+        to.mkdir(parents=True, exist_ok=True)
+        try:
+            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        except FileExistsError as error:
+            raise BadInput(_WHERE, "--to", str(to), "holds a seed, which is never replaced; name another") from error
+        with open(handle, "w") as file:  # noqa: PTH123, there is a handle only
+            file.write(seed)
+    print_lines(f"{path}: keep it secret until all answers are in; publish its SHA-256 now:", _sha256(seed))
+
+
+def reveal(
+    seed: Annotated[str, Parameter(help="The seed, or the file that holds it.")],
+    *,
+    to: Folder,
+    public: Annotated[str, Parameter(help="Text that nobody knew when the hash was published; at most 80 letters.")],
+    commitment: Annotated[str | None, Parameter(help="SHA-256 that was published; another seed is refused.")] = None,
+) -> None:
+    """Write the recipe of a round; BadInput if the seed or the text cannot be used, or the commitment is of another."""
+    text = _read(seed)
+    sha256 = _sha256(text)
+    if commitment is not None and commitment.strip().lower() != sha256:
+        raise BadInput(_WHERE, "--commitment", commitment, f"the seed has the SHA-256 {sha256}")
+    if not public or len(public) > _MOST_LETTERS or not public.isprintable():
+        raise BadInput(_WHERE, "--public", public, f"a line of at most {_MOST_LETTERS} letters is needed")
+    content = tomllib.loads((RECIPES / f"{_WHERE}.toml").read_text(encoding="utf-8"))
+    content["name"] = f"{_WHERE}-{sha256[:_DIGITS]}"
+    content["about"] = f"Round of the seed with the SHA-256 {sha256} and of the text {public}"
+    for table, purpose in ((content["dataset"], "queries"), (content["dataset"]["unseen_population"], "cloths")):
+        table["seed"] = stream_seed(f"{_WHERE} {purpose}", [text, public]) >> 1  # TOML has signed integers
+    path = to / f"{content['name']}.toml"
+    atomic_write(path, tomli_w.dumps(content).encode())
+    print_lines(f"{path}: `twillight questions {path} --to FOLDER` writes its questions")
+
+
+def _read(seed: str) -> str:
+    """Return the seed that is given as it is, or in a file."""
+    path = Path(seed)
+    if "\0" not in seed and len(seed) < _MOST and path.exists():
+        seed = read_text(path, _MOST, "a file with a seed").strip()
+    if len(seed) != 64 or set(seed) - set("0123456789abcdef"):
+        raise BadInput(_WHERE, "SEED", seed, "64 hexadecimal digits are needed, or the file that `challenge new` wrote")
+    return seed
+
+
+def _sha256(seed: str) -> str:
+    """Return the hash of a seed, in hexadecimal; `printf SEED | sha256sum` gives the same."""
+    return hashlib.sha256(seed.encode()).hexdigest()

@@ -1,0 +1,133 @@
+"""Answers to all questions of a benchmark as a file from anywhere, Parquet or CSV, read as data and checked as a whole.
+
+A row is the `id` of a question and its answer: the four components, or, if one of these is missing, linear RGB in the
+fabric's own colours. Rows have any order, other columns are ignored.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+from pyarrow import csv
+
+from pipeline.atomic import atomic_path
+from pipeline.compiled.arrays import Float32
+from pipeline.shards.query_file import blocks, open_queries
+from pipeline.shards.store import ROW_GROUP, parquet_writer
+from pipeline.truth.conventions import COMPONENTS
+from weaves.errors import BadInput
+from weaves.reading import refuse_irregular
+
+ID: Final = "id"
+RGB_COLUMNS: Final = ("red", "green", "blue")
+"""Columns of answers in colour."""
+
+_MOST_BYTES: Final = 1024  # of a row of CSV
+_MOST_ROWS: Final = 4  # for each question
+
+
+def read_answers(path: Path, count: int) -> Float32:
+    """Return the answers to the questions 0 to count - 1, (count, 4) components or (count, 3) RGB.
+
+    BadInput for the first fault: columns that are missing or of another type, an id that is no question or is there
+    twice, a value that is negative or not finite, a question without an answer.
+    """
+    table = _parquet(path, count) if path.suffix == ".parquet" else _csv(path, count)
+    for name in table.column_names:
+        if table[name].null_count:
+            row = int(np.flatnonzero(table[name].is_null().to_numpy())[0])
+            raise BadInput(str(path), f"row {row}, column {name}", None, "a number is needed")
+    given = {name: table[name].to_numpy() for name in table.column_names}
+    return _in_order(str(path), given.pop(ID), given, count)
+
+
+def write_answers(path: Path, answers: Float32) -> None:
+    """Write answers in the order of their questions; the same answers give the same bytes."""
+    names = COMPONENTS if answers.shape[1] == len(COMPONENTS) else RGB_COLUMNS
+    columns = {ID: np.arange(len(answers))} | dict(zip(names, np.ascontiguousarray(answers.T), strict=True))
+    table = pa.table(columns)
+    with atomic_path(path) as temporary, parquet_writer(temporary, table.schema, []) as writer:
+        writer.write_table(table, ROW_GROUP)
+
+
+def answers_sha256(answers: Float32) -> str:
+    """Return the hash of answers, whatever file they came in."""
+    return hashlib.sha256(str(answers.shape).encode() + answers.tobytes()).hexdigest()
+
+
+def _parquet(path: Path, count: int) -> pa.Table:
+    """Read the columns of an answer from a Parquet file."""
+    with open_queries(path) as file:
+        names, rows = _columns(path, file.schema_arrow.names), file.metadata.num_rows
+        for name in names:
+            kind = file.schema_arrow.field(name).type
+            if not (pa.types.is_integer(kind) if name == ID else kind in (pa.float32(), pa.float64())):
+                allowed = "must be an integer" if name == ID else "must be float (32 bits) or double (64 bits)"
+                raise BadInput(str(path), f"type of column {name}", str(kind), allowed)
+        if rows > _MOST_ROWS * count:
+            raise BadInput(str(path), "", f"has {rows:,} rows", f"there are {count:,} questions")
+        read = (block.select(names) for block in blocks(path, file, names))
+        return pa.concat_tables([file.schema_arrow.empty_table().select(names), *read])
+
+
+def _csv(path: Path, count: int) -> pa.Table:
+    """Read the columns of an answer from a file of CSV with a heading."""
+    refuse_irregular(path, "a file of CSV")
+    most = _MOST_BYTES * (_MOST_ROWS * count + 1)
+    try:
+        if (size := path.stat().st_size) > most:
+            raise BadInput(str(path), "", f"has {size:,} bytes", f"at most {most:,} are read for {count:,} questions")
+        with csv.open_csv(path) as reader:
+            names = _columns(path, reader.schema.names)
+        types = dict.fromkeys(names, pa.float64()) | {ID: pa.int64()}
+        return csv.read_csv(path, convert_options=csv.ConvertOptions(column_types=types, include_columns=names))
+    except (pa.ArrowException, OSError) as error:
+        reason = " ".join(str(error).split())
+        raise BadInput(
+            str(path), "", f"cannot be read ({reason[:120]})", "a heading, then numbers, are needed"
+        ) from error
+
+
+def _columns(path: Path, names: Sequence[str]) -> list[str]:
+    """Return the columns of an answer that a file has."""
+    answer = RGB_COLUMNS if set(RGB_COLUMNS) <= set(names) and not set(COMPONENTS) <= set(names) else COMPONENTS
+    for name in (ID, *answer):
+        if name not in names:
+            allowed = f"needed are {ID} and {', '.join(COMPONENTS)}, or {ID} and {', '.join(RGB_COLUMNS)}"
+            raise BadInput(str(path), "", f"column {name} missing", allowed)
+        if Counter(names)[name] > 1:
+            raise BadInput(str(path), "column", name, "is there more than once")
+    return [ID, *answer]
+
+
+def _in_order(where: str, ids: npt.NDArray[Any], given: dict[str, npt.NDArray[Any]], count: int) -> Float32:
+    """Return the answers in the order of the questions."""
+
+    def refuse(bad: npt.NDArray[np.bool_], column: str, values: npt.NDArray[Any], allowed: str) -> None:
+        if rows := int(bad.sum()):
+            row = int(bad.argmax())
+            more = f" ({rows - 1:,} more bad rows)" if rows > 1 else ""
+            raise BadInput(where, f"row {row}, column {column}", values[row].item(), allowed + more)
+
+    refuse((ids < 0) | (ids >= count), ID, ids, f"is no question: ids are 0 to {count - 1:,}")
+    again = np.ones(len(ids), np.bool_)
+    again[np.unique(ids, return_index=True)[1]] = False
+    refuse(again, ID, ids, "is there more than once")
+    with np.errstate(over="ignore", under="ignore"):
+        single = {name: values.astype(np.float32) for name, values in given.items()}
+    for name, values in single.items():
+        refuse(~(np.isfinite(values) & (values >= 0)), name, given[name], "must be finite and at least 0")
+    if len(ids) < count:
+        first = int(np.setdiff1d(np.arange(count), ids)[0])
+        left = f"{count - len(ids):,} of {count:,} questions have no answer"
+        raise BadInput(where, "", f"the id {first} is missing", left)
+    answers = np.empty((count, len(single)), np.float32)
+    answers[ids.astype(np.int64)] = np.stack(list(single.values()), axis=1)
+    return answers
