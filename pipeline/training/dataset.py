@@ -57,11 +57,12 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
     The order of the fabrics' names numbers them. The caller names the cache, a ``.npy`` file, after what it holds and
     deletes it in the end.
     """
-    counts = [sum(s.rows for s in manifest.shards if (s.fabric, s.split) == (name, "train")) for name in fabrics]
+    by_fabric = manifest.by_fabric(folder, fabrics, "train")
+    counts = [sum(part.rows for part in by_fabric[name]) for name in fabrics]
     with atomic_path(cache, durable=False) as temporary:  # no later process reads it
         shape = (sum(counts), COLUMNS)
         table = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
-        parts = [part for name in fabrics for part in manifest.parts(folder, name, "train")]
+        parts = [part for name in fabrics for part in by_fabric[name]]
         starts = np.cumsum([0, *(part.rows for part in parts)])
 
         def fill(part: ShardEntry, start: int) -> None:
