@@ -79,7 +79,8 @@ def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, monkeypatch
 PART = f"""#!{sys.executable}
 import sys
 from jobs.entry import main
-sys.exit(main())
+if __name__ == "__main__":  # workers are started from it
+    sys.exit(main())
 """
 
 
