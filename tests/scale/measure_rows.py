@@ -45,7 +45,7 @@ def read(folder: Path) -> None:
     Manifest.load(folder)  # imports what it needs
     start, cpu = time.perf_counter(), time.process_time()
     rows = load_rows(Manifest.load(folder), folder, ["polyester_lining"], folder.parents[1] / "rows.npy")
-    batch = Batches(rows, Order(rows.counts, 4096, 1, 0), torch.device("cpu")).step(0)
+    batch = Batches(rows, Order(rows.windows, 4096, 1, 0), torch.device("cpu")).step(0)
     assert batch.u.shape == (1, 4096)
     wall, cpu = time.perf_counter() - start, time.process_time() - cpu
     print(f"{wall:.1f} ({cpu:.1f})")
