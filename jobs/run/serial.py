@@ -22,13 +22,14 @@ _HERE: Final = "this process"
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Let the libraries that are first loaded in the block compute on one thread, as those of workers do."""
-    before = dict(os.environ)
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(ONE_THREAD)
     try:
         yield
     finally:
-        os.environ.clear()
-        os.environ.update(before)
+        for name, value in before.items():
+            del os.environ[name]
+            os.environ.update({} if value is None else {name: value})
 
 
 class Serial:

@@ -10,7 +10,7 @@ import psutil
 import pytest
 from rich.console import Console
 
-from tests.faults.runs import cluster, end, family, finish, gone, hashes, start
+from tests.faults.runs import cluster, end, family, finish, gone, hashes, run, start
 from tests.jobs import fake_stages as fake
 
 pytestmark = pytest.mark.faults
@@ -91,6 +91,24 @@ def test_killed_schedulers(recipe, undisturbed, tmp_path):
         if not alive:
             assert hashes(recipe, out) == undisturbed[1]
             out = tmp_path / str(kills)
+    finish(recipe, out, undisturbed)
+
+
+def test_killed_parts(recipe, undisturbed, tmp_path):
+    """Parts at the same time, one of them twice; one is killed, and all are started again."""
+    seeded, out = random.Random(4), tmp_path / "out"
+    out.mkdir()
+    for stage, kills in (("generate", 6), ("train", 2)):
+        ends = []
+        while kills or not ends or any(ended.code for ended in ends):
+            processes = [start(recipe, out, "--part", part, verb=stage) for part in ("1/2", "2/2", "2/2")]
+            victim = seeded.choice(processes)
+            if kills and wait_for_a_moment(victim, out, seeded):
+                victim.kill()
+            kills = max(0, kills - 1)
+            ends = [end(process) for process in processes]
+            assert all(ended.code in (0, -9) for ended in ends), ends
+        run(recipe, out, verb=stage)
     finish(recipe, out, undisturbed)
 
 
