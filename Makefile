@@ -98,14 +98,16 @@ budgets: $(READY)
 rooms: $(READY)
 	$(BIN)/python -m tests.lint.rooms
 
-# PyTorch's build for the CPU alone is taken where the package index has it: it needs no CUDA.
+# PyTorch's build for the CPU alone is taken where the package index has it: it needs no CUDA. Pip says so if it has not
+# (or has it for another platform), and any other failure ends the installation.
+NOT_THERE := "No matching distribution found|DO NOT MATCH THE HASHES"
 # Nothing is installed again until the pinned versions or the package's own description change.
 $(READY): requirements.txt requirements-cpu.txt requirements-cuda.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Twillight needs Python 3.11 or newer: say which with make PYTHON=/path/to/python3"; exit 1; }
 	@echo "installing, 1 of 3: the virtual environment .venv"
 	@$(PYTHON) -m venv .venv
 	@echo "installing, 2 of 3: the packages pinned in requirements.txt; this downloads about a gigabyte and takes minutes"
-	@$(INSTALL) --requirement requirements-cpu.txt 2>/dev/null || true
+	@$(INSTALL) --requirement requirements-cpu.txt 2>.venv/cpu.log || grep -Eq $(NOT_THERE) .venv/cpu.log || { cat .venv/cpu.log; echo "PyTorch is not installed: run make again"; exit 1; }
 	@$(INSTALL) --requirement requirements.txt
 	@$(BIN)/python -c 'import importlib.metadata as m, sys; sys.exit("nvidia" in str(m.requires("torch")))' || { echo "this build of PyTorch needs CUDA: three more gigabytes"; $(INSTALL) --requirement requirements-cuda.txt; }
 	@echo "installing, 3 of 3: twillight itself"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,6 +28,15 @@ def canonical(specification: Any) -> bytes:
 def fingerprint(specification: Any, length: int = 16) -> str:
     """Return the first `length` hexadecimal digits of the SHA-256 of the canonical bytes."""
     return hashlib.sha256(canonical(specification)).hexdigest()[:length]
+
+
+def fingerprints(kind: str, specification: Mapping[str, Any], changes: Iterable[Mapping[str, int]]) -> Iterator[str]:
+    """Yield ``fingerprint([kind, specification | change])`` of each change; what does not change is encoded once."""
+    parts = {key: canonical({key: value})[1:-1] for key, value in specification.items()}
+    head = canonical([kind])[:-1]
+    for change in changes:
+        own = parts | {key: f'"{key}":{value}'.encode() for key, value in change.items()}
+        yield hashlib.sha256(head + b",{" + b",".join(own[key] for key in sorted(own)) + b"}]").hexdigest()[:16]
 
 
 def file_sha256(path: Path) -> str:

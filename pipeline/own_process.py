@@ -1,22 +1,26 @@
 """Work in a process of its own: of code that may hang or crash, of what measures time, and of what shares nothing.
 
-The process is started as a command, because a worker of dask may not have children of `multiprocessing`.
+The process is started as a command, because a worker of dask may not have children of `multiprocessing`. The command
+itself only watches: the work is in a child of it. Whatever the work has started, in sessions of their own too, becomes
+the watcher's when its parent is gone [prctl(2), PR_SET_CHILD_SUBREAPER]. It kills all of it when the work has ended, or
+when the process that waits for the result is gone.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pickle
+import select
 import signal
 import subprocess
 import sys
-import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import Any, Final, TypeVar
+from typing import Any, Final, NoReturn, TypeVar
 
 from weaves.errors import WorkFailed
 
@@ -28,6 +32,8 @@ ONE_THREAD: Final = dict.fromkeys(
 """Environment of a process that computes on one thread."""
 
 _SECONDS_BETWEEN_LOOKS: Final = 0.2
+_MOST_ROUNDS: Final = 1000
+_PDEATHSIG, _CHILD_SUBREAPER = 1, 36  # of prctl(2)
 
 
 class ProcessEnded(WorkFailed):
@@ -50,7 +56,7 @@ def in_own_process(
 ) -> Result:
     """Call ``function(*arguments, progress)`` in a new process of one thread, and return its result.
 
-    The process ends with this one, and never receives Ctrl-C. What it prints is lost.
+    The process ends with this one, with all that it has started, and never receives Ctrl-C. What it prints is lost.
 
     Parameters
     ----------
@@ -68,26 +74,26 @@ def in_own_process(
     Exception
         What the function raises, with the traceback of the process as a note.
     """
-    here, there = Pipe()
+    (here, there), (watched, held) = Pipe(), os.pipe()  # the latter ends with this process
     # The paths of this process, and no other: a folder of the current one must not hide a package.
     paths = os.pathsep.join(path or os.getcwd() for path in sys.path)  # noqa: PTH109, a string is needed
     with interrupts_held():
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "pipeline.own_process", str(there.fileno())],
+            [sys.executable, "-P", "-m", "pipeline.own_process", str(there.fileno()), str(watched)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             env={**os.environ, **ONE_THREAD, "PYTHONPATH": paths},
-            pass_fds=[there.fileno()],
-            start_new_session=True,  # it ends with all processes that it starts
+            pass_fds=[there.fileno(), watched],
+            start_new_session=True,
         )
     there.close()
+    os.close(watched)
     try:
         here.send((function, arguments))
         while True:
             if not here.poll(_SECONDS_BETWEEN_LOOKS):
                 look()
-                # A process that it started may hold its end of the pipe.
                 if process.poll() is not None and not here.poll():
                     raise ProcessEnded(process.returncode)
                 continue
@@ -101,8 +107,7 @@ def in_own_process(
     except (EOFError, ConnectionError) as error:
         raise ProcessEnded(process.wait()) from error
     finally:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
+        os.close(held)
         process.wait()
         here.close()
 
@@ -121,13 +126,40 @@ def interrupts_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _main() -> None:
-    """Do the work of the parent process at the other end of a pipe, given by its number, and send the result."""
+def _main() -> NoReturn:
+    """Do work in a child, and end as it ends; the numbers of the pipes of `in_own_process` are given."""
     sys.dont_write_bytecode = True  # nothing is written beside the code of others
-    pipe = Connection(int(sys.argv[1]))
+    pipe, watched = Connection(int(sys.argv[1])), int(sys.argv[2])
+    _prctl(_CHILD_SUBREAPER, 1)
+    worker = os.fork()
+    if worker == 0:
+        _prctl(_PDEATHSIG, signal.SIGKILL)
+        os.setsid()  # the watcher is in no group that the work may signal
+        os.close(watched)
+        _work(pipe)
+    pipe.close()
+    import psutil  # here: the work begins meanwhile
+
+    ended, status = 0, 0
+    while not ended and not select.select([watched], [], [], _SECONDS_BETWEEN_LOOKS)[0]:
+        ended, status = os.waitpid(worker, os.WNOHANG)
+    for _ in range(_MOST_ROUNDS):  # what is killed may just have started another process, and is its parent's to bury
+        for process in (left := psutil.Process().children(recursive=True)):
+            with suppress(psutil.Error):
+                process.kill()
+        if not left:
+            break
+        with suppress(ChildProcessError):
+            os.waitpid(-1, os.WNOHANG)
+    if os.WIFSIGNALED(status):
+        os.kill(os.getpid(), os.WTERMSIG(status))
+    os._exit(os.waitstatus_to_exitcode(status))
+
+
+def _work(pipe: Connection) -> NoReturn:
+    """Do the work of the process at the other end of a pipe, and send the result."""
     try:
         function, arguments = pipe.recv()
-        threading.Thread(target=_end_with_parent, args=(pipe,), daemon=True).start()
         answer = "result", function(*arguments, lambda share: pipe.send(("share", float(share))))
     except BaseException as error:
         answer = "raised", _portable(error)
@@ -135,11 +167,10 @@ def _main() -> None:
     os._exit(0)  # threads that the work has left running do not hold the process
 
 
-def _end_with_parent(pipe: Connection) -> None:
-    try:
-        pipe.recv()
-    except (EOFError, OSError):
-        os.killpg(0, signal.SIGKILL)
+def _prctl(option: int, value: int) -> None:
+    """Set a property of this process; only Linux has these."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def _portable(error: BaseException) -> Exception:

@@ -49,7 +49,7 @@ def described_here(monkeypatch, tmp_path):
     """Describe code here: a process of its own for each is in tests/pipeline/models/added/test_apart.py."""
     from pipeline.models.added import describe as describe_module
 
-    monkeypatch.setattr(describe_module, "run_apart", lambda work, *arguments: work(*arguments, lambda share: None))
+    monkeypatch.setattr(describe_module, "run_apart", lambda work, *given, limits: work(*given, lambda share: None))
     monkeypatch.setattr(sys, "path", [*sys.path])
     yield
     for name, module in list(sys.modules.items()):

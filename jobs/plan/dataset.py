@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 from jobs.plan.task import Places, Progress, Stage, Task
 from jobs.plan.truth_cost import SECONDS_A_POINT, TruthCost
 from jobs.recipe.recipe import Recipe
 from pipeline import versions
 from pipeline.atomic import link
-from pipeline.fingerprint import fingerprint
+from pipeline.fingerprint import fingerprint, fingerprints
 from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
 
@@ -59,6 +59,11 @@ class Shard(Task):
     def products(self) -> tuple[str, ...]:
         """The same shard in every folder."""
         return tuple(f"{folder}/part-{self.id}.parquet" for folder in self.folders)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Nothing."""
+        return ()
 
     @property
     def cost(self) -> float:
@@ -117,23 +122,46 @@ class DataSet:
 
     def __init__(self, recipe: Recipe) -> None:
         self.recipe = recipe
-        parts = [Shard(shard=shard, role=role, folders=()) for role, shard in _rows(recipe)]
-        own = sorted(part.id for part in parts if not isinstance(part.shard, ExtraShardTask))
+        cuts = list(_cuts(recipe))
+        own = sorted(cut.id for cut in cuts if not isinstance(cut.first.shard, ExtraShardTask))
         self.fingerprint = fingerprint(own)
         """Of its own rows."""
         self.folder = f"{DATASETS}/{recipe.name}-{self.fingerprint[:8]}"
         """Relative to the output folder."""
-        self.shards = [part.model_copy(update={"folders": (self.folder,)}) for part in parts]
+        self.shards = [cut.shard(self.folder) for cut in cuts]
 
 
-def _rows(recipe: Recipe) -> Iterator[tuple[str, AnyShardTask]]:
-    """Cut the rows of every fabric into shards, each with the role of its fabric."""
+class _Cut(NamedTuple):
+    """Rows of a fabric's split or set, which are one shard."""
+
+    first: Shard
+    """Shard of the same split or set."""
+    numbers: dict[str, int]
+    """First row and number of rows."""
+    id: str
+    """Of the task."""
+
+    def shard(self, folder: str) -> Shard:
+        """Return the shard; validated is only the first."""
+        own = {"shard": self.first.shard.model_copy(update=self.numbers), "folders": (folder,), "id": self.id}
+        return self.first.model_copy(update=own)
+
+
+def _cuts(recipe: Recipe) -> Iterator[_Cut]:
+    """Cut the rows of every fabric into shards."""
     dataset = recipe.dataset
     for role, fabric, kind, total in (*recipe.own_rows(), *recipe.extra_rows()):
-        for start in range(0, total, dataset.shard_rows):
-            part: dict[str, Any] = {"fabric": fabric, "start": start, "rows": min(dataset.shard_rows, total - start)}
-            if isinstance(kind, str):
-                truth = (dataset.training_truth if kind == "train" else None) or dataset.truth
-                yield role, ShardTask(**part, split=kind, seed=dataset.seed, queries=dataset.queries, truth=truth)
-            else:
-                yield role, ExtraShardTask(**part, extra=kind)
+        starts = range(0, total, dataset.shard_rows)
+        numbers = [{"start": start, "rows": min(dataset.shard_rows, total - start)} for start in starts]
+        if not numbers:
+            continue
+        shard: AnyShardTask
+        if isinstance(kind, str):
+            truth = (dataset.training_truth if kind == "train" else None) or dataset.truth
+            own = {"split": kind, "seed": dataset.seed, "queries": dataset.queries, "truth": truth}
+            shard = ShardTask(fabric=fabric, **numbers[0], **own)
+        else:
+            shard = ExtraShardTask(fabric=fabric, **numbers[0], extra=kind)
+        first = Shard(shard=shard, role=role, folders=())
+        for cut, id in zip(numbers, fingerprints(first.stage, first.identity(), numbers), strict=True):
+            yield _Cut(first, cut, id)

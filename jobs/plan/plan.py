@@ -68,7 +68,7 @@ def _once(parts: Iterable[Shard]) -> list[Shard]:
     """Return each shard once: one of two data sets is made once and lies in both folders."""
     shards: dict[str, Shard] = {}
     for part in parts:
-        if first := shards.get(part.id):
-            part = first.model_copy(update={"folders": tuple(dict.fromkeys((*first.folders, *part.folders)))})
-        shards[part.id] = part
+        if (first := shards.setdefault(part.id, part)).folders != part.folders:
+            folders = tuple(dict.fromkeys((*first.folders, *part.folders)))
+            shards[part.id] = first.model_copy(update={"folders": folders})
     return list(shards.values())

@@ -44,11 +44,11 @@ class Training(Task):
         if model.of_one_material:
             groups = {fabric.name: [fabric.name] for fabric in (*recipe.seen, *recipe.unseen)}
         splits = {"train", "validation", *map(set_name, model.options.extra_rows)}
-        parts = [part for part in dataset.shards if part.shard.split in splits]
-        read: dict[str, dict[str, Any]] = {
-            key: {"fabrics": names, "shards": [part.id for part in parts if part.shard.fabric.name in names]}
-            for key, names in groups.items()
-        }
+        group_of = {name: key for key, names in groups.items() for name in names}
+        read: dict[str, dict[str, Any]] = {key: {"fabrics": names, "shards": []} for key, names in groups.items()}
+        for part in dataset.shards:
+            if part.shard.split in splits and (key := group_of.get(part.shard.fabric.name)) is not None:
+                read[key]["shards"].append(part.id)
         return [
             {
                 key: cls(options=single.options, training=single.training, dataset=dataset.folder, **rows)
@@ -117,7 +117,7 @@ class Training(Task):
         if isinstance(self.options, AddedMethod):
             from pipeline.models.added.apart import run_apart
 
-            return run_apart(_train, self, out, progress=progress)
+            return run_apart(_train, self, out, limits=[self.options], progress=progress)
         return _train(self, out, progress)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from jobs.recipe.entry import FORM
-from pipeline.models.added.added_code import ADDED_MODEL, GROUP, AddedFunction, AddedMethod
+from pipeline.models.added.added_code import ADDED_MODEL, GROUP, AddedFunction, AddedMethod, CallLimits
 from pipeline.models.added.describe import describe
 from pipeline.models.added.source import ADD
 from pipeline.models.catalogue import CLASSES, REPLACED_MODELS
@@ -21,7 +21,7 @@ from reports.catalogue import AddedMetric
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
 
-_BESIDE: Final = ("model", "name", "version", "limit", "training", "seeds", "runtimes")
+_BESIDE: Final = ("model", "name", "version", "limit", "memory", "training", "seeds", "runtimes")
 """Keys of a recipe's entry that are no options of the method."""
 
 
@@ -88,8 +88,9 @@ class Added:
             raise BadInput(where, f"{key}.model", model, _unknown(model, [*CLASSES, *self._given, *_installed()]))
         own = {name: value for name, value in entry.items() if name not in _BESIDE}
         name = entry.get("name", model)
+        limits = {key: entry[key] for key in CallLimits.model_fields if key in entry}
         source = f"{given.source}" if given else str(installed)
-        method = describe(source, own, {"name": name, **({"limit": entry["limit"]} if "limit" in entry else {})})
+        method = describe(source, own, {"name": name, **limits})
         if isinstance(method, AddedFunction):
             raise BadInput(where, f"{key}.model", model, "is the entry point of a metric; a method is needed")
         if "version" in entry and str(entry["version"]) != method.stated:

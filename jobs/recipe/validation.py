@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final, get_args
 
@@ -103,8 +104,8 @@ def _check_names(recipe: Recipe, where: str) -> None:
         ("dataset", [fabric.name for fabric in recipe.fabrics]),
         ("models", [model.options.name for model in recipe.models]),
     ):
-        for name in names:
-            if names.count(name) > 1:
+        for name, count in Counter(names).items():
+            if count > 1:
                 raise BadInput(where, key, name, "names must differ, because files are called by them")
     for index, model in enumerate(recipe.models):
         if (name := model.options.name) in _TAKEN:

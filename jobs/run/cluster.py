@@ -25,6 +25,7 @@ MOST_WORKERS: Final = 1024
 """Worker processes of a cluster on this machine, at most."""
 
 _SECONDS: Final = 5  # for a scheduler to answer
+_TRIES_TO_START: Final = 3  # the cluster on this machine
 _SECONDS_FOR_A_WORKER: Final = 60  # a cluster that adapts starts one when there is work
 
 
@@ -49,8 +50,9 @@ HERE: Final = Scheduler()
 def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) -> Iterator[Any]:
     """Connect to a scheduler, or start a cluster of so many workers that ends with this process.
 
-    `say` receives a sentence when a scheduler has no worker yet. BadInput if no scheduler answers, or it has no worker;
-    WorkFailed if the processes of the cluster on this machine cannot start, or the scheduler is lost within the block.
+    `say` receives a sentence when a scheduler has no worker yet, or the cluster is started again. BadInput if no
+    scheduler answers, or it has no worker; WorkFailed if the processes of the cluster on this machine cannot start, or
+    the scheduler is lost within the block.
     """
     # Before dask is imported, and inherited by workers: it reports every shutdown as a warning.
     os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "critical")
@@ -58,7 +60,7 @@ def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) ->
     from distributed.comm.core import CommClosedError
 
     try:
-        with _external(scheduler, say) if scheduler.address else _local(workers) as client:
+        with _external(scheduler, say) if scheduler.address else _local(workers, say) as client:
             yield client
     except (CancelledError, CommClosedError) as error:
         raise WorkFailed(
@@ -127,8 +129,8 @@ def _ends_deferred() -> Iterator[None]:
 
 
 @contextmanager
-def _local(workers: int) -> Iterator[Any]:
-    """Start a cluster on the loopback."""
+def _local(workers: int, say: Callable[[str], None]) -> Iterator[Any]:
+    """Start a cluster on the loopback; again, if one of its processes dies before all are there."""
     from multiprocessing import resource_tracker
 
     import dask.config
@@ -145,24 +147,29 @@ def _local(workers: int) -> Iterator[Any]:
         "distributed.worker.http.routes": [],
     }
     with dask.config.set(settings):
-        try:
-            with _ends_deferred(), interrupts_held():  # a cluster that is half there cannot be closed
-                cluster = LocalCluster(  # type: ignore[no-untyped-call]
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    host="127.0.0.1",
-                    protocol="tls://",
-                    security=Security.temporary(),  # type: ignore[no-untyped-call]
-                    dashboard_address=None,
-                    scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-                    memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
-                    silence_logs=logging.CRITICAL,
-                )
-                client = Client(cluster)  # type: ignore[no-untyped-call]
-        except (OSError, RuntimeError) as error:
-            reason = str(error).strip().splitlines()[:1] or [type(error).__name__]
-            raise WorkFailed(f"{workers} worker processes could not start: {reason[0]}") from error
+        for left in reversed(range(_TRIES_TO_START)):
+            try:
+                with _ends_deferred(), interrupts_held():  # a cluster that is half there cannot be closed
+                    cluster = LocalCluster(  # type: ignore[no-untyped-call]
+                        n_workers=workers,
+                        threads_per_worker=1,
+                        processes=True,
+                        host="127.0.0.1",
+                        protocol="tls://",
+                        security=Security.temporary(),  # type: ignore[no-untyped-call]
+                        dashboard_address=None,
+                        scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+                        memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
+                        silence_logs=logging.CRITICAL,
+                    )
+                    client = Client(cluster)  # type: ignore[no-untyped-call]
+                break
+            except (OSError, RuntimeError) as error:
+                reason = str(error).strip().splitlines()[:1] or [type(error).__name__]
+                sentence = f"{workers} worker processes could not start: {reason[0]}"
+                if not left:
+                    raise WorkFailed(sentence) from error
+                say(f"{sentence}; trying again")
         try:
             yield client
         finally:

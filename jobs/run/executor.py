@@ -13,9 +13,10 @@ ones behind a training. A task that measures time starts when nothing else runs,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from rich.console import Console
 
@@ -31,6 +32,7 @@ from jobs.run.outcome import Outcome
 from jobs.run.progress import Board
 from jobs.run.progress_forms import ProgressForm, form_of
 from jobs.run.receipt import Product
+from jobs.run.serial import Serial, one_thread
 from jobs.terminal import Terminal
 from pipeline import patience
 from pipeline.cores import cores
@@ -57,6 +59,7 @@ def execute(
     stages: Sequence[Stage] = STAGES,
     scheduler: Scheduler = HERE,
     workers: int = 0,
+    serial: bool = False,
     manifests: Sequence[ManifestFile] = (),
     console: Console | None = None,
     progress: ProgressForm = "auto",
@@ -64,7 +67,8 @@ def execute(
     """Run the unfinished tasks of some stages; what they need of other stages must be done.
 
     Workers of a scheduler must see the ledger's folder under its name; by default a cluster on this machine of so many
-    workers with one thread each, 0: one a core, ends with this process. Manifests list the shards that are made, or
+    workers with one thread each, 0: one a core, ends with this process. `serial`: no cluster, and this process does one
+    task after the other, beside other such processes in the same folder. Manifests list the shards that are made, or
     taken from another data set; they are whole when a task starts that needs others, and at the end. BadInput if the
     number of workers or the scheduler cannot be used; WorkFailed if a needed task of another stage is not done, the
     workers cannot start or have other software, or the scheduler is lost.
@@ -89,8 +93,12 @@ def execute(
         return summary
 
     board = Board(todo, estimate, form_of(progress, console or Terminal(stderr=True)))
-    with connected(scheduler, min(workers or cores(), len(todo)), board.say) as client, board:
-        crew, groups = Crew(client, bool(scheduler.address), board.hear), kernel_groups(todo)
+    count = min(workers or cores(), len(todo))
+    cluster: AbstractContextManager[Any] = one_thread() if serial else connected(scheduler, count, board.say)
+    with cluster as client, board:
+        crew: Crew | Serial
+        crew = Serial(ledger, board.hear) if serial else Crew(client, bool(scheduler.address), board.hear)
+        groups = kernel_groups(todo)
         board.workers = len(crew.accepted)
         crew.compile(groups, lambda done, under_way: board.compiling(done, len(groups), under_way))
         board.start(len(crew.accepted), crew.dashboard)
@@ -110,7 +118,7 @@ class _Driver:
 
     tasks: Mapping[str, Task]
     ready: Ready
-    crew: Crew
+    crew: Crew | Serial
     ledger: Ledger
     board: Board
     stages: Sequence[Stage]

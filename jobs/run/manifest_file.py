@@ -11,7 +11,7 @@ from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.task import Task
 from jobs.run.ledger import Ledger
 from jobs.run.receipt import Product
-from pipeline.shards.manifest import Manifest, ShardEntry
+from pipeline.shards.manifest import FILE, Manifest, ShardEntry
 
 _SECONDS_BETWEEN: Final = 2.0  # two times that it is written, at least
 _SHARE: Final = 0.02  # of the driver's time that goes into writing it, at most
@@ -54,6 +54,13 @@ class ManifestFile:
             self.content().save(self.folder)
             self._changed = False
             self._next = time.monotonic() + max(_SECONDS_BETWEEN, (time.monotonic() - start) / _SHARE)
+
+    def is_written(self) -> bool:
+        """Return whether the file lists exactly the shards that are done."""
+        try:
+            return (self.folder / FILE).read_bytes() == self.content().encoded()
+        except FileNotFoundError:
+            return False
 
     def content(self) -> Manifest:
         """Return the manifest of the shards that are done."""

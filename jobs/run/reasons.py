@@ -47,10 +47,12 @@ def reasons(tasks: Sequence[Task], ledger: Ledger) -> dict[str, str]:
 
 def _changed(task: Task, before: Sequence[Receipt]) -> str:
     """Return which keys are not those of the most similar predecessor."""
+    if not before:
+        return NEVER_MADE
     now = Receipt.of(task, {}, 0.0)
     lists = [receipt.changes(now) for receipt in before if receipt.identity]
     if not lists:
-        return "made before; its receipt does not say from what" if before else NEVER_MADE
+        return "made before; its receipt does not say from what"
     changes = min(lists, key=len)
     more = f" and {len(changes) - _MOST_KEYS} more" if len(changes) > _MOST_KEYS else ""
     return f"{CHANGED}{', '.join(changes[:_MOST_KEYS])}{more}"

@@ -8,17 +8,16 @@ may be removed while no run uses it.
 
 from __future__ import annotations
 
+import fcntl
 import glob
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
 from threading import Lock
-from typing import Final
-
-from filelock import FileLock, Timeout
+from typing import IO, Final
 
 from jobs.plan.dataset import DATASETS
 from pipeline import storage
@@ -27,6 +26,9 @@ from weaves.errors import BadInput, WorkFailed
 
 LEDGER: Final = "ledger"
 """Folder of the receipts, relative to the output folder."""
+
+LOCKS: Final = frozenset({f"{LEDGER}/lock", f"{LEDGER}/tasks.lock"})
+"""Empty files by which processes keep out of each other's way; no task makes them."""
 
 _FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "entries", "report")
 
@@ -88,29 +90,41 @@ class Store:
         self.wrote(target, size)
 
     @contextmanager
-    def held(self) -> Iterator[None]:
+    def held(self, shared: bool = False) -> Iterator[None]:
         """Keep other runs out for as long as this process lives: in object storage, those of this machine and user.
 
+        `shared`: others that hold the folder shared may be at work in it too, and none that holds it for itself.
         BadInput if the folder cannot be created or written; WorkFailed if another run is at work there.
         """
-        try:
-            folder = self._lock_folder()
-            folder.mkdir(parents=True, exist_ok=True)
-            lock = FileLock(folder / "lock", blocking=False)
-            lock.acquire()
-        except Timeout as error:
-            allowed = "another run is at work in this folder; wait for it, or choose another --out"
-            raise WorkFailed(f"{self.out}: {allowed}") from error
-        except OSError as error:
-            allowed = "--out must name a folder that can be written"
-            raise BadInput(str(self.out), "", error.strerror or error, allowed) from error
-        try:
+        with ExitStack() as stack:
+            try:
+                file = stack.enter_context(self._lock_file("lock"))
+                fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                allowed = "another run is at work in this folder; wait for it, or choose another --out"
+                raise WorkFailed(f"{self.out}: {allowed}") from error
+            except OSError as error:
+                allowed = "--out must name a folder that can be written"
+                raise BadInput(str(self.out), "", error.strerror or error, allowed) from error
             yield
-        finally:
-            lock.release()
+
+    @contextmanager
+    def claimed(self, task: str) -> Iterator[None]:
+        """Wait until no other process claims a task, given by its id, and claim it; in object storage as for `held`.
+
+        Each task is one byte of a file, of which bytes are locked that it does not have.
+        """
+        with self._lock_file("tasks.lock") as file:
+            fcntl.lockf(file, fcntl.LOCK_EX, 1, int(task[:15], 16))
+            yield
+
+    def _lock_file(self, name: str) -> IO[bytes]:
+        folder = self._lock_folder()
+        folder.mkdir(parents=True, exist_ok=True)
+        return (folder / name).open("a+b")
 
     def _lock_folder(self) -> Path:
-        """Return the folder of this machine in which runs lock each other out."""
+        """Return the folder of this machine with the locks."""
         return self.out / LEDGER
 
 
@@ -164,8 +178,8 @@ class _RemoteStore(Store):
             self._places[Path(path).name].remove(path)
 
     @contextmanager
-    def held(self) -> Iterator[None]:
-        with super().held():
+    def held(self, shared: bool = False) -> Iterator[None]:
+        with super().held(shared):
             # A lock here would outlive a killed run. A bucket that refuses the file is reported before work begins.
             (self.out / LEDGER / "lock").write_bytes(b"")
             yield

@@ -20,6 +20,7 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.faults import is_leftover, own_files
 from jobs.run.ledger import Ledger
+from jobs.run.store import LOCKS
 from jobs.terminal import MOST_SENTENCES, print_lines, print_table, size
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out
 from pipeline.storage import is_local, listing, remove_all
@@ -62,7 +63,7 @@ def prune(
         unneeded = sorted(made - needed)
         if unneeded:
             _print_sizes({path: files[path] for path in unneeded})
-        if kept := sorted(files.keys() - made - needed - {"ledger/lock"}):
+        if kept := sorted(files.keys() - made - needed - LOCKS):
             more = f" and {len(kept) - MOST_SENTENCES:,} more" if len(kept) > MOST_SENTENCES else ""
             print_lines(f"kept, because no task made them: {', '.join(kept[:MOST_SENTENCES])}{more}")
         if delete:

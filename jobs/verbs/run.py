@@ -1,21 +1,32 @@
-"""Stages of a recipe: plan, lock the output folder, execute, update the manifest, print a summary."""
+"""Stages of a recipe: plan, lock the output folder, execute, update the manifest, print a summary.
+
+A stage may be divided into parts (`jobs.plan.part`). Parts write products and receipts. Manifests, and what cannot be
+divided, are left to the same verb without `--part`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from jobs.plan.dataset import DataSet
 from jobs.plan.page import Page
+from jobs.plan.part import Part
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.recipe.load import load_recipe
-from jobs.run.executor import execute
+from jobs.run.executor import RunSummary, execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.terminal import duration, number, print_lines, print_table
 from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out, RecipeName, WorkerFlags
-from weaves.errors import WorkFailed
+from weaves.errors import BadInput, WorkFailed
+
+Share = Annotated[str, Parameter(help="Do this share of the tasks alone, such as 17/1000; needs no scheduler.")]
 
 
 def _verb(*stages: Stage) -> Callable[..., None]:
@@ -27,7 +38,20 @@ def _verb(*stages: Stage) -> Callable[..., None]:
     return verb
 
 
-generate, train, bench, report = map(_verb, STAGES)
+def _divisible(stage: Stage) -> Callable[..., None]:
+    """Return the function of the verb of a stage that may be done in parts."""
+
+    def verb(recipe: RecipeName, *, part: Share = "", add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+        if part:
+            work_part(recipe, stage, Part.read(part), out, on, add)
+        else:
+            work(recipe, [stage], out, on, add)
+
+    return verb
+
+
+generate, train, bench = map(_divisible, STAGES[:3])
+report = _verb("report")
 run = _verb(*STAGES)
 
 
@@ -56,15 +80,49 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
             manifests=manifests,
             progress=on.progress,
         )
-    chosen = [task for task in tasks if task.stage in stages]
-    if not summary.ran and not summary.failed:
-        print_lines(f"nothing to do: {len(chosen)} tasks done")
-    else:
-        _print_work(chosen, {task.id: ledger.seconds(task) for task in summary.ran})
+    _print_summary([task for task in tasks if task.stage in stages], summary, ledger)
     if "report" in stages and ledger.state(page) == "done":
         print_lines("")
         _print_methods([out / path for path in page.records])
         print_lines("", f"the page: {(out / page.products[0]).resolve()}")
+    _refuse_failed(recipe_name, summary, ledger, add)
+
+
+def work_part(recipe_name: str, stage: Stage, part: Part, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
+    """Run a part of the unfinished tasks of a stage in this process and print a summary; arguments as for `work`.
+
+    BadInput if the recipe or the folder cannot be used, or workers are chosen; WorkFailed if any task failed, if what
+    they need is not done, or if a run that is no part is at work in the folder.
+    """
+    if replace(on, progress=ON.progress) != ON:
+        allowed = "is done by one process without a scheduler: leave --workers, --scheduler and --tls-… out"
+        raise BadInput("--part", "", f"{part.number}/{part.parts}", allowed)
+    recipe = load_recipe(recipe_name, add)
+    tasks, ledger = plan(recipe), Ledger(out)
+    own = part.of(tasks, stage)
+    needs = {need for task in own for need in task.needs}
+    with ledger.store.held(shared=True):
+        for file in (ManifestFile(DataSet(member), ledger) for member in recipe.together if needs):
+            if not file.is_written():
+                where = file.folder.relative_to(out)
+                raise WorkFailed(f"{where}: its manifest lacks shards; run `twillight generate` without --part first")
+        given = [task for task in tasks if task.id in needs]
+        summary = execute([*given, *own], ledger, stages=[stage], serial=True, progress=on.progress)
+    _print_summary(own, summary, ledger)
+    _refuse_failed(recipe_name, summary, ledger, add)
+    print_lines(f"when all {part.parts:,} parts are done: `twillight {stage} {recipe_name}` without --part")
+
+
+def _print_summary(tasks: Sequence[Task], summary: RunSummary, ledger: Ledger) -> None:
+    """Print what a run did of some tasks."""
+    if not summary.ran and not summary.failed:
+        print_lines(f"nothing to do: {len(tasks)} tasks done")
+    else:
+        _print_work(tasks, {task.id: ledger.seconds(task) for task in summary.ran})
+
+
+def _refuse_failed(recipe_name: str, summary: RunSummary, ledger: Ledger, add: Sequence[str]) -> None:
+    """Raise WorkFailed if any task failed."""
     if summary.failed:
         first, *others = summary.failed
         flags = "".join(f" --add {source}" for source in add)

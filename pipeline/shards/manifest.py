@@ -106,16 +106,22 @@ class Manifest(Frozen):
         """Return all rows of a fabric's split in stream order, checksums verified; BadInput if there are none."""
         return rows_of(self.columns(folder, fabric, split))
 
-    def parts(self, folder: Path, fabric: str, split: str) -> list[ShardEntry]:
-        """Return a fabric's shards of a split or set, in stream order; BadInput if there are none."""
-        entries = [shard for shard in self.shards if shard.fabric == fabric and shard.split == split]
-        if not entries:
-            raise BadInput(str(folder / FILE), f"shards[{fabric}, {split}]", None, "no rows; generate them first")
-        return sorted(entries, key=lambda entry: entry.start)
+    def by_fabric(self, folder: Path, fabrics: Sequence[str], split: str) -> dict[str, list[ShardEntry]]:
+        """Return the shards of fabrics of a split or set, in stream order; BadInput if a fabric has none."""
+        entries: dict[str, list[ShardEntry]] = {name: [] for name in fabrics}
+        for shard in self.shards:
+            if shard.split == split and shard.fabric in entries:
+                entries[shard.fabric].append(shard)
+        for fabric, own in entries.items():
+            if not own:
+                raise BadInput(str(folder / FILE), f"shards[{fabric}, {split}]", None, "no rows; generate them first")
+            own.sort(key=lambda shard: shard.start)
+        return entries
 
     def columns(self, folder: Path, fabric: str, split: str) -> dict[str, npt.NDArray[Any]]:
         """Return all rows of a fabric's split or set by column, the fabric left out; errors as `read`."""
-        parts = [read_columns(folder / entry.file, entry.kind) for entry in self.parts(folder, fabric, split)]
+        entries = self.by_fabric(folder, [fabric], split)[fabric]
+        parts = [read_columns(folder / entry.file, entry.kind) for entry in entries]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

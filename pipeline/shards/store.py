@@ -117,6 +117,15 @@ def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ())
     return table
 
 
+def read_groups(path: Path, names: Sequence[str], first: int, groups: int) -> pa.Table:
+    """Read columns of some row groups of a shard, as many as there are from the `first` on; errors as `read_table`."""
+    again = "generate it again with `twillight generate`", "delete it and run `twillight generate`"
+    with readable(path, ("does not exist", again[0]), again[1]):
+        file = pq.ParquetFile(path, page_checksum_verification=True)
+        last = min(first + groups, file.num_row_groups)
+        return file.read_row_groups(range(first, last), columns=list(names), use_threads=False)
+
+
 def read_about(path: Path) -> dict[str, Any]:
     """Return the facts that a shard's metadata hold."""
     metadata = pq.read_schema(path).metadata or {}

@@ -6,14 +6,19 @@ takes the r-th slice of its rows, permuted anew in every epoch. A training that 
 therefore sees the rows it would have seen.
 
     example   3 fabrics, 2 a step: rounds (2 0 1)(0 1 2)... give the steps (2 0), (1 0), (1 2), ...
+
+More than `MOST_IN_TABLE` rows are in no table: they are read from the shards when a step needs them, in windows of a
+few row groups. Every epoch of a fabric visits its windows in a new order, and the rows of each in a new order. Rows are
+independent draws, so that this order is as good as any; neither memory nor the time to the first step grows with them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,11 +27,12 @@ from torch import Tensor
 from torch.utils.data import IterableDataset, get_worker_info
 
 from pipeline.atomic import atomic_path
+from pipeline.compiled.arrays import Index
 from pipeline.models.network import Batch
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import RowPiece
 from pipeline.shards.schema import QUERY_COLUMNS
-from pipeline.shards.store import read_table
+from pipeline.shards.store import ROW_GROUP, read_groups, read_table
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from weaves.errors import BadInput
 
@@ -38,6 +44,13 @@ TARGET = slice(12, 16)
 
 _NAMES: Final = (*QUERY_COLUMNS, *COMPONENTS, TRANSPARENCY)
 
+MOST_IN_TABLE: Final = 2**23
+"""Most rows that are read before the first step: a table of half a gigabyte, in some 4 s of one core."""
+
+_MOST_GROUPS: Final = 8  # row groups of a window, 131,072 rows or 9 MB; fewer of many fabrics, so that all are kept
+_MOST_PERMUTATIONS: Final = 512  # that are kept
+_STARTS: Final = 64  # fabrics whose first rows the last bias starts at
+
 _READERS: Final = 4  # shards that are read at the same time
 
 _ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
@@ -48,25 +61,106 @@ class TrainingRows:
 
     def __init__(self, table: npt.NDArray[np.float32], counts: Sequence[int]) -> None:
         self.table, self.counts = table, list(counts)
-        self.starts = np.concatenate([[0], np.cumsum(self.counts)])
+        self.windows = [[count] for count in counts]
+        self._starts = np.concatenate([[0], np.cumsum(self.counts)])
+
+    def index(self, fabrics: Index, rows: Index) -> Index:
+        """Return the places in the table of rows (F, n) of fabrics (F,)."""
+        places: Index = rows + self._starts[fabrics][:, None]
+        return places
+
+    def take(self, fabrics: Index, rows: Index) -> npt.NDArray[np.float32]:
+        """Return rows (F, n) of fabrics (F,), counted within each fabric, (F, n, COLUMNS)."""
+        return self.table[self.index(fabrics, rows)]
+
+    def spread(self, most: int) -> npt.NDArray[np.float32]:
+        """Return about so many rows of all fabrics, evenly spaced."""
+        return self.table[:: max(len(self.table) // most, 1)]
 
 
-def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: Path) -> TrainingRows:
+class WindowedRows:
+    """Rows that stay in their shards, which are given by fabric; the interface of `TrainingRows`."""
+
+    def __init__(self, folder: Path, shards: Sequence[Sequence[ShardEntry]]) -> None:
+        rows = ROW_GROUP * min(max(MOST_IN_TABLE // (ROW_GROUP * len(shards)), 1), _MOST_GROUPS)
+        self._pieces = [_windows(folder, own, rows) for own in shards]
+        self.windows = [[sum(piece.rows for piece in window) for window in own] for own in self._pieces]
+        self.counts = [sum(window) for window in self.windows]
+        self._window = lru_cache(maxsize=MOST_IN_TABLE // rows)(self._read)
+
+    def take(self, fabrics: Index, rows: Index) -> npt.NDArray[np.float32]:
+        """Return rows (F, n) of fabrics (F,), counted within each fabric, (F, n, COLUMNS); of each from one window."""
+        taken = []
+        for fabric, own in zip(fabrics.tolist(), rows, strict=True):
+            ends = np.cumsum(self.windows[fabric])
+            window = int(np.searchsorted(ends, own[0], side="right"))
+            taken.append(self._window(fabric, window)[own - (ends[window] - self.windows[fabric][window])])
+        return np.stack(taken)
+
+    def spread(self, most: int) -> npt.NDArray[np.float32]:
+        """Return at most so many rows: the first ones of some fabrics, evenly spaced among all."""
+        some = self._pieces[:: -(-len(self._pieces) // _STARTS)]
+        return np.concatenate([own[0][0].read(1)[: most // len(some)] for own in some])
+
+    def _read(self, fabric: int, window: int) -> npt.NDArray[np.float32]:
+        return np.concatenate([piece.read() for piece in self._pieces[fabric][window]])
+
+
+class _Piece(NamedTuple):
+    """Consecutive row groups of a shard."""
+
+    path: Path
+    first: int
+    """Number of the first group."""
+    rows: int
+    """Of all groups."""
+
+    def read(self, groups: int = 0) -> npt.NDArray[np.float32]:
+        """Return the rows of the first groups, 0: of all."""
+        return _stacked(read_groups(self.path, _NAMES, self.first, groups or -(-self.rows // ROW_GROUP)))
+
+
+def _windows(folder: Path, shards: Sequence[ShardEntry], least: int) -> list[list[_Piece]]:
+    """Cut the rows of a fabric into windows of at least so many rows, whole row groups, and not many more."""
+    pieces = [
+        _Piece(folder / shard.file, start // ROW_GROUP, min(least, shard.rows - start))
+        for shard in shards
+        for start in range(0, shard.rows, least)
+    ]
+    windows: list[list[_Piece]] = []
+    left = sum(piece.rows for piece in pieces)
+    window = 0  # rows of the last one
+    for piece in pieces:
+        if not windows or (window >= least and left >= least):
+            windows.append([])
+            window = 0
+        windows[-1].append(piece)
+        window, left = window + piece.rows, left - piece.rows
+    return windows
+
+
+def _stacked(table: Any) -> npt.NDArray[np.float32]:
+    return np.stack([column.to_numpy() for column in table.columns], axis=-1)
+
+
+def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: Path) -> TrainingRows | WindowedRows:
     """Return the training rows of fabrics, mapped from `cache`, which is written anew: an older one may be damaged.
 
-    The order of the fabrics' names numbers them. The caller names the cache, a ``.npy`` file, after what it holds and
-    deletes it in the end.
+    More than `MOST_IN_TABLE` stay in their shards. The order of the fabrics' names numbers them. The caller names the
+    cache, a ``.npy`` file, after what it holds and deletes it in the end.
     """
-    counts = [sum(s.rows for s in manifest.shards if (s.fabric, s.split) == (name, "train")) for name in fabrics]
+    by_fabric = manifest.by_fabric(folder, fabrics, "train")
+    counts = [sum(part.rows for part in by_fabric[name]) for name in fabrics]
+    if sum(counts) > MOST_IN_TABLE:
+        return WindowedRows(folder, [by_fabric[name] for name in fabrics])
     with atomic_path(cache, durable=False) as temporary:  # no later process reads it
         shape = (sum(counts), COLUMNS)
         table = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
-        parts = [part for name in fabrics for part in manifest.parts(folder, name, "train")]
+        parts = [part for name in fabrics for part in by_fabric[name]]
         starts = np.cumsum([0, *(part.rows for part in parts)])
 
         def fill(part: ShardEntry, start: int) -> None:
-            columns = read_table(folder / part.file, names=_NAMES)
-            table[start : start + part.rows] = np.stack([column.to_numpy() for column in columns.columns], axis=-1)
+            table[start : start + part.rows] = _stacked(read_table(folder / part.file, names=_NAMES))
 
         with ThreadPoolExecutor(_READERS) as pool:  # one shard of each is in memory
             for _ in pool.map(fill, parts, starts):
@@ -77,19 +171,20 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
 class Order:
     """Which rows each step sees: a pure function of (seed, step).
 
-    `counts` are the rows of each fabric; a step sees `batch` rows of so many fabrics, no more than there are.
+    `windows` are the numbers of rows of each fabric's windows, which are shuffled one by one; a step sees `batch` rows
+    of so many fabrics, no more than there are.
     """
 
-    def __init__(self, counts: Sequence[int], batch: int, fabrics: int, seed: int) -> None:
-        self.counts = list(counts)
-        self.fabrics = min(fabrics, len(self.counts), batch)
+    def __init__(self, windows: Sequence[Sequence[int]], batch: int, fabrics: int, seed: int) -> None:
+        self._windows = [np.array(own) for own in windows]
+        self.fabrics = min(fabrics, len(self._windows), batch)
         self.each = batch // self.fabrics
         self._seed = seed
-        self._epochs: dict[int, tuple[int, npt.NDArray[np.int64]]] = {}  # the last permutation of each fabric
+        self._last: dict[int, tuple[tuple[int, ...], Index]] = {}  # purpose and permutation, by fabric
 
-    def step(self, step: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    def step(self, step: int) -> tuple[Index, Index]:
         """Return the fabrics (F,) of a step and their rows (F, n), counted within each fabric."""
-        total = len(self.counts)
+        total = len(self._windows)
         visits = [divmod(place, total) for place in range(step * self.fabrics, (step + 1) * self.fabrics)]
         turns = {turn: self._permutation(total, _ROUND, turn, 0) for turn in {turn for turn, _ in visits}}
         chosen = np.array([turns[turn][place] for turn, place in visits])
@@ -100,21 +195,36 @@ class Order:
         """Return the generator of everything else that is random in a step."""
         return self._generator(_STEP, step, 0)
 
-    def _slice(self, fabric: int, visit: int) -> npt.NDArray[np.int64]:
-        """Return the rows of a fabric's `visit`; a fabric with fewer rows than wanted repeats them."""
-        count = self.counts[fabric]
-        slices = max(count // self.each, 1)
-        epoch, part = divmod(visit, slices)
-        if self._epochs.get(fabric, (-1,))[0] != epoch:
-            self._epochs[fabric] = epoch, self._permutation(count, _EPOCH, epoch, fabric)
-        permutation = self._epochs[fabric][1]
+    def _slice(self, fabric: int, visit: int) -> Index:
+        """Return the rows of a fabric's `visit`; a window with fewer rows than wanted repeats them."""
+        counts = self._windows[fabric]
+        slices = np.maximum(counts // self.each, 1)
+        epoch, part = divmod(visit, int(slices.sum()))
+        if len(counts) == 1:
+            return self._part(part, fabric, counts[0], _EPOCH, epoch, fabric)
+        order = self._permutation(len(counts), _EPOCH, epoch, fabric)
+        ends = np.cumsum(slices[order])
+        turn = int(np.searchsorted(ends, part, side="right"))
+        window = int(order[turn])
+        part -= int(ends[turn] - slices[window])
+        first = int(counts[:window].sum())
+        return first + self._part(part, fabric, counts[window], _EPOCH, epoch, fabric, window)
+
+    def _part(self, part: int, fabric: int, count: int, *purpose: int) -> Index:
+        """Return a slice of the permutation of a window, which is kept for the fabric's next visit."""
+        if self._last.get(fabric, ((), None))[0] != purpose:
+            self._last.pop(fabric, None)
+            self._last[fabric] = purpose, self._permutation(count, *purpose)
+            if len(self._last) > _MOST_PERMUTATIONS:
+                del self._last[next(iter(self._last))]  # the oldest
+        permutation = self._last[fabric][1]
         return np.resize(permutation[part * self.each : (part + 1) * self.each], self.each)
 
-    def _permutation(self, count: int, purpose: int, index: int, of: int) -> npt.NDArray[np.int64]:
-        return self._generator(purpose, index, of).permutation(count)
+    def _permutation(self, count: int, *purpose: int) -> Index:
+        return self._generator(*purpose).permutation(count)
 
-    def _generator(self, purpose: int, index: int, of: int) -> np.random.Generator:
-        return np.random.Generator(np.random.Philox(np.random.SeedSequence((self._seed, purpose, index, of))))
+    def _generator(self, *purpose: int) -> np.random.Generator:
+        return np.random.Generator(np.random.Philox(np.random.SeedSequence((self._seed, *purpose))))
 
 
 class Batches:
@@ -123,20 +233,21 @@ class Batches:
     A GPU holds the whole table if it takes less than half of the free memory.
     """
 
-    def __init__(self, rows: TrainingRows, order: Order, device: torch.device) -> None:
+    def __init__(self, rows: TrainingRows | WindowedRows, order: Order, device: torch.device) -> None:
         self.rows, self.order, self.device = rows, order, device
-        self._resident: Tensor | None = None
-        if device.type == "cuda" and rows.table.nbytes < torch.cuda.mem_get_info(device)[0] // 2:
-            self._resident = torch.from_numpy(np.array(rows.table)).to(device)
+        self._resident: tuple[TrainingRows, Tensor] | None = None
+        free = torch.cuda.mem_get_info(device)[0] if device.type == "cuda" else 0
+        if isinstance(rows, TrainingRows) and rows.table.nbytes < free // 2:
+            self._resident = rows, torch.from_numpy(np.array(rows.table)).to(device)
 
     def step(self, step: int) -> Batch:
         """Return the batch of a step."""
         fabrics, rows = self.order.step(step)
-        index = rows + self.rows.starts[fabrics][:, None]
         if self._resident is not None:
-            table = self._resident[torch.from_numpy(index).to(self.device)]
+            own, whole = self._resident
+            table = whole[torch.from_numpy(own.index(fabrics, rows)).to(self.device)]
         else:
-            table = torch.from_numpy(self.rows.table[index]).to(self.device)
+            table = torch.from_numpy(self.rows.take(fabrics, rows)).to(self.device)
         u, v, sigma = table[..., :3].unbind(dim=-1)
         minor, angle, curvature = table[..., 9:12].unbind(dim=-1)
         wi, wo, target = table[..., 3:6], table[..., 6:9], table[..., TARGET]

@@ -82,7 +82,7 @@ def train(
     identity = fingerprint(card)  # of everything that shapes the weights
     with _reproducible(training.threads, device):
         rows = load_rows(manifest, manifest_folder, fabrics, folder / f"{identity}-{ROWS}")
-        order = Order(rows.counts, training.batch, training.fabrics, training.seed)
+        order = Order(rows.windows, training.batch, training.fabrics, training.seed)
         batches = Batches(rows, order, device)
 
         # Build the network; its last bias starts at the mean of a spread of targets.
@@ -90,7 +90,7 @@ def train(
         sets = [set_name(rows) for rows in options.extra_rows]
         extra = ([manifest.columns(manifest_folder, name, own) for name in fabrics] for own in sets)
         network = build_network(options, members, extra)
-        network.start_at(torch.from_numpy(rows.table[:: max(len(rows.table) // _START_ROWS, 1), TARGET].copy()))
+        network.start_at(torch.from_numpy(rows.spread(_START_ROWS)[:, TARGET].copy()))
         network.to(device).train()
         groups = network.parameter_groups(training.learning_rate)
         optimiser = torch.optim.AdamW(groups, weight_decay=training.weight_decay, fused=True)

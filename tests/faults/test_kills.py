@@ -1,13 +1,17 @@
 """Kills at random moments: the same command continues, and the bytes are those of a run that nothing disturbs."""
 
+import io
 import random
 import time
 from contextlib import nullcontext, suppress
 
+import dask.config
 import psutil
 import pytest
+from rich.console import Console
 
-from tests.faults.runs import cluster, end, family, finish, gone, hashes, start
+from tests.faults.runs import cluster, end, family, finish, gone, hashes, run, start
+from tests.jobs import fake_stages as fake
 
 pytestmark = pytest.mark.faults
 
@@ -88,6 +92,42 @@ def test_killed_schedulers(recipe, undisturbed, tmp_path):
             assert hashes(recipe, out) == undisturbed[1]
             out = tmp_path / str(kills)
     finish(recipe, out, undisturbed)
+
+
+def test_killed_parts(recipe, undisturbed, tmp_path):
+    """Parts at the same time, one of them twice; one is killed, and all are started again."""
+    seeded, out = random.Random(4), tmp_path / "out"
+    out.mkdir()
+    for stage, kills in (("generate", 6), ("train", 2)):
+        ends = []
+        while kills or not ends or any(ended.code for ended in ends):
+            processes = [start(recipe, out, "--part", part, verb=stage) for part in ("1/2", "2/2", "2/2")]
+            victim = seeded.choice(processes)
+            if kills and wait_for_a_moment(victim, out, seeded):
+                victim.kill()
+            kills = max(0, kills - 1)
+            ends = [end(process) for process in processes]
+            assert all(ended.code in (0, -9) for ended in ends), ends
+        run(recipe, out, verb=stage)
+    finish(recipe, out, undisturbed)
+
+
+DIES_ONCE = """
+import os, pathlib, signal
+flag = pathlib.Path("FLAG")
+if not flag.exists():
+    flag.touch()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_worker_killed_while_the_cluster_starts(tmp_path):
+    (tmp_path / "dies.py").write_text(DIES_ONCE.replace("FLAG", str(tmp_path / "died")))  # dask runs a copy
+    console = Console(file=io.StringIO(), width=400)
+    with dask.config.set({"distributed.worker.preload": [str(tmp_path / "dies.py")]}):
+        summary = fake.run([fake.task("one"), fake.task("other")], tmp_path, console, workers=2)
+    assert len(summary.ran) == 2 and (tmp_path / "died").exists()
+    assert "2 worker processes could not start" in console.file.getvalue()
 
 
 def works(process):

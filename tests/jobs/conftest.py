@@ -1,12 +1,13 @@
-from contextlib import nullcontext, suppress
+from functools import partial
 
 import pytest
 
 from jobs.cli import main
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
-from jobs.run import executor
-from jobs.run.outcome import work
+from jobs.run.executor import execute
+from jobs.verbs import run
+from tests.jobs import fake_stages
 
 RECIPE = """
 name = "tiny"
@@ -109,33 +110,8 @@ def twillight(capsys, monkeypatch, tmp_path):
     return call
 
 
-class Here:
-    """Stands in for the crew: each task is done in this process when it is started."""
-
-    dashboard, threads, slots = None, 1, 1
-
-    def __init__(self, client, external, hear):
-        self.hear, self.accepted, self.outcomes = hear, ["here"], []
-
-    def look(self):
-        pass
-
-    def compile(self, groups, show):
-        for group in groups:
-            with suppress(Exception):  # it is told by the task that needs the kernel
-                group.compile(lambda kernel: self.hear({"kernel": kernel}))
-
-    def start(self, task, out, inputs, avoided=()):
-        hear = self.hear
-        self.outcomes.append((task, work(task, executor.Path(out), lambda s: hear({"task": task.id, "share": s}))))
-
-    def ended(self, seconds):
-        ended, self.outcomes = self.outcomes, []
-        return ended
-
-
 @pytest.fixture
 def here(monkeypatch):
-    """Runs without a cluster."""
-    monkeypatch.setattr(executor, "connected", lambda scheduler, workers, say: nullcontext())
-    monkeypatch.setattr(executor, "Crew", Here)
+    """Runs without a cluster: task after task in this process, as a part does them."""
+    for module in (fake_stages, run):
+        monkeypatch.setattr(module, "execute", partial(execute, serial=True))

@@ -99,6 +99,6 @@ def finished(recipe, out, stages=STAGES):
 
 
 def contents(out):
-    """Return the bytes of all files but the lock."""
-    files = [path for path in out.rglob("*") if path.is_file() and path.name != "lock"]
+    """Return the bytes of all files but the locks."""
+    files = [path for path in out.rglob("*") if path.is_file() and path.suffix != ".lock" and path.name != "lock"]
     return {str(path.relative_to(out)): path.read_bytes() for path in files}

@@ -1,5 +1,6 @@
 """The snippets of jobs/CLUSTER.md, with a local cluster or local processes in place of each service."""
 
+import json
 import os
 import re
 import stat
@@ -9,6 +10,7 @@ import types
 from pathlib import Path
 
 import pytest
+import yaml
 from distributed import LocalCluster
 from rich.console import Console
 
@@ -16,6 +18,7 @@ from jobs.cli import app
 from jobs.run.cluster import Scheduler
 from tests.jobs import fake_stages as fake
 from tests.jobs.dask_processes import ENVIRONMENT
+from tests.jobs.small_recipes import write_smallest
 
 pytestmark = [pytest.mark.external, pytest.mark.slow]  # clusters of dask
 
@@ -73,6 +76,72 @@ def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, monkeypatch
     assert len(summary.ran) == 6 and not summary.failed
 
 
+PART = f"""#!{sys.executable}
+import sys
+from jobs.entry import main
+if __name__ == "__main__":  # workers are started from it
+    sys.exit(main())
+"""
+
+
+def command_of(index):
+    """Return the shell line of the snippet that names a variable."""
+    blocks = re.findall(r"^```(sh|json|yaml)\n(.*?)^```$", TEXT, re.M | re.S)
+    ((language, block),) = [found for found in blocks if index in found[1]]
+    if language == "sh":
+        return block
+    content = json.loads(block) if language == "json" else yaml.safe_load(block)
+    if language == "json":
+        shell, flag, line = content["containerOverrides"]["command"]
+        count = content["arrayProperties"]["size"]
+    else:
+        shell, flag, line = content["spec"]["template"]["spec"]["containers"][0]["command"]
+        count = content["spec"]["completions"]
+    assert (shell, flag, count) == ("sh", "-c", 1000)
+    return line
+
+
+ARRAYS = {"SLURM_ARRAY_TASK_ID": 1, "AWS_BATCH_JOB_ARRAY_INDEX": 0, "JOB_COMPLETION_INDEX": 0}
+"""Variables with the number of a job in its array, and the first number."""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """Return a folder with a recipe, its products by an undivided run, and `twillight`."""
+    folder = tmp_path_factory.mktemp("small")
+    write_smallest(folder, "full", {"shard_rows": 64})
+    (folder / "twillight").write_text(PART)
+    (folder / "twillight").chmod(stat.S_IRWXU)
+    environment = ENVIRONMENT | {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}
+    environment.pop("OMP_NUM_THREADS", None)
+    subprocess.run(["twillight", "generate", "full.toml", "--out", "whole"], cwd=folder, env=environment, check=True)
+    return folder, environment
+
+
+@pytest.mark.parametrize("index", ARRAYS)
+def test_all_jobs_of_an_array_at_once_and_a_closing_command_are_an_undivided_run(small, tmp_path, index):
+    """One job is there twice, as after a restart whose end was not noticed."""
+    folder, environment = small
+    out, line = tmp_path / "out", command_of(index).replace(" full ", " full.toml ").replace("/1000", "/3")
+    line = re.sub(r"--out \S+", f"--out {out}", line)
+    if index == "SLURM_ARRAY_TASK_ID":
+        assert "--array=1-1000 " in line
+    jobs = [
+        subprocess.Popen(["sh", "-c", line], cwd=folder, env=environment | {index: str(ARRAYS[index] + number)})
+        for number in (0, 1, 2, 1)
+    ]
+    assert [job.wait(timeout=600) for job in jobs] == [0] * len(jobs)
+    assert not list(out.rglob(".tmp-*")) and not list(out.glob("datasets/*/manifest.json"))
+    command = ["twillight", "generate", "full.toml", "--out", str(out)]
+    closing = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True)
+    assert "nothing to do: 7 tasks done" in closing.stdout
+
+    def products(out):
+        return {path.name: path.read_bytes() for path in out.glob("datasets/*/*")}
+
+    assert products(out) == products(folder / "whole") and len(products(out)) == 8
+
+
 SRUN = """#!/bin/sh
 "$@" &
 "$@" &
@@ -94,7 +163,7 @@ if __name__ == "__main__":  # workers are started from it
 
 
 def test_the_job_of_slurm_runs_tasks(tmp_path):
-    (script,) = re.findall(r"^```sh\n(#!/bin/bash\n.*?)^```$", TEXT, re.M | re.S)
+    (script,) = re.findall(r"^```sh\n(#!/bin/bash\n[^`]*?dask worker.*?)^```$", TEXT, re.M | re.S)
     folder = tmp_path / "bin"
     folder.mkdir()
     for name, content in (("srun", SRUN), ("twillight", TWILLIGHT), ("dask", DASK), ("job", script)):

@@ -93,6 +93,17 @@ def test_a_storage_that_fails_for_a_while_has_the_shards_of_a_folder(switch, tmp
     assert not any(b"secret-of-the-tests" in path.read_bytes() for path in place(address).rglob("*") if path.is_file())
 
 
+def test_parts_on_machines_that_share_the_storage_alone_have_the_bytes_of_a_folder(switch, tmp_path, monkeypatch, call):
+    here, address = tmp_path / "out", "s3://products/parts"
+    for machine, part in enumerate((["--part", "2/2"], ["--part", "1/2"], ["--part", "2/2"], [])):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / f"machine-{machine}"))
+        code, said, told = call("generate", address, *part)
+        assert code == 0 and ("nothing to do" in said) == (machine > 1), told
+    for part in (["--part", "1/1"], []):
+        assert call("generate", here, *part)[0] == 0
+    assert products(place(address)) == products(here)
+
+
 @pytest.mark.slow
 def test_generate_train_check_and_repair_leave_the_bytes_of_a_folder(switch, tmp_path, monkeypatch, call):
     here, address = tmp_path / "out", "s3://products/whole"

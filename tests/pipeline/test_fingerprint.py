@@ -2,7 +2,7 @@ import hashlib
 
 import pytest
 
-from pipeline.fingerprint import canonical, fingerprint
+from pipeline.fingerprint import canonical, fingerprint, fingerprints
 
 
 def test_known_bytes():
@@ -14,3 +14,10 @@ def test_known_bytes():
 def test_numbers_that_are_none_are_refused(value):
     with pytest.raises(ValueError, match="JSON"):
         fingerprint([value])
+
+
+def test_many_that_differ_in_some_integers_are_those_of_each():
+    specification = {"b": [1.0, 0.5], "start": 3, "a": {"start": "ä", "c": None}, "~": "x"}
+    changes = [{"start": 10**12}, {"start": 0, "rows": -1}, {}]
+    each = [fingerprint(["kind", specification | change]) for change in changes]
+    assert list(fingerprints("kind", specification, changes)) == each

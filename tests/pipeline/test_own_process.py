@@ -57,20 +57,26 @@ from pipeline.own_process import in_own_process
 
 class Code:
     def __reduce__(self):
-        return eval, ("lambda p: (p(__import__('os').getpid()), __import__('time').sleep(3600))",)
+        return eval, ("lambda p: (p(__import__('os').getpid()), p(SLEEPER), __import__('time').sleep(3600))",)
 
 in_own_process(Code(), progress=lambda pid: print(int(pid), flush=True))
 """
 
 
 def test_the_process_ends_when_its_parent_is_killed():
-    with subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, text=True, cwd=ROOT) as parent:
-        child = psutil.Process(int(parent.stdout.readline()))
+    command = [sys.executable, "-c", PARENT.replace("SLEEPER", SLEEPERS[2])]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as parent:
+        processes = [psutil.Process(int(parent.stdout.readline())) for _ in range(2)]
         parent.kill()
-        child.wait(timeout=120)
+        assert not gone(processes, 120)
 
 
-SLEEPER = "__import__('subprocess').Popen(['sleep', '3600'], close_fds=False).pid"
+SLEEPERS = [
+    "__import__('subprocess').Popen(['sleep', '3600'], close_fds=False).pid",
+    "__import__('subprocess').Popen(['sleep', '3600'], start_new_session=True).pid",
+    "int(__import__('subprocess').check_output(['sh', '-c', 'setsid sleep 3600 >/dev/null & echo $!']))",
+]
+"""Start a process that holds the pipe, one in a session of its own, and one whose parent is gone; return its number."""
 
 
 def ended(pid):
@@ -78,9 +84,20 @@ def ended(pid):
     return not psutil.pid_exists(pid) or not gone([psutil.Process(pid)])
 
 
-def test_processes_that_it_starts_end_with_it_and_do_not_hide_its_end():
-    assert ended(in_own_process(Code(f"lambda p: {SLEEPER}")))
+@pytest.mark.parametrize("sleeper", SLEEPERS, ids=["child", "session", "orphan"])
+def test_processes_that_it_starts_end_with_it_and_do_not_hide_its_end(sleeper):
+    assert ended(in_own_process(Code(f"lambda p: {sleeper}")))
     started = []
     with pytest.raises(ProcessEnded, match="exit code 3"):
-        in_own_process(Code(f"lambda p: (p({SLEEPER}), __import__('os')._exit(3))"), progress=started.append)
+        in_own_process(Code(f"lambda p: (p({sleeper}), __import__('os')._exit(3))"), progress=started.append)
     assert ended(int(started[0]))
+
+    def look():
+        if len(started) > 1:
+            raise ValueError("it takes too long")
+
+    with pytest.raises(ValueError, match="too long"):
+        in_own_process(
+            Code(f"lambda p: (p({sleeper}), __import__('time').sleep(3600))"), progress=started.append, look=look
+        )
+    assert ended(int(started[1]))

@@ -7,10 +7,14 @@ cost, in shards of the default size. Each step is a process of its own: `twillig
 reading of a training up to its first batch. Printed for each: seconds of the clock and (in brackets) of processor time,
 the peak memory of the largest process (resident set, pages of mapped files included), and the most files that one
 process had open; for the reading, the same two times from its start to the first batch, imports left out.
+
+With ``--links 100`` only the reading is measured, of so many shards of 10^6 rows that are links to one file: also the
+times of a thousand batches.
 """
 
 from __future__ import annotations
 
+import os
 import resource
 import subprocess
 import sys
@@ -45,10 +49,61 @@ def read(folder: Path) -> None:
     Manifest.load(folder)  # imports what it needs
     start, cpu = time.perf_counter(), time.process_time()
     rows = load_rows(Manifest.load(folder), folder, ["polyester_lining"], folder.parents[1] / "rows.npy")
-    batch = Batches(rows, Order(rows.counts, 4096, 1, 0), torch.device("cpu")).step(0)
+    batch = Batches(rows, Order(rows.windows, 4096, 1, 0), torch.device("cpu")).step(0)
     assert batch.u.shape == (1, 4096)
     wall, cpu = time.perf_counter() - start, time.process_time() - cpu
     print(f"{wall:.1f} ({cpu:.1f})")
+
+
+FABRICS = ["denim", "satin_8", "gauze", "organza", "herringbone", "silk_charmeuse", "basket", "houndstooth"]
+
+
+def write_links(folder: Path, shards: int, rows: int = 10**6) -> None:
+    """Write a data set whose shards are links to one of random numbers."""
+    import numpy as np
+
+    from pipeline.shards.manifest import Manifest, ShardEntry
+    from pipeline.shards.queries import QueryOptions, draw_queries
+    from pipeline.shards.store import columns_of, write_columns
+    from pipeline.truth.query import Answers
+    from weaves.fabric import load_fabric
+
+    queries = draw_queries(QueryOptions(), load_fabric(FABRICS[0]).weave.repeat, 0, 0, rows)
+    mean = np.random.default_rng(0).random((rows, 4), np.float32)
+    columns = columns_of(queries, Answers.opaque(mean, mean, np.ones(rows, np.int32)))
+    write_columns(folder / "0.parquet", "components", FABRICS[0], columns, {})
+    entries = []
+    for index in range(shards):
+        fabric, start = FABRICS[index % len(FABRICS)], index // len(FABRICS) * rows
+        facts = {"file": f"{index}.parquet", "split": "train", "rows": rows, "sha256": "0" * 64}
+        entries.append(ShardEntry(fabric=fabric, start=start, **facts))
+        if index:
+            os.link(folder / "0.parquet", folder / entries[-1].file)
+    fabrics = {name: load_fabric(name) for name in FABRICS}
+    Manifest(name="links", fingerprint="0", roles={"seen": FABRICS}, fabrics=fabrics, about={}, shards=entries).save(
+        folder
+    )
+
+
+def read_links(folder: Path) -> None:
+    """Read the first batch and a thousand more of 8,192 rows; print seconds and memory."""
+    import torch
+
+    from pipeline.shards.manifest import Manifest
+    from pipeline.training.dataset import Batches, Order, load_rows
+
+    Manifest.load(folder)  # imports what it needs
+    for first, last in ((0, 1), (1, 1001)):
+        wall, cpu = time.perf_counter(), time.process_time()
+        if first == 0:
+            rows = load_rows(Manifest.load(folder), folder, FABRICS, folder / "rows.npy")
+            rows.spread(2**16)
+            batches = Batches(rows, Order(rows.windows, 8192, len(FABRICS), 0), torch.device("cpu"))
+        for step in range(first, last):
+            batches.step(step)
+        wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(f"{last - first} batches: {wall:.1f} ({cpu:.1f}) s, {memory:.0f} MiB", flush=True)
 
 
 def watched(command: list[str]) -> tuple[list[str], list[str]]:
@@ -73,10 +128,17 @@ def watched(command: list[str]) -> tuple[list[str], list[str]]:
     return [f"{wall:.0f} ({cpu:.0f})", f"{memory / 2**20:.0f} MiB", str(files)], said.strip().splitlines()
 
 
-def main(rows: tuple[int, ...] = (10**5, 10**6, 10**7), workers: int = 2, dataset: Path | None = None) -> None:
+def main(
+    rows: tuple[int, ...] = (10**5, 10**6, 10**7), workers: int = 2, dataset: Path | None = None, links: int = 0
+) -> None:
     """Measure each number of rows and print a table; with a data set, only read it."""
     if dataset:
-        read(dataset)
+        (read_links if links else read)(dataset)
+        return
+    if links:
+        with tempfile.TemporaryDirectory() as name:
+            write_links(Path(name), links)
+            subprocess.run([sys.executable, __file__, "--dataset", name, "--links", "1"], check=True)
         return
     print("| rows | step | seconds | memory | files | first batch |\n|---|---|---|---|---|---|")
     for count in rows:

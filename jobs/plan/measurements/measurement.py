@@ -135,8 +135,9 @@ class Measurement(Task):
         A method that fails ends a measurement of it alone. One of several methods starts again without it. MethodFailed
         if the only method fails.
         """
-        added = [model for model in held(self, Trained) if isinstance(model.options, AddedMethod)]
-        if not added and not list(held(self, AddedMetric)):
+        models = (model.options for model in held(self, Trained))
+        added = [*held(self, AddedMetric), *(options for options in models if isinstance(options, AddedMethod))]
+        if not added:
             self.write(out, {}, progress)
             return
         from pipeline.models.added.apart import run_apart
@@ -145,7 +146,7 @@ class Measurement(Task):
         left_out: dict[str, str] = {}
         while True:
             try:
-                return run_apart(self.write, out, left_out, progress=progress)
+                return run_apart(self.write, out, left_out, limits=added, progress=progress)
             except MethodFailed as failure:
                 if failure.name in left_out or self.without([failure.name]) is None:
                     raise

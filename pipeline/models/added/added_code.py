@@ -1,7 +1,7 @@
 """Options of a method or metric from outside: its code, with place, hash and version, and a method's own options.
 
 No recipe holds these fields. They are made from `--add` or from an installed package (`jobs.recipe.added`), so a recipe
-alone never runs code. Where the code lies and how long a call may take are no part of an identity.
+alone never runs code. Where the code lies and its limits are no part of an identity.
 """
 
 from __future__ import annotations
@@ -27,10 +27,20 @@ Kind = Literal["behind", "stretch", "curvature"]
 Limit = Annotated[float, Field(gt=0, le=86_400)]
 """Seconds."""
 
-_PLACES: Final = ("source", "folder", "limit")
+
+class CallLimits(Frozen):
+    """Limits of code from outside; no part of an identity."""
+
+    limit: Limit = 600.0
+    """Longest time of one call."""
+    memory: Annotated[float, Field(gt=0, le=1024)] = 4.0
+    """Most memory of each of its processes, in GiB: of data that is its own, not of mapped files."""
 
 
-class AddedCode(Frozen):
+_PLACES: Final = ("source", "folder", *CallLimits.model_fields)
+
+
+class AddedCode(CallLimits):
     """A class or function from outside the package."""
 
     source: str = Field(max_length=4096)
@@ -43,8 +53,6 @@ class AddedCode(Frozen):
     """Name and version of the installed distribution; empty for a file or folder."""
     stated: str = Field(max_length=64)
     """Version that the code states."""
-    limit: Limit = 600.0
-    """Longest time of one call."""
 
     @property
     def in_source(self) -> str:

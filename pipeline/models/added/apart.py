@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import mmap
+import resource
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pipeline.models.added.guarded import STATE_BYTES, WATCH, Call, MethodFailed
+from pipeline.models.added.added_code import CallLimits
+from pipeline.models.added.guarded import GIB, STATE_BYTES, WATCH, Call, MethodFailed
 from pipeline.own_process import ProcessEnded, in_own_process
 
 Result = TypeVar("Result")
 
 
 def run_apart(
-    function: Callable[..., Result], *arguments: Any, progress: Callable[[float], None] = lambda share: None
+    function: Callable[..., Result],
+    *arguments: Any,
+    limits: Iterable[CallLimits] = (CallLimits(),),
+    progress: Callable[[float], None] = lambda share: None,
 ) -> Result:
     """Call ``function(*arguments, progress)`` in a process of its own, as `in_own_process` does.
 
-    It raises what the function raises; MethodFailed if a method from outside raises, returns nothing usable, takes too
-    long in one call, or ends the process; WorkFailed if the process ends for another reason.
+    It has the most memory that any of the `limits` allows, and so has each process that it starts. It raises what the
+    function raises; MethodFailed if a method from outside raises, returns nothing usable, takes too long in one call,
+    or ends the process; WorkFailed if the process ends for another reason.
     """
     with tempfile.NamedTemporaryFile(prefix="twillight-") as state:
         state.truncate(STATE_BYTES)
@@ -32,7 +38,9 @@ def run_apart(
                     raise MethodFailed(call.name, f"{call.function} took longer than {call.limit:g} s, its limit")
 
             try:
-                result: Result = in_own_process(_watched, state.name, function, arguments, progress=progress, look=look)
+                memory = int(max(each.memory for each in limits) * GIB)
+                work = state.name, memory, function, arguments
+                result: Result = in_own_process(_watched, *work, progress=progress, look=look)
                 return result
             except ProcessEnded as error:
                 call = Call.read(shared)
@@ -42,9 +50,14 @@ def run_apart(
 
 
 def _watched(
-    state: str, function: Callable[..., Result], arguments: tuple[Any, ...], progress: Callable[[float], None]
+    state: str,
+    memory: int,
+    function: Callable[..., Result],
+    arguments: tuple[Any, ...],
+    progress: Callable[[float], None],
 ) -> Result:
-    """Call a function, with the calls of methods from outside marked in the bytes of a file."""
+    """Call a function with so many bytes of memory; calls of methods from outside are marked in the bytes of a file."""
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     with Path(state).open("rb+") as file:
         WATCH.attach(mmap.mmap(file.fileno(), STATE_BYTES))
     return function(*arguments, progress)

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final, get_args
 
-from pipeline.models.added.added_code import AddedFunction, AddedMethod, Kind
+from pipeline.models.added.added_code import AddedFunction, AddedMethod, CallLimits, Kind
 from pipeline.models.added.apart import run_apart
 from pipeline.models.added.guarded import MethodFailed, faults_of
 from pipeline.models.added.source import ADD, locate
@@ -44,15 +44,16 @@ def describe(text: str, own: Mapping[str, Any], more: Mapping[str, Any]) -> Adde
     """Return what code from outside is: a function is a metric, a class a method.
 
     `text` is ``module:name`` or ``file.py:name``; `own` are the method's own options, others have their defaults;
-    `more` are the name in tables, if it is not the method's own, and the limit of a call. BadInput if there is no such
-    code, it cannot be imported, the method cannot be made, or it lacks what a method needs.
+    `more` are the name in tables, if it is not the method's own, and the limits of time and memory. BadInput if there
+    is no such code, it cannot be imported, the method cannot be made, or it lacks what a method needs.
     """
     try:
         json.dumps(own)
     except TypeError as error:
         raise BadInput(ADD, "", text, f"its options must be numbers, texts, lists and tables ({error})") from error
     try:
-        fields = run_apart(_described, text, dict(own))
+        limits = validated(CallLimits, {key: more[key] for key in CallLimits.model_fields if key in more}, ADD)
+        fields = run_apart(_described, text, dict(own), limits=[limits])
     except MethodFailed as failure:
         raise BadInput(ADD, "", text, failure.reason) from failure
     fields |= more

@@ -7,6 +7,7 @@ a call that takes too long (`pipeline.models.added.apart`).
 from __future__ import annotations
 
 import math
+import resource
 import struct
 import threading
 import time
@@ -30,6 +31,11 @@ if TYPE_CHECKING:
     from weaves.fabric import Fabric
 
 _STATE: Final = struct.Struct("<ddi64s16s")
+
+GIB: Final = 2**30
+"""Bytes."""
+
+_NO_MEMORY: Final = "can't allocate memory"  # in a RuntimeError of PyTorch
 
 STATE_BYTES: Final = _STATE.size
 """Size of the shared bytes."""
@@ -120,6 +126,9 @@ def described(error: BaseException, root: Path) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     own = [f for f in frames if Path(f.filename) == root or root in Path(f.filename).parents]
     where = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+    limit = resource.getrlimit(resource.RLIMIT_DATA)[0]
+    if limit != resource.RLIM_INFINITY and (isinstance(error, MemoryError) or _NO_MEMORY in str(error)):
+        return f"it needs more than {limit / GIB:g} GiB of memory, its limit{where}"
     if isinstance(error, SyntaxError):
         where = f" ({Path(error.filename or root).name}, line {error.lineno})"
         return one_line(f"SyntaxError: {error.msg}{where}", 200)

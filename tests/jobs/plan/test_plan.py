@@ -4,6 +4,7 @@ import pytest
 
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
+from pipeline.fingerprint import fingerprint
 from tests.jobs.identities import LEARNT, assert_changed, ids
 
 
@@ -40,6 +41,10 @@ def test_plans_are_pure_and_in_order_of_need_and_no_two_tasks_write_one_file(fil
         assert before.issuperset(task.needs) and task.id not in before and written.isdisjoint(task.products)
         before.add(task.id)
         written.update(task.products)
+
+
+def test_the_ids_of_a_plan_are_those_of_what_its_tasks_compute(tasks):
+    assert [task.id for task in tasks] == [fingerprint([task.stage, task.identity()]) for task in tasks]
 
 
 def test_a_general_model_never_reads_the_unseen_fabric_nor_any_test_row(tasks):

@@ -148,6 +148,7 @@ def test_an_installed_method_enters_if_the_recipe_names_it(files, planned, their
         ("theirs", 1, HERE + "version = 4\n", "models.3.version = 4: the method given has version 3"),
         ("theirs", 1, HERE + "row = 4\n", "has no option 'row'; did you mean 'rows'?"),
         ("theirs", 1, HERE + "limit = 0\n", "limit = 0: Input should be greater than 0"),
+        ("theirs", 1, HERE + 'memory = "all"\n', "memory = 'all': Input should be a valid number"),
         ("theirs", 1, HERE + "rows = 2026-01-01\n", "its options must be numbers, texts, lists and tables"),
         ("theirs", 1, HERE + 'name = "woven"\n', "names must differ"),
         ("theirs", 1, HERE + "[models.training]\nsteps = 5\n", "has nothing to train"),

@@ -132,11 +132,15 @@ def test_another_data_set_adopts_a_shard_it_shares_if_it_is_sound(done, sound):
         assert done.state(TASK) == done.state(twin) == "done"
 
 
-def test_one_run_at_a_time_in_a_folder_that_can_be_written(tmp_path):
+def test_one_run_at_a_time_or_several_parts_in_a_folder_that_can_be_written(tmp_path):
     first, second = Store.of(tmp_path), Store.of(tmp_path)
     with first.held(), pytest.raises(WorkFailed, match="another run is at work"), second.held():
         pass
     with second.held():
         (tmp_path / "file").touch()
+    with first.held(shared=True), second.held(shared=True), pytest.raises(WorkFailed, match="another run"):
+        Store.of(tmp_path).held().__enter__()
+    with first.held(), pytest.raises(WorkFailed, match="another run"), second.held(shared=True):
+        pass
     with pytest.raises(BadInput, match="--out must name a folder"), Store.of(tmp_path / "file" / "out").held():
         pass

@@ -3,8 +3,10 @@ import pytest
 import torch
 from torch.utils.data import DataLoader
 
-from pipeline.shards.manifest import Manifest
+from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import DatasetRows
+from pipeline.shards.store import ROW_GROUP, read_groups, read_table
+from pipeline.training import dataset
 from pipeline.training.dataset import COLUMNS, Batches, Order, RowStream, TrainingRows, load_rows
 from pipeline.truth.query import Answers, Queries
 from tests.datasets import write_dataset
@@ -12,20 +14,21 @@ from weaves.errors import BadInput
 
 
 def test_order_is_a_function_of_seed_and_step():
-    forwards = Order([100, 50, 70], batch=32, fabrics=2, seed=7)
+    forwards = Order([[100], [50], [70]], batch=32, fabrics=2, seed=7)
     steps = [forwards.step(step) for step in range(40)]
     for step in (39, 0, 17):  # another order of asking, another object
-        fabrics, rows = Order([100, 50, 70], batch=32, fabrics=2, seed=7).step(step)
+        fabrics, rows = Order([[100], [50], [70]], batch=32, fabrics=2, seed=7).step(step)
         np.testing.assert_array_equal(fabrics, steps[step][0])
         np.testing.assert_array_equal(rows, steps[step][1])
-    assert not np.array_equal(Order([100, 50, 70], 32, 2, seed=8).step(0)[1], steps[0][1])
+    assert not np.array_equal(Order([[100], [50], [70]], 32, 2, seed=8).step(0)[1], steps[0][1])
 
 
-def test_every_round_visits_every_fabric_and_every_epoch_every_row_once():
-    order = Order([64] * 5, batch=10, fabrics=5, seed=1)
+@pytest.mark.parametrize("windows", [[48], [16, 32], [16, 16, 16]])
+def test_every_round_visits_every_fabric_and_every_epoch_every_row_once(windows):
+    order = Order([[64]] * 5, batch=10, fabrics=5, seed=1)
     for step in range(8):
         assert sorted(order.step(step)[0]) == [0, 1, 2, 3, 4]
-    order = Order([48, 48], batch=32, fabrics=2, seed=1)
+    order = Order([windows, windows], batch=32, fabrics=2, seed=1)
     epochs = []
     for epoch in range(3):
         seen = {0: [], 1: []}
@@ -38,8 +41,8 @@ def test_every_round_visits_every_fabric_and_every_epoch_every_row_once():
 
 
 def test_few_rows_are_repeated_and_no_more_fabrics_taken_than_there_are():
-    assert sorted(np.bincount(Order([3], batch=8, fabrics=1, seed=0).step(0)[1][0])) == [2, 3, 3]
-    order = Order([10, 10], batch=9, fabrics=8, seed=0)
+    assert sorted(np.bincount(Order([[3]], batch=8, fabrics=1, seed=0).step(0)[1][0])) == [2, 3, 3]
+    order = Order([[10], [10]], batch=9, fabrics=8, seed=0)
     assert (order.fabrics, order.each) == (2, 4)
 
 
@@ -48,8 +51,9 @@ def test_batches_hold_the_rows_of_their_fabrics():
     counts = [30, 20, 40]
     table = np.zeros((90, COLUMNS), np.float32)
     table[:, 0], table[:, 1] = np.repeat(range(3), counts), np.concatenate([np.arange(count) for count in counts])
-    order = Order(counts, batch=12, fabrics=2, seed=3)
-    batch = Batches(TrainingRows(table, counts), order, torch.device("cpu")).step(5)
+    rows = TrainingRows(table, counts)
+    order = Order(rows.windows, batch=12, fabrics=2, seed=3)
+    batch = Batches(rows, order, torch.device("cpu")).step(5)
     fabrics, numbers = order.step(5)
     np.testing.assert_array_equal(batch.fabric, fabrics)
     np.testing.assert_array_equal(batch.u, np.repeat(fabrics[:, None], 6, axis=1))
@@ -65,11 +69,72 @@ def test_columns_are_where_batches_look_for_them(tmp_path):
     write_dataset(tmp_path, {"seen": ["denim"]}, [("denim", "train", 0, queries, answers)])
     rows = load_rows(Manifest.load(tmp_path), tmp_path, ["denim"], tmp_path / "rows.npy")
     np.testing.assert_array_equal(rows.table, np.arange(17)[None])
-    batch = Batches(rows, Order([1], batch=1, fabrics=1, seed=0), torch.device("cpu")).step(0)
+    batch = Batches(rows, Order([[1]], batch=1, fabrics=1, seed=0), torch.device("cpu")).step(0)
     for name in Queries._fields:
         np.testing.assert_array_equal(getattr(batch, name)[0], getattr(queries, name))
     np.testing.assert_array_equal(batch.target[0], answers.mean)
     assert batch.transparency.item() == 16
+
+
+def test_the_rows_of_a_slice_are_of_one_window_and_the_oldest_permutations_are_forgotten(monkeypatch):
+    """Windows of one fabric come in another order in each epoch; what is forgotten comes again."""
+    monkeypatch.setattr(dataset, "_MOST_PERMUTATIONS", 1)
+    windows = [[64, 64, 32], [64, 64, 32]]
+    order, again = (Order(windows, batch=32, fabrics=2, seed=3) for _ in range(2))
+    starts, orders = np.array([0, 64, 128]), []
+    for epoch in range(6):
+        visited = []
+        for step in range(10 * epoch, 10 * epoch + 10):
+            rows = order.step(step)[1]
+            np.testing.assert_array_equal(rows, again.step(step)[1])
+            found = np.searchsorted(starts, rows, side="right")
+            assert (found == found[:, :1]).all()
+            visited.append(int(found[0, 0]))
+        assert len(order._last) == 1
+        orders.append(tuple(visited))
+    assert len(set(orders)) > 1
+
+
+def test_rows_that_stay_in_their_shards_are_those_of_the_table(folder, tmp_path, monkeypatch):
+    """Every window of every fabric, in both orders of fabrics, as if row groups had a thousand rows."""
+    manifest, orders = Manifest.load(folder), (NAMES, NAMES[::-1])
+    tables = [load_rows(manifest, folder, names, tmp_path / f"{names[0]}.npy") for names in orders]
+    monkeypatch.setattr(dataset, "MOST_IN_TABLE", 4096)
+    monkeypatch.setattr(dataset, "ROW_GROUP", 1000)
+    monkeypatch.setattr(dataset, "read_groups", groups_of_a_thousand)
+    for names, table in zip(orders, tables, strict=True):
+        windowed = load_rows(manifest, folder, names, tmp_path / "none.npy")
+        assert windowed.counts == table.counts and windowed.windows == [[2000, 2096]] * 2
+        for fabric in range(2):
+            for start, rows in ((0, 2000), (2000, 2096)):
+                own = np.array([fabric]), start + np.random.default_rng(start).permutation(rows)[None]
+                np.testing.assert_array_equal(windowed.take(*own), table.take(*own))
+        some = windowed.spread(600)
+        np.testing.assert_array_equal(some, np.concatenate([table.table[:300], table.table[4096:4396]]))
+
+
+@pytest.mark.parametrize("least", [1, 2, 4, 8])
+def test_windows_are_of_whole_row_groups_and_of_enough_rows(tmp_path, least, monkeypatch):
+    monkeypatch.setattr(dataset, "ROW_GROUP", 10)
+    rows = [25, 5, 1, 60, 9, 10, 3]
+    shards = [
+        ShardEntry(file=f"s{i}.parquet", fabric="x", split="train", start=0, rows=n, sha256="")
+        for i, n in enumerate(rows)
+    ]
+    windows = dataset._windows(tmp_path, shards, 10 * least)
+    sizes = [sum(piece.rows for piece in window) for window in windows]
+    assert sum(sizes) == sum(rows) and min(sizes) >= 10 * least and max(sizes) < 30 * least
+    read = [
+        (piece.path.name, piece.first + group)
+        for window in windows
+        for piece in window
+        for group in range(-(-piece.rows // 10))
+    ]
+    assert read == [(shard.file, group) for shard in shards for group in range(-(-shard.rows // 10))]
+
+
+def groups_of_a_thousand(path, names, first, groups):
+    return read_table(path, names=names).slice(1000 * first, 1000 * groups)
 
 
 NAMES = ["cotton_twill", "polyester_lining"]
@@ -130,3 +195,13 @@ def test_columns_are_tensors_of_their_own_type(folder):
 def test_bad_options_are_one_sentence(options, sentence, folder):
     with pytest.raises(BadInput, match=sentence):
         stream(folder, **options)
+
+
+def test_row_groups_of_a_shard_are_slices_of_it(folder, tmp_path):
+    path = next(folder.glob("*.parquet"))
+    whole = read_table(path, names=["u", "sigma"])
+    assert read_groups(path, ["u", "sigma"], 0, 8).equals(whole) and whole.num_rows < ROW_GROUP
+    assert read_groups(path, ["u", "sigma"], 1, 8).num_rows == 0
+    (tmp_path / "cut.parquet").write_bytes(path.read_bytes()[:-9])
+    with pytest.raises(BadInput, match="not a whole Parquet file"):
+        read_groups(tmp_path / "cut.parquet", ["u"], 0, 1)

@@ -12,6 +12,7 @@ from pipeline.models.neumip import NeumipOptions
 from pipeline.models.registry import load_methods, load_model, module_of
 from pipeline.models.woven import WovenOptions
 from pipeline.shards.manifest import Manifest
+from pipeline.training import dataset
 from pipeline.training.checkpoint import CHECKPOINT, State, read_checkpoint
 from pipeline.training.loop import rate_factor, train
 from pipeline.training.options import TrainingOptions
@@ -95,6 +96,16 @@ def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, wh
     assert shares[0] == pytest.approx(17 / 30)
     assert contents(resumed) == contents(whole)
     assert set(contents(whole)) == {"model.safetensors", "card.json"}
+
+
+def test_a_killed_training_on_rows_that_stay_in_their_shards_goes_on_to_the_same_bytes(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(dataset, "MOST_IN_TABLE", 1000)
+    arguments = OPTIONS["woven"], SHORT, folder, FABRICS["woven"]
+    train(*arguments, tmp_path / "whole")
+    kill_at(20 / 30, *arguments, tmp_path / "resumed")
+    assert not list((tmp_path / "resumed").glob("*.npy"))
+    train(*arguments, tmp_path / "resumed")
+    assert contents(tmp_path / "resumed") == contents(tmp_path / "whole")
 
 
 def test_a_network_from_outside_learns_and_answers(folder, theirs, whole):

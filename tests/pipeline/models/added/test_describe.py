@@ -101,6 +101,17 @@ def test_options_that_it_does_not_have_and_code_that_ends_its_process_get_a_sent
         describe(f"{path}:Theirs", {}, {})
 
 
+@pytest.mark.parametrize("code", ["bytearray(2**30)", "__import__('numpy').zeros(2**27)"])
+def test_a_method_that_needs_more_memory_than_its_limit_is_told(path, monkeypatch, code):
+    monkeypatch.setattr(describe_module, "run_apart", run_apart)
+    path.write_text(f"x = {code}\n" + METHOD)
+    assert describe(f"{path}:Theirs", {}, {"memory": 2.0}).memory == 2.0
+    with pytest.raises(
+        BadInput, match=r"import: it needs more than 0.5 GiB of memory, its limit \(theirs.py, line 1\)"
+    ):
+        describe(f"{path}:Theirs", {}, {"memory": 0.5})
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
