@@ -1,4 +1,4 @@
-"""What fits predict of measured cloth that they were not given, beside formulas in use and the laboratories' errors.
+"""Predictions of measured cloth by fits that were not given it, beside formulas in use and the laboratories' errors.
 
 The data are shipped (pipeline.fitting.measured). Of the shade each ring of light is predicted by a fit to the others;
 of data sheets the transmittance of white yarns by that of charcoal ones, and that of the solar band by the visible one.
@@ -21,7 +21,7 @@ from pipeline.fitting.predicted import Errors
 from reports.truth.row_records import RowRecords
 
 LABORATORY: Final = "a second measurement"
-"""The laboratories' own errors, which nothing can be asked to go below."""
+"""The laboratories' own errors."""
 
 _SHADE, _SHEETS, _BAND = "shade_6216", "fabrics", "visible"
 _QUANTITIES: Final = ("light straight through", "reflectance", "BRDF below 65 degrees")
@@ -32,7 +32,7 @@ class Prediction:
     """One quantity of one cloth, as a fit, a formula or another measurement has it."""
 
     method: str
-    """What predicts it."""
+    """A fit, a formula, or a second measurement."""
     fabric: str
     """The cloth that was measured."""
     quantity: str
