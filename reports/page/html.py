@@ -30,7 +30,7 @@ from weaves.fabric import Fabric
 ALWAYS: Final = frozenset({"fabrics", "made", "columns", "limits"})
 """Sections that every page has; the others are left out where nothing was measured."""
 
-FIRST_SIGHT: Final = frozenset({"trade", "error", "pictures", "live", "scenes"})
+FIRST_SIGHT: Final = frozenset({"trade", "error", "pictures", "live", "scenes", "traced", "measured"})
 """Sections that are open from the start."""
 
 OPEN_ROWS: Final = 15

@@ -90,11 +90,10 @@ def _inside(x: float, y: float, z: float, over: Float64, tubes: Tubes) -> bool:
 
 
 @kernel
-def _shares(directions: Float64, places: Float64, over: Float64, tubes: Tubes) -> Float64:
-    """Return the shares of rays that meet no tube, (Q,), of directions (Q, 3) through places (K, 3) of the plane."""
+def _pass(directions: Float64, places: Float64, over: Float64, tubes: Tubes, passed: Float64) -> None:
+    """Count the rays that meet no tube, (Q,), of directions (Q, 3) through places (K, 3) of the plane."""
     picks, ends = over.shape
     top = max(tubes.warp[1] + tubes.warp[2], tubes.weft[1] + tubes.weft[2])
-    shares = np.zeros(len(directions))
     for k in range(len(places)):
         x, y = places[k, 0] * ends, places[k, 1] * picks * tubes.picks
         if _inside(x, y, 0.0, over, tubes):
@@ -108,8 +107,14 @@ def _shares(directions: Float64, places: Float64, over: Float64, tubes: Tubes) -
                 _inside(x + tx * z, y + ty * z, z, over, tubes) or _inside(x - tx * z, y - ty * z, -z, over, tubes)
             ):
                 z += step
-            shares[q] += z >= top
-    return shares / len(places)
+            passed[q] += z >= top
+
+
+def _shares(directions: Float64, places: Float64, over: Float64, tubes: Tubes) -> Float64:
+    """Return the shares of rays that meet no tube, (Q,)."""
+    passed = np.zeros(len(directions))
+    _pass(directions, places, over, tubes, passed)
+    return passed / len(places)
 
 
 def fitted(draft: str, measured: Straight, directions: Float64, places: Float64, tied: bool, seed: int) -> Float64:
