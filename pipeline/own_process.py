@@ -143,6 +143,8 @@ def _main() -> NoReturn:
     ended, status = 0, 0
     while not ended and not select.select([watched], [], [], _SECONDS_BETWEEN_LOOKS)[0]:
         ended, status = os.waitpid(worker, os.WNOHANG)
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(worker, signal.SIGKILL)  # where no process adopts those of its children, its group is what is known
     for _ in range(_MOST_ROUNDS):  # what is killed may just have started another process, and is its parent's to bury
         for process in (left := psutil.Process().children(recursive=True)):
             with suppress(psutil.Error):
