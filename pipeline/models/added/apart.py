@@ -57,7 +57,9 @@ def _watched(
     progress: Callable[[float], None],
 ) -> Result:
     """Call a function with so many bytes of memory; calls of methods from outside are marked in the bytes of a file."""
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    most = memory if hard == resource.RLIM_INFINITY else min(memory, hard)  # a limit of the account is never raised
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
     with Path(state).open("rb+") as file:
         WATCH.attach(mmap.mmap(file.fileno(), STATE_BYTES))
     return function(*arguments, progress)
