@@ -88,7 +88,7 @@ def _csv(path: Path, count: int) -> pa.Table:
             names = _columns(path, reader.schema.names)
         types = dict.fromkeys(names, pa.float64()) | {ID: pa.int64()}
         return csv.read_csv(path, convert_options=csv.ConvertOptions(column_types=types, include_columns=names))
-    except (pa.ArrowException, OSError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = " ".join(str(error).split())
         raise BadInput(
             str(path), "", f"cannot be read ({reason[:120]})", "a heading, then numbers, are needed"

@@ -110,7 +110,7 @@ def test_columns_that_are_missing_empty_or_of_another_type_are_named(tmp_path, e
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"id", b"\xff\xfe\0", b"id,red\n" + b"1," * 10**6, b"PAR1" * 9, b"id,id\n1,2\n"]
+    "content", [b"", b"id", b"\xff\xfe\0", b"id,\xff\n0,1\n", b"id,red\n" + b"1," * 10**6, b"PAR1" * 9, b"id,id\n1,2\n"]
 )
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_what_is_no_table_is_one_sentence(tmp_path, ending, content):
