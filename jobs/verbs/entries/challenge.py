@@ -2,7 +2,8 @@
 
 A round is the recipe `challenge` with the seeds of the round in place of its own. So the population and the queries are
 those of the code that all recipes share, and whoever has the seed generates the same bytes. A text that is public only
-after the hash, such as a hash of all frozen versions, enters too: nobody can draw seeds until one suits.
+after the hash, and that nobody controls, enters too: nobody can draw seeds until one suits. The list of versions is no
+such text, because the organiser writes it and knows the seed.
 """
 
 from __future__ import annotations
