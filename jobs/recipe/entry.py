@@ -24,8 +24,13 @@ ANSWER_FILES: Final = ("answers.parquet", "answers.csv")
 """Files of the answers, of which one lies beside the form."""
 
 
+def is_plain(text: str) -> bool:
+    """Return whether Markdown and HTML show a text as it is, on one line."""
+    return text.isprintable() and not set(text) & set("|`<>[]\\")
+
+
 def _shown(text: str) -> str:
-    if not text.isprintable() or set(text) & set("|`<>[]\\"):
+    if not is_plain(text):
         raise ValueError("one line without | ` < > [ ] \\ is needed")
     return text
 
@@ -65,6 +70,16 @@ class EntryForm(Frozen):
     def about(self) -> str:
         """Origin in words."""
         return f"answers by {self.authors}, version {self.version}, {self.code}; its costs are stated, not measured"
+
+    @property
+    def costs(self) -> tuple[tuple[str, float, str], ...]:
+        """Metric, value and note of each number that is stated."""
+        return (
+            ("stated_time", self.nanoseconds, f"{self.machine}, threads: {self.threads}"),
+            ("stated_bytes", self.bytes_stored, self.training),
+            ("stated_multiply_adds", self.multiply_adds, ""),
+            ("stated_tries", self.tries, f"{self.code}, version {self.version}"),
+        )
 
     @property
     def code(self) -> str:

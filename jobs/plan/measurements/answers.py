@@ -81,12 +81,7 @@ class OfAnswers(Measurement):
             raise BadInput(self.file, "", "was changed after the plan was made", "start the command again")
         form, subject = self.form, Record(method=self.form.name).made_by(f"{self.form.about}, SHA-256 {self.sha256}")
         records = measure_answers(subject, answers, rows, [role for _, role in self.fabrics], self.named, self.errors)
-        for metric, value, note in (
-            ("stated_time", form.nanoseconds, f"{form.machine}, threads: {form.threads}"),
-            ("stated_bytes", form.bytes_stored, form.training),
-            ("stated_multiply_adds", form.multiply_adds, ""),
-            ("stated_tries", form.tries, f"{form.code}, version {form.version}"),
-        ):
+        for metric, value, note in form.costs:
             records.append(subject.of(metric, value, 1).model_copy(update={"note": note}))
         *_, form_copy, answers_copy = self.products
         atomic_write(out / form_copy, tomli_w.dumps(form.model_dump()).encode())

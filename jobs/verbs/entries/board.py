@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter
 
-from jobs.recipe.entry import FORM, EntryForm
+from jobs.recipe.entry import FORM, EntryForm, is_plain
 from jobs.terminal import print_lines
 from jobs.verbs.parameters import Local
 from pipeline.atomic import atomic_write
@@ -40,6 +40,13 @@ def board(
         whole = {record.method for record in records} == {form.name}
         if not whole or not {record.metric for record in records} >= {*columns_of("entries")}:
             raise BadInput(str(folder / "records.json"), "", "holds other Records", f"those of {form.name} are needed")
+        stated = [
+            (record.metric, record.value, record.note) for record in records if record.metric in columns_of("entries")
+        ]
+        if sorted(stated) != sorted(form.costs):
+            raise BadInput(str(folder / "records.json"), "", "states other costs", f"those of {FORM} are needed")
+        if not all(is_plain(record.fabric + record.setting) for record in records):
+            raise BadInput(str(folder / "records.json"), "", "has names with signs of Markdown", "letters are needed")
         if form.name in names:
             raise BadInput(str(folder), "name", form.name, "is the name of another entry")
         names.add(form.name)

@@ -44,6 +44,8 @@ def test_what_was_not_measured_or_is_of_other_rows_is_refused(measured, entry, r
     (other / "records.machine.json").unlink()
     for content, words in (
         (text.replace(dataset, "0" * 16), "that of the entries before"), ("[]", "those of other are needed"),
+        (text.replace("without code", "[here](x)"), "states other costs"),
+        (text.replace('"fabric": "', '"fabric": "|'), "signs of Markdown"),
         (text.replace("stated_tries", "mse"), "holds other Records"), (text.replace('"other"', '"x"'), "other Records"),
     ):  # fmt: skip
         (other / "records.json").write_text(content, encoding="utf-8")
