@@ -48,7 +48,7 @@ class Prediction:
     high: float | None = None
     """Largest of it."""
     count: int = 1
-    """Always 1."""
+    """Of every number; a row is one measurement."""
 
 
 RECORDS: Final = RowRecords(
