@@ -13,7 +13,7 @@ ones behind a training. A task that measures time starts when nothing else runs,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -32,7 +32,7 @@ from jobs.run.outcome import Outcome
 from jobs.run.progress import Board
 from jobs.run.progress_forms import ProgressForm, form_of
 from jobs.run.receipt import Product
-from jobs.run.serial import Serial, one_thread
+from jobs.run.serial import Serial
 from jobs.terminal import Terminal
 from pipeline import patience
 from pipeline.cores import cores
@@ -94,7 +94,7 @@ def execute(
 
     board = Board(todo, estimate, form_of(progress, console or Terminal(stderr=True)))
     count = min(workers or cores(), len(todo))
-    cluster: AbstractContextManager[Any] = one_thread() if serial else connected(scheduler, count, board.say)
+    cluster: AbstractContextManager[Any] = nullcontext() if serial else connected(scheduler, count, board.say)
     with cluster as client, board:
         crew: Crew | Serial
         crew = Serial(ledger, board.hear) if serial else Crew(client, bool(scheduler.address), board.hear)

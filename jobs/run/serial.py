@@ -5,31 +5,16 @@ Tasks that measure time and code from outside have processes of their own, as al
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, ClassVar, Final
 
 from jobs.plan.task import Task
 from jobs.run.compiling import KernelGroup
 from jobs.run.ledger import Ledger
 from jobs.run.outcome import Outcome, work
-from pipeline.own_process import ONE_THREAD
 
 _HERE: Final = "this process"
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Let the libraries that are first loaded in the block compute on one thread, as those of workers do."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            del os.environ[name]
-            os.environ.update({} if value is None else {name: value})
 
 
 class Serial:

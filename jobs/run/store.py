@@ -104,7 +104,7 @@ class Store:
                 allowed = "another run is at work in this folder; wait for it, or choose another --out"
                 raise WorkFailed(f"{self.out}: {allowed}") from error
             except OSError as error:
-                allowed = "--out must name a folder that can be written"
+                allowed = "--out must name a folder that can be written, on a file system with locks (flock)"
                 raise BadInput(str(self.out), "", error.strerror or error, allowed) from error
             yield
 
@@ -112,10 +112,15 @@ class Store:
     def claimed(self, task: str) -> Iterator[None]:
         """Wait until no other process claims a task, given by its id, and claim it; in object storage as for `held`.
 
-        Each task is one byte of a file, of which bytes are locked that it does not have.
+        Each task is one byte of a file, of which bytes are locked that it does not have. WorkFailed if the file system
+        has no locks.
         """
         with self._lock_file("tasks.lock") as file:
-            fcntl.lockf(file, fcntl.LOCK_EX, 1, int(task[:15], 16))
+            try:
+                fcntl.lockf(file, fcntl.LOCK_EX, 1, int(task[:15], 16))
+            except OSError as error:
+                allowed = "parts need a file system with locks (fcntl); choose another --out"
+                raise WorkFailed(f"{self.out}: {error.strerror or error}; {allowed}") from error
             yield
 
     def _lock_file(self, name: str) -> IO[bytes]:

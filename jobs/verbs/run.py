@@ -116,7 +116,7 @@ def work_part(recipe_name: str, stage: Stage, part: Part, out: Path, on: WorkerF
 def _print_summary(tasks: Sequence[Task], summary: RunSummary, ledger: Ledger) -> None:
     """Print what a run did of some tasks."""
     if not summary.ran and not summary.failed:
-        print_lines(f"nothing to do: {len(tasks)} tasks done")
+        print_lines(f"nothing to do: {len(tasks)} tasks done" if tasks else "nothing to do: no task is in this part")
     else:
         _print_work(tasks, {task.id: ledger.seconds(task) for task in summary.ran})
 

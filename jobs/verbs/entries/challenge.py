@@ -44,8 +44,12 @@ def new(*, to: Folder) -> None:
             handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         except FileExistsError as error:
             raise BadInput(_WHERE, "--to", str(to), "holds a seed, which is never replaced; name another") from error
-        with open(handle, "w") as file:  # noqa: PTH123, there is a handle only
-            file.write(seed)
+        try:
+            with open(handle, "w") as file:  # noqa: PTH123, there is a handle only
+                file.write(seed)
+        except OSError:
+            path.unlink()  # a part of a seed would be kept as one
+            raise
     print_lines(f"{path}: keep it secret until all answers are in; publish its SHA-256 now:", _sha256(seed))
 
 

@@ -1,6 +1,13 @@
 """Stages in parts: their products, and what one closing command adds, are those of an undivided run, byte for byte."""
 
+import errno
+import fcntl
+import json
+import os
 import random
+import subprocess
+import sys
+from unittest.mock import Mock
 
 import pytest
 
@@ -10,6 +17,7 @@ from jobs.plan.plan import KINDS
 from jobs.plan.training import Training
 from jobs.run import executor, outcome
 from jobs.run.ledger import Ledger
+from pipeline.own_process import ONE_THREAD
 from tests.jobs import made_up
 from weaves.errors import WorkFailed
 
@@ -22,6 +30,22 @@ def recipe(tmp_path, here, monkeypatch):
     monkeypatch.setattr(executor, "kernel_groups", lambda tasks: [])
     monkeypatch.setattr(outcome, "in_own_process", lambda run, out, progress: run(out, progress))
     return made_up.write_recipe(tmp_path, "tiny", "neumip", "woven")
+
+
+NUMPY_IS_LOADED = """
+import json, os, sys
+
+class Look:
+    def find_spec(self, name, *_):
+        if name == "numpy":
+            print(json.dumps(dict(os.environ)))
+            sys.meta_path.remove(self)
+
+sys.meta_path.insert(0, Look())
+from jobs.entry import main
+main()
+"""
+"""A command that prints its environment when it loads numpy."""
 
 
 def lasting(out):
@@ -74,7 +98,22 @@ def test_a_task_of_a_part_that_fails_leaves_the_others_and_is_told(recipe, tmp_p
     assert "generate 2 2 0" in call("status", recipe, "--out", tmp_path / "out")[1]
 
 
-def test_a_part_is_refused_beside_a_run_that_is_none(recipe, tmp_path, call):
+def test_a_part_is_refused_beside_a_run_that_is_none_and_where_no_file_can_be_locked(
+    recipe, tmp_path, call, monkeypatch
+):
+    part = "generate", recipe, "--out", tmp_path / "out", "--part", "1/2"
     with Ledger(tmp_path / "out").store.held():
-        code, _, told = call("generate", recipe, "--out", tmp_path / "out", "--part", "1/2")
+        code, _, told = call(*part)
     assert code == 1 and "another run is at work in this folder" in told
+    for name, expected in (("lockf", 1), ("flock", 2)):
+        monkeypatch.setattr(fcntl, name, Mock(side_effect=OSError(errno.ENOLCK, "No locks available")))
+        code, _, told = call(*part)
+        assert code == expected and "No locks available" in told and "file system with locks" in told
+
+
+def test_libraries_of_a_part_are_loaded_for_one_thread():
+    """They read the environment when they are loaded."""
+    command = [sys.executable, "-c", NUMPY_IS_LOADED, "train", "quick", "--part=0/1"]
+    several = {**os.environ, **dict.fromkeys(ONE_THREAD, "2")}
+    done = subprocess.run(command, env=several, capture_output=True, text=True, check=True)
+    assert ONE_THREAD.items() <= json.loads(done.stdout.splitlines()[0]).items()

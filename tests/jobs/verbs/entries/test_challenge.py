@@ -1,9 +1,12 @@
+import errno
 import hashlib
 import re
 import stat
 import tomllib
+from unittest.mock import Mock
 
 from jobs.recipe.load import load_recipe
+from jobs.verbs.entries import challenge
 
 
 def test_a_round_is_drawn_from_its_seed_and_only_from_it(call, tmp_path):
@@ -27,7 +30,11 @@ def test_a_round_is_drawn_from_its_seed_and_only_from_it(call, tmp_path):
     assert same[0] == same[1] == same[2]
 
 
-def test_seeds_are_never_replaced_and_another_one_is_refused(call, refused, tmp_path):
+def test_seeds_are_never_replaced_nor_written_in_part_and_another_one_is_refused(call, refused, tmp_path, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(challenge, "open", Mock(side_effect=OSError(errno.ENOSPC, "No space left")), raising=False)
+        code, _, told = call("challenge", "new", "--to", tmp_path)
+    assert code == 1 and "No space left" in told and not (tmp_path / "seed").exists()
     call("challenge", "new", "--to", tmp_path)
     before = (tmp_path / "seed").read_text()
     assert "holds a seed, which is never replaced" in refused("challenge", "new", "--to", tmp_path)
