@@ -1,7 +1,6 @@
 """Entry of the command line. Ctrl-C gets a sentence from the first moment, while the verbs are still being loaded.
 
-A part of a stage (`--part`) computes on one thread, as a worker does, so that its bytes are those of a worker.
-Libraries read the number of threads when they are loaded, which importing the verbs does.
+A part (`--part`) computes on one thread, as workers do: libraries read the number of threads when they are loaded.
 """
 
 from __future__ import annotations

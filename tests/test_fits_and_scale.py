@@ -21,7 +21,6 @@ ROOT = Path(__file__).parents[1]
         ("fits/fit_selvage_errors.py --presets denim --random 0 --rows 32", "case 3: errors"),
         ("fits/measure_walls.py --fabrics voile --side 2 --rays 2", "| voile | 80 |"),
         ("scale/measure_driver.py --tasks 3", "| 3 |"),
-        ("scale/measure_overhead.py --shards 2 --rows 64", "2 shards of 64 rows"),
         ("scale/measure_requests.py --tasks 3", "| resume | 11 |"),
         ("scale/measure_rows.py --rows 1000", "| 1,000 | read |"),
     ],

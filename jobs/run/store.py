@@ -112,15 +112,13 @@ class Store:
     def claimed(self, task: str) -> Iterator[None]:
         """Wait until no other process claims a task, given by its id, and claim it; in object storage as for `held`.
 
-        Each task is one byte of a file, of which bytes are locked that it does not have. WorkFailed if the file system
-        has no locks.
+        Each task is one byte of a file, most of them beyond its end. WorkFailed if the file system has no locks.
         """
         with self._lock_file("tasks.lock") as file:
             try:
                 fcntl.lockf(file, fcntl.LOCK_EX, 1, int(task[:15], 16))
             except OSError as error:
-                allowed = "parts need a file system with locks (fcntl); choose another --out"
-                raise WorkFailed(f"{self.out}: {error.strerror or error}; {allowed}") from error
+                raise WorkFailed(f"{self.out}: {error.strerror}; parts need a file system with locks") from error
             yield
 
     def _lock_file(self, name: str) -> IO[bytes]:

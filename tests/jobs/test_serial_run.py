@@ -38,9 +38,8 @@ BENT = {"queries": {"curvature": [0.01, 0.5], "behind": 0.5}}
 SMALL_CURVED = {"model": "curved", "silhouette_rows": 64}
 
 
-@pytest.mark.parametrize(
-    ("dataset", "model"), [({}, {}), pytest.param(BENT, SMALL_CURVED, marks=pytest.mark.slow)], ids=["neumip", "curved"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("dataset", "model"), [({}, {}), (BENT, SMALL_CURVED)], ids=["neumip", "curved"])
 def test_a_page_compares_a_network_of_view_rays_with_its_variant_without_an_offset(
     tmp_path, here, capsys, monkeypatch, dataset, model
 ):

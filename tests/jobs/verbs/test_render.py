@@ -122,6 +122,7 @@ def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
     assert changed[(number == 1) | (number == 2)].mean() > 0.9 and not changed[(number == 0) | (number > 2)].any()
 
 
+@pytest.mark.slow
 def test_all_bounces_make_white_cloth_brighter(render, tmp_path):
     """Silk of albedo .85 lacks a sixth of its light with one bounce; the file says which it has."""
     (tmp_path / "white.toml").write_text(woven("silk_charmeuse", specular=(0.0,) * 3, diffuse=(0.85,) * 3).to_toml())

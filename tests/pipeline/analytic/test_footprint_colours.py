@@ -106,7 +106,7 @@ def test_stripes_have_the_mass_of_a_gaussian(sigma):
     np.testing.assert_allclose(picks, np.tile(fabric.weft.specular_rgb, (21, 1)), atol=1e-6)
 
 
-@pytest.mark.parametrize("behind", [False, True])
+@pytest.mark.parametrize("behind", [slow(False), True])
 def test_a_cloth_turned_by_half_a_turn_has_its_threads_in_reverse(behind):
     """The plain weave is its own half turn; ends and picks of two colours are not."""
     fabric = coloured("voile", **STRIPES)

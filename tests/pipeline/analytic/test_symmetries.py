@@ -23,9 +23,10 @@ def assert_equal(one, other, worst=WORST):
 
 
 QUERIES = asked(stretch=4.0)
+SLOW = methods.summed_area, methods.soft_nodes_behind
 
 
-@pytest.mark.parametrize("method", [slow(m) if m is methods.summed_area else m for m in methods.PLACED])
+@pytest.mark.parametrize("method", [slow(m) if m in SLOW else m for m in methods.PLACED])
 def test_a_cloth_drawn_in_another_way_has_the_same_answers(method):
     """A mirror reverses the sense of the twists: without that the mirrored cloth answers otherwise. Twice the repeat
     has the same longest period: waves and means over all cells are not others. Maps of mean normals begin somewhere."""

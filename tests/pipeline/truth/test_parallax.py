@@ -97,7 +97,7 @@ def test_rays_need_the_ply_model_estimators_of_rays_and_a_viewer_not_too_low(opt
         _answers(LOPSIDED, equal_queries(direction(20.0, 0.0), direction(89.5, 50.0)))
 
 
-@pytest.mark.parametrize("walls", ["left_out", "rim"])
+@pytest.mark.parametrize("walls", [slow("left_out"), "rim"])
 @pytest.mark.parametrize("fabric", [slow(woven("denim")), slow(woven("satin_8")), LOPSIDED, slow(woven("voile"))])
 def test_tables_answer_footprints_of_rays(fabric, walls):
     """Round, elliptic and rotated ones, views to 80 degrees, the light of every third query behind the cloth."""

@@ -33,6 +33,7 @@ def test_more_clusters_err_less(denim):
     )
 
 
+@pytest.mark.slow
 def test_narrow_footprints_converge_with_the_texels_of_the_finest_level(monkeypatch, denim):
     """A footprint narrower than those of the table is answered wider: order 1 at least, until clusters err more."""
     queries, truth = asked((0.1, 0.4))

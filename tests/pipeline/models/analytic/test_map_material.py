@@ -49,7 +49,7 @@ def test_highlights_have_the_energy_of_the_truth(name):
 
 def test_an_even_sky_is_not_made_brighter_and_the_size_of_maps_is_checked():
     cloth, (method,) = load_fabric("denim"), load_methods(MapMaterialOptions(size=128))
-    for angle in (0.0, 0.8, 1.4):
+    for angle in (0.0, 1.4):
         answers = under_an_even_sky(method, cloth, [np.sin(angle), 0.0, np.cos(angle)])
         assert answers @ [0.3, 0.3, 1.0, 1.0] < 1.0
     wide = ["".join("#."[(3 * x + 5 * y) % 32 < 16] for x in range(32)) for y in range(32)]
