@@ -20,7 +20,7 @@ MODELS: Final[dict[str, int]] = {
     "point_sampled": 5,
     "prefiltered": 2,
     "selvage": 9,
-    "soft_nodes": 8,
+    "soft_nodes": 9,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 

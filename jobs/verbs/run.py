@@ -43,7 +43,7 @@ def _divisible(stage: Stage) -> Callable[..., None]:
 
     def verb(recipe: RecipeName, *, part: Share = "", add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
         if part:
-            work_part(recipe, stage, Part.read(part), out, on, add)
+            _work_part(recipe, stage, Part.read(part), out, on, add)
         else:
             work(recipe, [stage], out, on, add)
 
@@ -88,7 +88,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
     _refuse_failed(recipe_name, summary, ledger, add)
 
 
-def work_part(recipe_name: str, stage: Stage, part: Part, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
+def _work_part(recipe_name: str, stage: Stage, part: Part, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
     """Run a part of the unfinished tasks of a stage in this process and print a summary; arguments as for `work`.
 
     BadInput if the recipe or the folder cannot be used, or workers are chosen; WorkFailed if any task failed, if what

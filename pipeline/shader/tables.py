@@ -6,7 +6,8 @@
                tangent along; across; mean and sharpness of horizons, two azimuths a row; the horizons of the other
                side, if known; falls over curved cloth, if known, four azimuths a row; areas that a viewer sees, four
                azimuths a row, angle by angle
-    grid       uint8: horizons of the pieces, 255 straight above; those of the other side; falls; the same of the back
+    grid       uint8: horizons of the pieces, 255 straight above; those of the other side; falls; of all nodes the share
+               of the area that is a wall where a float ends, 255 all of it; the same of the back
 
 `layout.slang` holds the constants and a function that reads the scalars and places.
 """
@@ -199,6 +200,7 @@ def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
     """Return what the shader reads of one side."""
     rows = _node_rows(table)
     groups, cells = _groups(table)
+    grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
     behind, curvatures = int(len(table.behind_grid) > 0), len(table.grid_falls)
     least, greatest = map(float, table.shown)
     warp_height, weft_height = family_heights(table)
@@ -216,6 +218,8 @@ def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
         "falls_row": OTHER_ROW + behind * (AZIMUTHS // 2),
         "areas_row": rows.shape[1] - SEEN_ANGLES * FALL_ROWS,
         "rims": int(table.rims),
+        "node_count": table.evenly.size,
+        "end_walls": len(grid) if len(table.end_walls) else 0,
         "end_tints": len(tints[0]),
         "pick_tints": len(tints[1]),
     }
@@ -248,8 +252,7 @@ def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
         "gauss_places": GAUSS_PLACES,
         "gauss_weights": GAUSS_WEIGHTS,
     }
-    grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
-    return _Side(integers, numbers, of_integers, of_numbers, rows, grid)
+    return _Side(integers, numbers, of_integers, of_numbers, rows, np.append(grid, table.end_walls.ravel()))
 
 
 def _refuse_large_tables(known: Sequence[_Side]) -> None:

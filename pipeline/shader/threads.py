@@ -158,7 +158,7 @@ def by_copy(table: SoftNodeTable) -> SoftNodeTable:
         return np.ascontiguousarray(kept.reshape(*kept.shape[:-2], kept.shape[-2] // per_block, BLOCK_NODES))
 
     nodes = np.ascontiguousarray(of_nodes(table.nodes.transpose(1, 0, 2)).transpose(1, 0, 2))
-    names = ("evenly", "mean", "sharpness", "behind_mean", "behind_sharpness", "falls", "areas")
+    names = ("evenly", "mean", "sharpness", "behind_mean", "behind_sharpness", "falls", "areas", "end_walls")
     columns: dict[str, Any] = {name: of_nodes(getattr(table, name)) for name in names}
     columns |= {name: getattr(table, name)[of_pieces] for name in ("pieces", "bounds", "floats", "crowns")}
     return table._replace(

@@ -33,7 +33,7 @@ from weaves.fabric import Fabric
 
 
 @runtime_checkable
-class KnowsRims(Protocol):
+class _KnowsRims(Protocol):
     """A method that knows which share of view rays leaves a curved cloth again."""
 
     def coverage(self, fabric: Fabric, looks: Queries) -> Float32:
@@ -86,7 +86,7 @@ def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
     """Return a method's pictures."""
     queries = edge_queries(options, fabric.weave.repeat)
     method.prepare(fabric)
-    if isinstance(method, KnowsRims):
+    if isinstance(method, _KnowsRims):
         covered = method.coverage(fabric, queries)
         return _edge(fabric, queries, covered, method.predict(fabric, queries, options.seed), options)
     front = np.flatnonzero(queries.wi[:, 2] > 0)

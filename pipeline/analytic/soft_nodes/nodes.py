@@ -12,7 +12,6 @@ different pieces there are, the coarser they are, so that a table stays near a m
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -31,19 +30,16 @@ from pipeline.analytic.soft_nodes.groups import (
     gather,
     piece_rows,
 )
-from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES, rays_left, seen_areas
+from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES, heights, rays_left, seen_areas
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import ClothSide, cloth_side
 from pipeline.truth.geometry.heightfield import (
-    BEND,
     GAP,
     HALF_LENGTH,
     TOP,
     WARP,
     WEFT,
     HeightField,
-    height_beneath,
-    torus_height,
 )  # fmt: skip
 from pipeline.truth.geometry.horizon import horizon_sines, horizons
 from pipeline.truth.geometry.pieces import CellPiece, cell_pieces, longest_period, orbits
@@ -66,6 +62,7 @@ EVEN: Final = 0.42
 """Of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %."""
 
 _SHARPEST = 0.02  # least spread of a horizon
+_LEAST_AREA = 1e-9  # of a node's box, of which walls are a share
 
 # Columns of `SoftNodeTable.groups`.
 START, LINES, GROUP_FAMILY = range(3)
@@ -140,6 +137,9 @@ class SoftNodeTable(NamedTuple):
     """Least and greatest of these heights, (2,)."""
     areas: Float32
     """Area that a viewer sees of each node's box (seen_areas), (AZIMUTHS, SEEN_ANGLES, B, BLOCK_NODES)."""
+    end_walls: npt.NDArray[np.uint8]
+    """Share of that area which is a wall where a float ends, of LEVELS; of no azimuths without light from behind or
+    without rims, uint8 (AZIMUTHS, …)."""
     view_lines: float
     """Deviation below which a footprint places its nodes on lines."""
     spacing: float
@@ -204,7 +204,9 @@ def tabulate(
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    rays = _ray_columns(model, located, grid, groups, rules, first_nodes, evenly, starts[-2] * BLOCK_NODES, rims)
+    rays = _ray_columns(
+        model, located, grid, groups, rules, first_nodes, evenly, starts[-2] * BLOCK_NODES, rims, behind
+    )
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
@@ -253,24 +255,19 @@ def _horizon_grids(
 
 
 def _ray_columns(
-    model: ClothSide,
-    located: _Located,
-    grid: npt.NDArray[np.uint8],
-    groups: list[PieceGroup],
-    rules: list[tuple[Rule, Rule]],
-    first_nodes: list[int],
-    evenly: Float64,
-    gaps: int,
-    rims: bool,
-) -> dict[str, Any]:
+    model: ClothSide, located: _Located, grid: npt.NDArray[np.uint8], groups: list[PieceGroup],
+    rules: list[tuple[Rule, Rule]], first_nodes: list[int], evenly: Float64, gaps: int, rims: bool, behind: bool,
+) -> dict[str, Any]:  # fmt: skip
     """Return the columns of `SoftNodeTable` by which view rays meet heights."""
     stop = len(evenly)
     front, spots = model.front, _spots(model.front, groups, rules, first_nodes, stop)
     shown = spots[:, 3][spots[:, 2] > 0.0]
-    areas = np.zeros((AZIMUTHS, SEEN_ANGLES, stop))
+    areas, ends = np.zeros((2, AZIMUTHS, SEEN_ANGLES, stop))
     of_groups = seen_areas(front, located.samples, grid, list(zip(groups, rules, strict=True)), rims)
     for group, (across, _), first, own in zip(groups, rules, first_nodes, of_groups, strict=True):
-        areas[..., _node_indices(group, across, first)] = own
+        indices = _node_indices(group, across, first)
+        areas[..., indices], ends[..., indices] = own
+    shares = np.rint(LEVELS * ends / np.maximum(areas, _LEAST_AREA))[: AZIMUTHS if behind and rims else 0]
     if rims:
         areas[..., :gaps] *= rays_left(areas * evenly, gaps)[..., None]
     return {
@@ -283,6 +280,7 @@ def _ray_columns(
         "spots": spots,
         "shown": np.array([shown.min(), shown.max()], np.float32),
         "areas": _in_blocks(areas),
+        "end_walls": _in_blocks(shares).astype(np.uint8),
     }
 
 
@@ -297,23 +295,13 @@ def _spots(
     """Return place in the cell, share of the cell and height of all nodes, (lines, 4, COLUMNS)."""
     spots = np.zeros((stop // COLUMNS, 4, COLUMNS), np.float32)
     for group, (across, along), first in zip(groups, rules, first_nodes, strict=True):
-        a, of_a = (np.pad(column, (0, COLUMNS - len(across.places))) for column in (across.places, across.weights))
-        for line, (place, weight) in enumerate(zip(along.places, along.weights, strict=True), first // COLUMNS):
-            b = np.full(COLUMNS, place)
-            x, y = (b, a) if group.piece.family == WEFT else (a, b)
-            spots[line] = x, y, of_a * weight, _heights(front, group.piece, a, place)
+        (end, pick), piece, own = group.cells[0], group.piece, spots[first // COLUMNS :][: group.lines]
+        own, extents = own[:, :, : len(across.places)], (across.places, along.places[:, None])
+        own[:, 0], own[:, 1] = extents if piece.family != WEFT else extents[::-1]
+        own[:, 2] = np.outer(along.weights, across.weights)
+        if piece.family != GAP:
+            own[:, 3] = heights(front, pick, end, piece.family, piece.side, across.places, along.places)
     return spots
-
-
-def _heights(front: HeightField, piece: CellPiece, across: Float64, place: float) -> Float64:
-    """Return the heights of a piece at places across it."""
-    if piece.family == GAP:
-        return np.zeros(COLUMNS)
-    yarn = front.yarn[piece.family]
-    bend = 1.0 / piece.curve if piece.curve else 0.0
-    own = np.array([piece.offset, bend, bend * math.sin(yarn[BEND]), bend * math.cos(yarn[BEND])])
-    height = torus_height if piece.side == TOP else height_beneath
-    return np.array([height(yarn, own, float(a) - 0.5, place - 0.5 + piece.offset)[0] for a in across])
 
 
 def _in_blocks(values: Float64) -> Float32:

@@ -76,8 +76,9 @@ class Scratch(NamedTuple):
     """Where the viewer sees the fixed nodes, in x and in y, (lines, 2, COLUMNS)."""
     areas: Float32
     freed: Float32
-    """Area seen of the boxes of the fixed nodes, and by how much more of them is seen over curved cloth,
-    (B, BLOCK_NODES)."""
+    walls: Float32
+    """Area seen of the boxes of the fixed nodes, by how much more of them is seen over curved cloth, and how much of
+    the area are walls where floats end, of LEVELS, (B, BLOCK_NODES)."""
 
 
 @allocating_kernel
@@ -98,6 +99,7 @@ def scratch_for(table: SoftNodeTable) -> Scratch:
         np.empty((kinds, DRAFT_ROWS, MOST_ON_LINES), np.float32),
         np.empty((kinds, MOST_ON_LINES), np.uint32),
         np.empty((len(table.spots), 2, COLUMNS), np.float32),
+        np.zeros((fixed, BLOCK_NODES), np.float32),
         np.zeros((fixed, BLOCK_NODES), np.float32),
         np.zeros((fixed, BLOCK_NODES), np.float32),
     )

@@ -64,7 +64,7 @@ def seen_areas(
     groups: list[tuple[PieceGroup, tuple[Rule, Rule]]],
     rims: bool,
 ) -> Iterator[Float64]:
-    """Yield the areas of each group's nodes, (azimuths, angles, nodes).
+    """Yield the areas of each group's nodes, and of the walls where floats end in them, (2, azimuths, angles, nodes).
 
     `samples` are the pieces of all grids, each with its pick and end, and `grid` their horizons, (grids, AZIMUTHS,
     cells along y, cells along x); `groups` come with their rules, and their `blocks` are numbers of grids. Walls count
@@ -78,7 +78,7 @@ def seen_areas(
         of_along = overlap(along.borders, grid_edges(*piece.along, size, 0.0))
         blocks, counts = np.unique(group.blocks, return_counts=True)
         mean = sum(count * of_grids[block] for block, count in zip(blocks, counts, strict=True)) / counts.sum()
-        yield (of_along @ mean @ of_across.T).reshape(SEEN_ANGLES, AZIMUTHS, -1).transpose(1, 0, 2)
+        yield (of_along @ mean @ of_across.T).reshape(2, SEEN_ANGLES, AZIMUTHS, -1).swapaxes(1, 2)
 
 
 def rays_left(shares: Float64, gaps: int) -> Float64:
@@ -94,15 +94,15 @@ def rays_left(shares: Float64, gaps: int) -> Float64:
 def _areas_of(
     front: HeightField, sample: tuple[int, int, CellPiece], grid: npt.NDArray[np.uint8], towards: Float64, rims: bool
 ) -> Float64:
-    """Return the areas of the cells of a grid, (angles, azimuths, cells along the yarn, cells across)."""
+    """Return areas of a grid's cells and of the walls where its float ends, (2, angles, azimuths, along, across)."""
     pick, end, piece = sample
     size = grid.shape[-1]
     across, along = grid_edges(*piece.across, size, piece.radius), grid_edges(*piece.along, size, 0.0)
-    heights = np.zeros((size + 1, size + 1))
+    height = np.zeros((size + 1, size + 1))
     if piece.family != GAP:
-        heights = _heights(front, pick, end, piece.family, piece.side, across, along)
-    by_across = 0.5 * (np.diff(heights[1:], axis=1) + np.diff(heights[:-1], axis=1)) / np.diff(across)
-    by_along = 0.5 * (np.diff(heights[:, 1:], axis=0) + np.diff(heights[:, :-1], axis=0)) / np.diff(along)[:, None]
+        height = heights(front, pick, end, piece.family, piece.side, across, along)
+    by_across = 0.5 * (np.diff(height[1:], axis=1) + np.diff(height[:-1], axis=1)) / np.diff(across)
+    by_along = 0.5 * (np.diff(height[:, 1:], axis=0) + np.diff(height[:, :-1], axis=0)) / np.diff(along)[:, None]
     sines = grid / 255.0
     # x runs along a weft.
     o_across, o_along = (towards[..., 1], towards[..., 0]) if piece.family not in (WARP, GAP) else (
@@ -113,16 +113,17 @@ def _areas_of(
     o_across, o_along, rise = (part[..., None, None] for part in (o_across, o_along, towards[..., 2]))
     area = np.maximum(rise - o_across * by_across - o_along * by_along, 0.0)
     area *= np.clip(0.5 + (rise - sines) / _RAMP, 0.0, 1.0)
+    ends = np.zeros_like(area)
     if rims and piece.family != GAP:
-        _add_walls(front, sample, heights, across, along, area, towards)
-    return area
+        _add_walls(front, sample, height, across, along, area, ends, towards)
+    return np.stack([area, ends])
 
 
 @allocating_kernel
-def _heights(
+def heights(
     front: HeightField, pick: int, end: int, family: int, side: int, across: Float64, along: Float64
 ) -> Float64:  # fmt: skip
-    """Return heights of a piece, (along, across)."""
+    """Return heights of a piece at places of its cell, (along, across)."""
     height, yarn, own = np.zeros((len(along), len(across))), front.yarn[family], front.floats[pick, end, side]
     for j in range(len(along)):
         for i in range(len(across)):
@@ -133,15 +134,10 @@ def _heights(
 
 
 def _add_walls(
-    front: HeightField,
-    sample: tuple[int, int, CellPiece],
-    heights: Float64,
-    across: Float64,
-    along: Float64,
-    area: Float64,
-    towards: Float64,
-) -> None:
-    """Add the walls below a piece's borders to the areas of the cells there."""
+    front: HeightField, sample: tuple[int, int, CellPiece], height: Float64, across: Float64, along: Float64,
+    area: Float64, ends: Float64, towards: Float64,
+) -> None:  # fmt: skip
+    """Add the walls below a piece's borders to the areas of the cells there; where its float ends, to `ends` too."""
     pick, end, piece = sample
     size, warp = len(across) - 1, piece.family == WARP
     cells = np.diff(along)[:, None] * np.diff(across)
@@ -155,20 +151,21 @@ def _add_walls(
         near = np.clip(near.astype(np.int64), 0, _WALL_PLACES - 1)
         for index, sign in ((0, -1.0), (size, 1.0)):
             border = middles[index]
-            rim = np.interp(places, edges, heights[:, index] if runs_along else heights[index])
+            rim = np.interp(places, edges, height[:, index] if runs_along else height[index])
             # Whether the border lies along y.
             upright = runs_along == warp
             x, y = (np.full(_WALL_PLACES, border), places) if upright else (places, np.full(_WALL_PLACES, border))
             dx, dy = (sign, 0.0) if upright else (0.0, sign)
             facing = np.maximum(towards[..., 0] * dx + towards[..., 1] * dy, 0.0)
-            height, sines = _wall_horizons(front, end + x, pick + y, dx, dy, rim, azimuths)
+            drop, sines = _wall_horizons(front, end + x, pick + y, dx, dy, rim, azimuths)
             free = np.clip(0.5 + (towards[..., 2, None, None] - sines) / _RAMP, 0.0, 1.0).mean(axis=-1)
-            seen = facing[..., None] * (free * height)[..., near] * lengths
+            seen = facing[..., None] * (free * drop)[..., near] * lengths
             inside = index - 1 if index else 0
             if runs_along:
                 area[..., :, inside] += seen / cells[:, inside]
             else:
                 area[..., inside, :] += seen / cells[inside]
+                ends[..., inside, :] += seen / cells[inside]
 
 
 @allocating_kernel
@@ -208,9 +205,10 @@ def angle_of(oz: np.float32) -> tuple[int, np.float32]:
 
 @fast_kernel
 def write_areas(
-    table: Float32, low: int, high: int, turn: np.float32, step: int, part: np.float32, found: Float32
-) -> None:
-    """Write the areas of all nodes, (B, BLOCK_NODES), towards a direction between azimuths and angles."""
+    table: Float32 | npt.NDArray[np.uint8], low: int, high: int, turn: np.float32, step: int, part: np.float32,
+    found: Float32,
+) -> None:  # fmt: skip
+    """Write the areas or shares of all nodes, (B, BLOCK_NODES), towards a direction between azimuths and angles."""
     a, b, c, d = table[low, step], table[low, step + 1], table[high, step], table[high, step + 1]
     of_a, of_b = (_1 - turn) * (_1 - part), (_1 - turn) * part
     of_c, of_d = turn * (_1 - part), turn * part

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import above, azimuths_apart, ramp, seen_and_lit
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, LEVELS
 from pipeline.analytic.torus_frame import sigma, spread
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel
@@ -54,6 +54,7 @@ _SHORTEST = np.float32(1e-6)  # least squared length of a half vector
 _FLAKES = np.float32(0.25 / (4.0 * math.pi))  # four places a node; 1 / (4 pi) of the density
 _GAUSS = np.float32(1.0 / math.sqrt(3.0))
 _WHOLE = np.float32(1.001)  # a box that is seen, with the tail of its ramp
+_PER_LEVEL = np.float32(1.0 / LEVELS)
 _AWAY = np.float32(0.05)  # cosine to the viewer of a fixed node that faces away; a part of its box may not
 
 
@@ -220,26 +221,23 @@ def yarn_layer(yarn: Float32, thickness: np.float32) -> YarnLayer:
 
 @fast_kernel
 def shade_fixed(
-    nodes: Float32,
-    weight: Float32,
-    light: NodeHorizons,
-    areas: Float32,
-    freed: Float32,
-    d: YarnDirections,
-    yarn: Float32,
-    thickness: np.float32,
-    behind: Behind,
-) -> Six:
-    """Return the sums over fixed nodes of one family; `areas` and `freed` as in `Scratch`.
+    nodes: Float32, weight: Float32, light: NodeHorizons, areas: Float32, freed: Float32, walls: Float32 | None,
+    d: YarnDirections, yarn: Float32, thickness: np.float32,
+) -> Six:  # fmt: skip
+    """Return the sums over fixed nodes of one family; `areas`, `freed` and `walls` as in `Scratch`.
 
-    With the light behind, `light` has the horizons of the back.
+    There are `walls` with the light behind alone. `light` has the horizons of the back then, and the light reaches no
+    wall where a float ends: on one side is the edge of the crossing yarn, and the rim faces the other one.
     """
-    layer, rise = yarn_layer(yarn, thickness), d.iz if behind is None else -d.iz
+    layer, rise = yarn_layer(yarn, thickness), d.iz if walls is None else -d.iz
+    behind: Behind = None if walls is None else True
     hx, hy, hz = d.ix + d.ox, d.iy + d.oy, d.iz + d.oz
     total = (_0, _0, _0, _0, _0, _0)
     for b in range(len(weight)):
         for k in range(BLOCK_NODES):
             lit = ramp(above(rise, light.low[b, k], light.high[b, k], light.turn, light.sharpness[b, k]))
+            if walls is not None:
+                lit *= _1 - _PER_LEVEL * walls[b, k]
             at, along, across = _fixed_node(nodes, b, k, hx, hy, hz)
             seen = _seen_of(at, areas[b, k], freed[b, k], d)
             total = added(total, shade_node(d, at, along, across, seen, lit, weight[b, k], layer, behind, _AWAY))

@@ -167,6 +167,8 @@ def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: F
     step, part = angle_of(look.oz)
     write_areas(table.areas, look.low_o, look.high_o, look.turn_o, step, part, scratch.areas)
     scratch.freed[:] = _0
+    if look.iz < _0 and len(table.end_walls) > 0:
+        write_areas(table.end_walls, look.low_o, look.high_o, look.turn_o, step, part, scratch.walls)
     if look.bend_o > _0:
         low_o, high_o, turn_o = look.low_o, look.high_o, look.turn_o
         bend_rows(mean, table.falls, low_o, high_o, turn_o, bend_of(look.bend_o), scratch.curved[1])
@@ -186,9 +188,9 @@ def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: F
         areas, freed = scratch.areas[a:b], scratch.freed[a:b]
         light = NodeHorizons(mean[low_i, a:b], mean[high_i, a:b], sharp[near_i, a:b], look.turn_i)
         if look.iz < _0:
-            sums = shade_fixed(nodes, own, light, areas, freed, d, yarn, thickness, True)
+            sums = shade_fixed(nodes, own, light, areas, freed, scratch.walls[a:b], d, yarn, thickness)
         else:
-            sums = shade_fixed(nodes, own, light, areas, freed, d, yarn, thickness, None)
+            sums = shade_fixed(nodes, own, light, areas, freed, None, d, yarn, thickness)
         write_sums(sums, result[kind])
     a, b = table.starts[kinds], table.starts[kinds + 1]
     return shares_of(shares[a:b], scratch.areas[a:b]) if b > a else _0
