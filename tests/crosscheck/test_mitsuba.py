@@ -162,8 +162,7 @@ def _estimated(fabric, wi, wo):
 
 
 @pytest.mark.parametrize(
-    ("name", "pair"),
-    [(name, pair) if (name, pair) in FAST else slow(name, pair) for name in FABRICS for pair in PAIRS],
+    ("name", "pair"), [(name, pair) if (name, pair) in FAST else slow(name, pair) for name in FABRICS for pair in PAIRS]
 )
 def test_diffuse_components_are_those_of_a_rendering(name, pair):
     """Rationale: geometry, shadows, masks and normaliser, against code that shares none of it but the heights.

@@ -61,10 +61,7 @@ def _mesh(fabric):
     warp_over, vertices, triangles, count = fabric.weave.warp_over, [], [], 0
     picks, ends = warp_over.shape
     turn = np.arange(AROUND) * 2.0 * math.pi / AROUND
-    for yarn, own, across, along in (
-        (fabric.warp, warp_over.T, ends, picks),
-        (fabric.weft, ~warp_over, picks, ends),
-    ):
+    for yarn, own, across, along in ((fabric.warp, warp_over.T, ends, picks), (fabric.weft, ~warp_over, picks, ends)):
         for column in range(-REACH, across + REACH):
             over = own[column % across]
             s, z, slope = _line(

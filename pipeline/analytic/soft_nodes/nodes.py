@@ -36,6 +36,7 @@ from pipeline.truth.cloth import ClothSide, cloth_side
 from pipeline.truth.geometry.heightfield import (
     GAP,
     HALF_LENGTH,
+    RADIUS,
     TOP,
     WARP,
     WEFT,
@@ -61,7 +62,7 @@ _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 EVEN: Final = 0.42
 """Of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %."""
 
-_SHARPEST = 0.02  # least spread of a horizon
+_SHARPEST, _FLATTEST = 0.02, 0.2  # least spread of a horizon, least sharpness of a ramp
 _LEAST_AREA = 1e-9  # of a node's box, of which walls are a share
 
 # Columns of `SoftNodeTable.groups`.
@@ -118,8 +119,8 @@ class SoftNodeTable(NamedTuple):
     behind_mean: Float32
     behind_sharpness: Float32
     behind_grid: npt.NDArray[np.uint8]
-    """The same of the back of the cloth at the same places, its tangent planes included: above them the back sees light
-    from behind. Of no nodes and no grids if the table was built without."""
+    """The same of the back at the same places, its tangent planes included: above them it sees light from behind. The
+    middles are those of `_ramps`. Of no nodes and no grids if the table was built without."""
     falls: Float32
     grid_falls: npt.NDArray[np.uint8]
     """Falls of `mean` and `grid` over curved cloth, as shares (curved_horizons); of no curvatures if the table was
@@ -138,8 +139,8 @@ class SoftNodeTable(NamedTuple):
     areas: Float32
     """Area that a viewer sees of each node's box (seen_areas), (AZIMUTHS, SEEN_ANGLES, B, BLOCK_NODES)."""
     end_walls: npt.NDArray[np.uint8]
-    """Share of that area which is a wall where a float ends, of LEVELS; of no azimuths without light from behind or
-    without rims, uint8 (AZIMUTHS, …)."""
+    """Share of that area which is a wall that no light from behind reaches, of LEVELS; of no azimuths without light
+    from behind or without rims, uint8 (AZIMUTHS, …)."""
     view_lines: float
     """Deviation below which a footprint places its nodes on lines."""
     spacing: float
@@ -176,8 +177,7 @@ def tabulate(
     rules = [_rules(group) for group in groups]
     starts, first_nodes, stop = [], [], 0
     kinds = (ends, picks) if by_thread else (1, 1)
-    of_kinds = [(WARP, end) for end in range(kinds[0])] + [(WEFT, pick) for pick in range(kinds[1])] + [(GAP, 0)]
-    for kind in of_kinds:
+    for kind in (*((WARP, end) for end in range(kinds[0])), *((WEFT, pick) for pick in range(kinds[1])), (GAP, 0)):
         starts.append(stop // BLOCK_NODES)
         for group in groups:
             if (group.piece.family, group.thread) == kind:
@@ -198,7 +198,7 @@ def tabulate(
             of_nodes[:, indices], _ = _soft_horizons(group, across, along, of_grid)
         if behind:
             behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, across, along, behind_grid)
-    rows = zip(groups, first_nodes, strict=True)
+    behind_mean, behind_sharpness = _ramps(behind_mean, behind_variance)
     cell_groups: list[list[int]] = [[] for _ in range(ends * picks)]
     for index, group in enumerate(groups):
         for end, pick in group.cells:
@@ -219,13 +219,13 @@ def tabulate(
         evenly=_in_blocks(evenly),
         mean=_in_blocks(mean),
         sharpness=_in_blocks(_sharpness(variance)),
-        groups=np.array([(first, group.lines, group.piece.family) for group, first in rows], np.uint32),
+        groups=np.array([(k, g.lines, g.piece.family) for g, k in zip(groups, first_nodes, strict=True)], np.uint32),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
         cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
         **_piece_columns(located),
         grid=grid,
         behind_mean=_in_blocks(behind_mean),
-        behind_sharpness=_in_blocks(_sharpness(behind_variance)),
+        behind_sharpness=_in_blocks(behind_sharpness),
         behind_grid=behind_grid,
         falls=_in_blocks(falls),
         grid_falls=grid_falls,
@@ -267,7 +267,9 @@ def _ray_columns(
     for group, (across, _), first, own in zip(groups, rules, first_nodes, of_groups, strict=True):
         indices = _node_indices(group, across, first)
         areas[..., indices], ends[..., indices] = own
-    shares = np.rint(LEVELS * ends / np.maximum(areas, _LEAST_AREA))[: AZIMUTHS if behind and rims else 0]
+    # Of walls beside a gap some are lit.
+    dark = LEVELS if front.yarn[:, RADIUS].min() >= 0.5 else 0.5 * LEVELS
+    shares = np.rint(dark * ends / np.maximum(areas, _LEAST_AREA))[: AZIMUTHS if behind and rims else 0]
     if rims:
         areas[..., :gaps] *= rays_left(areas * evenly, gaps)[..., None]
     return {
@@ -356,6 +358,23 @@ def _sharpness(variance: Float64) -> Float64:
     return np.asarray(1.0 / np.sqrt(12.0 * (variance + _SHARPEST**2)))
 
 
+def _ramps(mean: Float64, variance: Float64) -> tuple[Float64, Float64]:
+    """Return middle and sharpness of ramps clip(1/2 + (z - middle) sharpness, 0, 1), z from 0 to 1, of horizons s.
+
+    Many horizons of the back are 1. Ramps of their mean and variance would end beyond z = 1, and light too much. These
+    have the integrals that V(z) = P(s < z) has: of V 1 - E[s], of z V (1 - E[s^2]) / 2.
+    """
+    # The ramp of 1 - s is the mirror image: only the nearer end of 0 to 1 is to be looked at.
+    near, square = np.clip(np.minimum(mean, 1.0 - mean), _LEAST_AREA, None), mean**2 + variance
+    # A ramp that leaves that end alone begins `reach` before it; one that leaves both is a line.
+    reach, slope = 1.5 * (near + variance / near), np.maximum(6.0 * (mean - square), _FLATTEST)
+    inside, line = np.sqrt(3.0 * variance) <= near, reach > 1.0
+    sharpness = np.where(inside, _sharpness(variance), np.where(line, slope, 2.0 * near / reach**2))
+    middle = np.where(inside, near, reach - 0.5 / sharpness)
+    middle = np.where(mean > 0.5, 1.0 - middle, middle)
+    return np.where(line & ~inside, (square - 0.5) / slope + 2.0 / 3.0, middle), sharpness
+
+
 def _rules(group: PieceGroup) -> tuple[Rule, Rule]:
     """Return the nodes of a group across and along."""
     piece = group.piece
@@ -369,12 +388,10 @@ def _bounds(piece: CellPiece) -> tuple[float, ...]:
 
 
 def _float_lengths(front: HeightField) -> Float32:
-    found = []
-    for family in (WARP, WEFT):
-        # A float that never ends counts as long as the repeat.
-        shown = np.minimum(front.floats[front.top == family, TOP, HALF_LENGTH], 0.5 * front.top.shape[family])
-        found.append(2.0 * float(shown.mean()) if shown.size else 1.0)
-    return np.array(found, np.float32)
+    # A float that never ends counts as long as the repeat.
+    longest = ((family, 0.5 * front.top.shape[family]) for family in (WARP, WEFT))
+    shown = [np.minimum(front.floats[front.top == family, TOP, HALF_LENGTH], most) for family, most in longest]
+    return np.array([2.0 * own.mean() if own.size else 1.0 for own in shown], np.float32)
 
 
 def _grid_places(samples: list[tuple[int, int, CellPiece]], size: int) -> tuple[Float64, Float64, Mask]:

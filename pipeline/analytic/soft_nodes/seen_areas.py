@@ -2,7 +2,8 @@
 
 A box has the area a = integral of A(wo) V over it, as a share of its own: 1 from above, n_s.wo / n_z where nothing
 hides it. With rims it has that of the wall below its border too. The areas of all boxes and gaps then sum to wo.n_s,
-because every ray meets something.
+because every ray meets something. Light from behind reaches no wall where a float ends: on the float's side the back
+shows the upright edge of the crossing yarn there, and the rim faces the other side less than its box does.
 
 Cells of the grids of horizons are summed. Their heights differ by exactly what a ray sees of their slope,
 n_s.wo / n_z = wo_z - wo.grad h, so that steep borders of yarns lose nothing.
@@ -28,6 +29,7 @@ from pipeline.truth.geometry.heightfield import (
     TOP,
     UNDER,
     WARP,
+    WEFT,
     HeightField,
     height_beneath,
     local_position,
@@ -103,14 +105,10 @@ def _areas_of(
         height = heights(front, pick, end, piece.family, piece.side, across, along)
     by_across = 0.5 * (np.diff(height[1:], axis=1) + np.diff(height[:-1], axis=1)) / np.diff(across)
     by_along = 0.5 * (np.diff(height[:, 1:], axis=0) + np.diff(height[:, :-1], axis=0)) / np.diff(along)[:, None]
-    sines = grid / 255.0
     # x runs along a weft.
-    o_across, o_along = (towards[..., 1], towards[..., 0]) if piece.family not in (WARP, GAP) else (
-        towards[..., 0], towards[..., 1]
-    )  # fmt: skip
-    if piece.family not in (WARP, GAP):
-        sines = sines.transpose(0, 2, 1)
-    o_across, o_along, rise = (part[..., None, None] for part in (o_across, o_along, towards[..., 2]))
+    weft = piece.family == WEFT
+    sines = (grid.transpose(0, 2, 1) if weft else grid) / 255.0
+    o_across, o_along, rise = (towards[..., axis, None, None] for axis in ((1, 0, 2) if weft else (0, 1, 2)))
     area = np.maximum(rise - o_across * by_across - o_along * by_along, 0.0)
     area *= np.clip(0.5 + (rise - sines) / _RAMP, 0.0, 1.0)
     ends = np.zeros_like(area)
@@ -161,11 +159,9 @@ def _add_walls(
             free = np.clip(0.5 + (towards[..., 2, None, None] - sines) / _RAMP, 0.0, 1.0).mean(axis=-1)
             seen = facing[..., None] * (free * drop)[..., near] * lengths
             inside = index - 1 if index else 0
-            if runs_along:
-                area[..., :, inside] += seen / cells[:, inside]
-            else:
-                area[..., inside, :] += seen / cells[inside]
-                ends[..., inside, :] += seen / cells[inside]
+            row = (..., slice(None), inside) if runs_along else (..., inside, slice(None))
+            for walls in (area,) if runs_along else (area, ends):
+                walls[row] += seen / cells[row]
 
 
 @allocating_kernel

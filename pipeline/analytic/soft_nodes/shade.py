@@ -226,8 +226,7 @@ def shade_fixed(
 ) -> Six:  # fmt: skip
     """Return the sums over fixed nodes of one family; `areas`, `freed` and `walls` as in `Scratch`.
 
-    There are `walls` with the light behind alone. `light` has the horizons of the back then, and the light reaches no
-    wall where a float ends: on one side is the edge of the crossing yarn, and the rim faces the other one.
+    There are `walls` with the light behind alone; `light` has the horizons of the back then, and the walls are dark.
     """
     layer, rise = yarn_layer(yarn, thickness), d.iz if walls is None else -d.iz
     behind: Behind = None if walls is None else True

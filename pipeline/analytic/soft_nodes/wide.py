@@ -12,14 +12,7 @@ from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import LINES, START, SoftNodeTable
 from pipeline.analytic.soft_nodes.scratch import Scratch, SoftQuery
 from pipeline.analytic.soft_nodes.seen_areas import angle_of, write_areas
-from pipeline.analytic.soft_nodes.shade import (
-    NodeHorizons,
-    directions,
-    shade_fixed,
-    shares_of,
-    write_freed,
-    write_sums,
-)
+from pipeline.analytic.soft_nodes.shade import NodeHorizons, directions, shade_fixed, shares_of, write_freed, write_sums
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel
 from pipeline.compiled.float32 import remaining

@@ -79,10 +79,7 @@ def test_bad_input_is_one_sentence(files, old, new, words):
 
 @pytest.mark.parametrize(
     "network",
-    [
-        'model = "neumip"\noffset = false',
-        *(f'model = "{name}"' for name in ("unified_btf", "btf_autoencoder")),
-    ],
+    ['model = "neumip"\noffset = false', *(f'model = "{name}"' for name in ("unified_btf", "btf_autoencoder"))],
 )
 def test_every_network_may_learn_view_rays(files, network):
     """Beside `woven`; and all that is planned, the truth at extremes too, is of these rays."""

@@ -7,7 +7,6 @@ import pytest
 from reports.images import draft, tiles
 from reports.images.exr import Exr
 from reports.images.tiles import EXPOSURE, displayed, encoded
-from weaves.colour import linear_rgb
 from weaves.draft import Draft, Matrix
 from weaves.fabric import load_fabric
 
@@ -82,10 +81,6 @@ def test_maps_repeat_with_the_weave(draw):
     assert picture.shape[:2] == (side, side) and (picture[:, : side - ends] == picture[:, ends:]).all()
     assert np.ptp(picture[..., :3]) > 50
     assert draw is tiles.height or picture[..., 2].min() >= 127, "normals point up in blue"
-
-
-def test_hex_colour_inverts_the_fabrics_own():
-    assert tiles.hex_colour(linear_rgb("#3b5bdb")) == "#3b5bdb"
 
 
 @pytest.mark.parametrize("tone", ["srgb", "reinhard"])

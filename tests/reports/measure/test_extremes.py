@@ -1,5 +1,4 @@
 import math
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,14 +9,14 @@ from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodesOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.models.registry import load_methods
-from pipeline.models.runtimes import RUNTIMES, runs
+from pipeline.models.runtimes import runs
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import LOWEST_VIEWER, faults
 from reports.measure.extremes import FAR, FOOTPRINTS, extremes, lustrous, measure_extremes
-from reports.options import EXTREME_PRECISIONS, RuntimeName
+from reports.options import EXTREME_PRECISIONS
 from tests.pipeline.models.stand_ins import SMALL, FakeMethod
 from weaves.fabric import load_fabric
 
@@ -110,10 +109,6 @@ def test_places_and_sizes_that_change_the_answer_are_seen():
     shrink = Scaled(spoil=lambda answers, queries: answers * np.where(queries.sigma > 1e4, 0.75, 1.0)[:, None])
     found = measured(shrink)
     assert found["", "extreme_far"].value == 0.0 and found["", "extreme_large"].value == pytest.approx(0.25, rel=0.02)
-
-
-def test_the_names_of_runtimes_are_those_of_the_models():
-    assert set(RUNTIMES) == set(get_args(RuntimeName))
 
 
 @pytest.mark.parametrize("cloth", [LINING, lustrous(TWILL)], ids=lambda fabric: fabric.name)

@@ -7,7 +7,7 @@ import jobs.verbs.gallery
 import reports.exports.gallery
 from reports.exports.gallery import FIBRES, Card, gallery_page
 from tests.browser import opened
-from weaves.fabric import load_fabric, preset_names
+from weaves.fabric import load_fabric
 
 
 def test_the_site_has_every_file_that_it_names(twillight, refused, monkeypatch, tmp_path):
@@ -37,10 +37,6 @@ def test_the_site_has_every_file_that_it_names(twillight, refused, monkeypatch, 
     assert "64" in (tmp_path / "own-maps" / "maps.json").read_text()
     shutil.copyfile("own.toml", "two.toml")
     assert "same name" in refused("gallery", "two.toml", "own.toml", "--out", "x")
-
-
-def test_every_fibre_is_of_presets():
-    assert {name for names in FIBRES.values() for name in names} <= set(preset_names())
 
 
 @pytest.mark.external
