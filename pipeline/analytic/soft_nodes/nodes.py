@@ -62,8 +62,9 @@ _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
 EVEN: Final = 0.42
 """Of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %."""
 
-_SHARPEST, _FLATTEST = 0.02, 0.2  # least spread of a horizon, least sharpness of a ramp
+_SHARPEST, _FLATTEST = 0.02, 0.5  # least spread of a horizon, least sharpness of a ramp
 _LEAST_AREA = 1e-9  # of a node's box, of which walls are a share
+_DARK_BESIDE_GAPS = 0.5  # share of walls that light from behind does not reach, if yarns leave gaps
 
 # Columns of `SoftNodeTable.groups`.
 START, LINES, GROUP_FAMILY = range(3)
@@ -165,8 +166,7 @@ def tabulate(
     """
     detail = DETAILS[level]
     model = cloth_side(fabric, TruthOptions())
-    front = model.front
-    picks, ends = front.top.shape
+    front, (picks, ends) = model.front, model.front.top.shape
 
     located = _locate(front)
     size = next((n for n in _GRIDS if len(located.samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
@@ -267,8 +267,7 @@ def _ray_columns(
     for group, (across, _), first, own in zip(groups, rules, first_nodes, of_groups, strict=True):
         indices = _node_indices(group, across, first)
         areas[..., indices], ends[..., indices] = own
-    # Of walls beside a gap some are lit.
-    dark = LEVELS if front.yarn[:, RADIUS].min() >= 0.5 else 0.5 * LEVELS
+    dark = LEVELS * (1.0 if front.yarn[:, RADIUS].min() >= 0.5 else _DARK_BESIDE_GAPS)
     shares = np.rint(dark * ends / np.maximum(areas, _LEAST_AREA))[: AZIMUTHS if behind and rims else 0]
     if rims:
         areas[..., :gaps] *= rays_left(areas * evenly, gaps)[..., None]
@@ -367,9 +366,10 @@ def _ramps(mean: Float64, variance: Float64) -> tuple[Float64, Float64]:
     # The ramp of 1 - s is the mirror image: only the nearer end of 0 to 1 is to be looked at.
     near, square = np.clip(np.minimum(mean, 1.0 - mean), _LEAST_AREA, None), mean**2 + variance
     # A ramp that leaves that end alone begins `reach` before it; one that leaves both is a line.
-    reach, slope = 1.5 * (near + variance / near), np.maximum(6.0 * (mean - square), _FLATTEST)
-    inside, line = np.sqrt(3.0 * variance) <= near, reach > 1.0
-    sharpness = np.where(inside, _sharpness(variance), np.where(line, slope, 2.0 * near / reach**2))
+    reach, inside = 1.5 * (near + variance / near), np.sqrt(3.0 * variance) <= near
+    line, slope = reach > 1.0, np.maximum(6.0 * (mean - square), _FLATTEST)
+    steep = np.minimum(2.0 * near / reach**2, _sharpness(np.zeros(1)))
+    sharpness = np.where(inside, _sharpness(variance), np.where(line, slope, steep))
     middle = np.where(inside, near, reach - 0.5 / sharpness)
     middle = np.where(mean > 0.5, 1.0 - middle, middle)
     return np.where(line & ~inside, (square - 0.5) / slope + 2.0 / 3.0, middle), sharpness
@@ -419,8 +419,6 @@ def _soft_horizons(
     of_across = overlap(across.borders, grid_edges(*piece.across, size, piece.radius))
     of_along = overlap(along.borders, grid_edges(*piece.along, size, 0.0))
     blocks, counts = np.unique(group.blocks, return_counts=True)
-    values = grid[blocks] / LEVELS
-    if piece.family == WEFT:
-        values = values.transpose(0, 1, 3, 2)
+    values = (grid[blocks].transpose(0, 1, 3, 2) if piece.family == WEFT else grid[blocks]) / LEVELS
     share = (counts / counts.sum())[:, None, None, None]
     return over_boxes((share * values).sum(axis=0), (share * values**2).sum(axis=0), of_along, of_across)

@@ -91,9 +91,8 @@ def test_a_part_is_refused_beside_a_run_that_is_none_or_without_locks(recipe, tm
 
 
 def test_libraries_of_a_part_are_loaded_for_one_thread():
-    """They read the environment when they are loaded, which the entry alone does not do."""
-    shown = "print('numpy' in sys.modules, main(), os.environ['OPENBLAS_NUM_THREADS'])"
-    code = f"import os, sys; from jobs.entry import main; {shown}"
+    shown = "'numpy' in sys.modules, main(), os.environ['OPENBLAS_NUM_THREADS']"  # libraries read it at their import
+    code = f"import os, sys; from jobs.entry import main; print({shown})"
     command = ["env", "OPENBLAS_NUM_THREADS=2", sys.executable, "-c", code, "train", "quick", "--part=0/1"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout == "False 2 1\n"

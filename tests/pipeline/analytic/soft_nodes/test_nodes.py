@@ -20,8 +20,7 @@ from weaves.fabric import load_fabric
 def test_tables_stay_small(fabric, most):
     """Areas that a viewer sees are a third to a half of them."""
     table = tabulate(fabric)
-    assert nbytes(table) < most
-    assert table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
+    assert nbytes(table) < most and table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
     assert table.evenly.size <= 256 + 128 + 3 * BLOCK_NODES
 
 
@@ -46,8 +45,7 @@ def test_ramps_of_the_back_have_the_light_of_its_horizons():
     """Mixtures of horizons, many of them 1: the integral of z V differs by less than .01, half of it for V = 1."""
     random, z = np.random.default_rng(3), np.linspace(0.0, 1.0, 2001)
     for share in random.uniform(0.0, 1.0, 60):
-        low, high = np.sort(random.random(2))
-        sines = np.where(random.random(2000) < share, 1.0, random.uniform(low, high, 2000))
+        sines = np.where(random.random(2000) < share, 1.0, random.uniform(*np.sort(random.random(2)), 2000))
         middle, sharpness = _ramps(sines.mean(keepdims=True), sines.var(keepdims=True))
         apart = np.clip(0.5 + (z - middle) * sharpness, 0.0, 1.0) - (sines[:, None] < z).mean(axis=0)
         assert abs((z * apart).mean()) < 0.01
