@@ -15,7 +15,7 @@ TRUTH: Final = 8
 TRAINING: Final = 4
 """The training loop and the files that it writes."""
 
-MODELS: Final[dict[str, int]] = {"curved": 2, "point_sampled": 5, "prefiltered": 2, "selvage": 9, "soft_nodes": 9}
+MODELS: Final[dict[str, int]] = {"curved": 2, "point_sampled": 5, "prefiltered": 2, "selvage": 10, "soft_nodes": 9}
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
 BOUND: Final = 2
