@@ -164,8 +164,7 @@ def tabulate(
     with `curved` cloth that is curved towards the viewer. `level` is one of DETAILS. With `rims` view rays that meet a
     wall see the rim above it.
     """
-    detail = DETAILS[level]
-    model = cloth_side(fabric, TruthOptions())
+    detail, model = DETAILS[level], cloth_side(fabric, TruthOptions())
     front, (picks, ends) = model.front, model.front.top.shape
 
     located = _locate(front)
@@ -364,15 +363,16 @@ def _ramps(mean: Float64, variance: Float64) -> tuple[Float64, Float64]:
     have the integrals that V(z) = P(s < z) has: of V 1 - E[s], of z V (1 - E[s^2]) / 2.
     """
     # The ramp of 1 - s is the mirror image: only the nearer end of 0 to 1 is to be looked at.
-    near, square = np.clip(np.minimum(mean, 1.0 - mean), _LEAST_AREA, None), mean**2 + variance
-    # A ramp that leaves that end alone begins `reach` before it; one that leaves both is a line.
+    near, lit = np.clip(np.minimum(mean, 1.0 - mean), _LEAST_AREA, None), 1.0 - mean**2 - variance
+    # A ramp that leaves that end alone begins `reach` before it; one that leaves both is a line, 0 up to `start`.
     reach, inside = 1.5 * (near + variance / near), np.sqrt(3.0 * variance) <= near
-    line, slope = reach > 1.0, np.maximum(6.0 * (mean - square), _FLATTEST)
+    line, slope = reach > 1.0, np.maximum(6.0 * (mean - 1.0 + lit), _FLATTEST)
     steep = np.minimum(2.0 * near / reach**2, _sharpness(np.zeros(1)))
     sharpness = np.where(inside, _sharpness(variance), np.where(line, slope, steep))
     middle = np.where(inside, near, reach - 0.5 / sharpness)
-    middle = np.where(mean > 0.5, 1.0 - middle, middle)
-    return np.where(line & ~inside, (square - 0.5) / slope + 2.0 / 3.0, middle), sharpness
+    start = 2.0 * np.cos((np.arccos(np.clip(1.5 * lit / slope - 1.0, -1.0, 0.0)) - 2.0 * np.pi) / 3.0)
+    of_line = np.where(1.5 * lit < slope, start, 2.0 / 3.0 - lit / slope) + 0.5 / slope
+    return np.where(line & ~inside, of_line, np.where(mean > 0.5, 1.0 - middle, middle)), sharpness
 
 
 def _rules(group: PieceGroup) -> tuple[Rule, Rule]:

@@ -42,7 +42,7 @@ def test_horizons_of_narrow_and_wide_footprints_agree():
 
 
 def test_ramps_of_the_back_have_the_light_of_its_horizons():
-    """Mixtures of horizons, many of them 1: the integral of z V differs by less than .01, half of it for V = 1."""
+    """Mixtures of horizons, many of them 1: the integral of z V differs by less than .01; for V = 1 it is .5."""
     random, z = np.random.default_rng(3), np.linspace(0.0, 1.0, 2001)
     for share in random.uniform(0.0, 1.0, 60):
         sines = np.where(random.random(2000) < share, 1.0, random.uniform(*np.sort(random.random(2)), 2000))
