@@ -7,7 +7,7 @@
                side, if known; falls over curved cloth, if known, four azimuths a row; areas that a viewer sees, four
                azimuths a row, angle by angle
     grid       uint8: horizons of the pieces, 255 straight above; those of the other side; falls; of all nodes the share
-               of the area that is a wall where a float ends, 255 all of it; the same of the back
+               of the area that light from behind does not reach, 255 all of it; the same of the back
 
 `layout.slang` holds the constants and a function that reads the scalars and places.
 """

@@ -64,7 +64,7 @@ EVEN: Final = 0.42
 
 _SHARPEST, _FLATTEST = 0.02, 0.5  # least spread of a horizon, least sharpness of a ramp
 _LEAST_AREA = 1e-9  # of a node's box, of which walls are a share
-_DARK_BESIDE_GAPS = 0.5  # share of walls that light from behind does not reach, if yarns leave gaps
+_DARK_BESIDE_GAPS = 0.5  # share of walls that light from behind does not reach, if yarns leave gaps (measured)
 
 # Columns of `SoftNodeTable.groups`.
 START, LINES, GROUP_FAMILY = range(3)

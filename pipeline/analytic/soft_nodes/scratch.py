@@ -77,8 +77,8 @@ class Scratch(NamedTuple):
     areas: Float32
     freed: Float32
     walls: Float32
-    """Area seen of the boxes of the fixed nodes, by how much more of them is seen over curved cloth, and how much of
-    the area are walls where floats end, of LEVELS, (B, BLOCK_NODES)."""
+    """Area seen of the boxes of the fixed nodes, by how much more of them is seen over curved cloth, and which share
+    of the area are walls that light from behind does not reach, of LEVELS, (B, BLOCK_NODES)."""
 
 
 @allocating_kernel

@@ -2,8 +2,8 @@
 
 A box has the area a = integral of A(wo) V over it, as a share of its own: 1 from above, n_s.wo / n_z where nothing
 hides it. With rims it has that of the wall below its border too. The areas of all boxes and gaps then sum to wo.n_s,
-because every ray meets something. Light from behind reaches no wall where a float ends: on the float's side the back
-shows the upright edge of the crossing yarn there, and the rim faces the other side less than its box does.
+because every ray meets something. Walls where floats end are counted apart too: sums over fixed nodes take them for
+dark with the light behind, which agrees with the truth (reports/LOG.md, "Rims lit from behind").
 
 Cells of the grids of horizons are summed. Their heights differ by exactly what a ray sees of their slope,
 n_s.wo / n_z = wo_z - wo.grad h, so that steep borders of yarns lose nothing.
