@@ -1,6 +1,6 @@
 """numba's compiler, made a function of the sources: what a kernel computes depends on no process and no order.
 
-Compiled code holds copies of what it calls, each optimised once more in its new place. numba 0.61 to 0.68 let four
+Compiled code holds copies of what it calls, all optimised together in their new place. numba 0.61 to 0.68 let four
 things that are no part of a function decide about its bits:
 
 - which copy of a callee runs: the linker takes the first that the process loaded (`_SelfContained`);
@@ -33,6 +33,9 @@ class _SelfContained(JITCodeLibrary):
 
     _loaded = False
 
+    def _optimize_final_module(self) -> None:
+        """Wait until Python calls it: to optimise every callee alone as well took a fifth of the time of compiling."""
+
     def _finalize_final_module(self) -> None:
         self._shared_module = self._for_callers()
         self._compiled_object, self._finalized = b"", True
@@ -41,6 +44,8 @@ class _SelfContained(JITCodeLibrary):
         self._ensure_finalized()  # type: ignore[no-untyped-call]
         if not self._loaded and any(function.name == name for function in _defined(self._shared_module)):
             self._loaded = True
+            if not self._compiled_object:
+                super()._optimize_final_module()  # type: ignore[no-untyped-call]
             for function in _defined(self._final_module, binding.Linkage.linkonce_odr):
                 function.linkage = binding.Linkage.internal
             super()._finalize_final_module()  # type: ignore[no-untyped-call]
@@ -57,7 +62,7 @@ class _SelfContained(JITCodeLibrary):
         return self
 
     def _for_callers(self) -> binding.ModuleRef:
-        """Return the optimised code before machine code is made of it, by way of bytes like all that is cached."""
+        """Return the code before it is optimised as a whole, by way of bytes like all that is cached."""
         shared = self._final_module.clone()
         for function in _defined(shared, binding.Linkage.external):
             function.linkage = binding.Linkage.linkonce_odr

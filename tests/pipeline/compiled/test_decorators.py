@@ -91,7 +91,7 @@ from weaves.fabric import load_fabric
 fabric = load_fabric("denim")
 queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
 asked = {
-    "node_table": lambda: np.hstack(estimate(fabric, queries, TruthOptions(estimator="node_table"), 1)[:2]),
+    "auto": lambda: np.hstack(estimate(fabric, queries, TruthOptions(), 1)[:2]),
     "soft_nodes": lambda: SoftNodes().predict(fabric, queries),
     "summed_area": lambda: answer(tabulate(fabric, 16), queries),
 }
@@ -276,7 +276,7 @@ def test_kernels_that_borrow_arrays_call_none_that_returns_them():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "order"),
-    [(SMALL, ("fast", "plain", "twice", "smooth", "shared")), (REAL, ("node_table", "soft_nodes", "summed_area"))],
+    [(SMALL, ("fast", "plain", "twice", "smooth", "shared")), (REAL, ("auto", "soft_nodes", "summed_area"))],
     ids=["small", "real"],
 )
 def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies, asked, order):
