@@ -84,7 +84,8 @@ class _Bars:
             self._print(_failure(event) if event.task else event.message)
         if event.task:
             self._update(event.task.stage, board)
-            self._row("all", start=True, total=1.0, completed=_share(board), left=_left(board))
+            share = sum(board.work.values()) / max(sum(board.all_work.values()), 1e-9)
+            self._row("all", start=True, total=1.0, completed=share, left=_left(board))
 
     def _update(self, stage: Stage, board: Board) -> None:
         whole = board.ended[stage] == board.planned[stage]  # rounding must not leave a bar short of its end
@@ -108,11 +109,6 @@ class _Bars:
 
     def _print(self, sentence: str) -> None:
         self._bars.console.print(sentence, style="yellow", soft_wrap=True, highlight=False, markup=False)
-
-
-def _share(board: Board) -> float:
-    """Return the share of the work that is done."""
-    return sum(board.work.values()) / max(sum(board.all_work.values()), 1e-9)
 
 
 class _Lines:

@@ -129,18 +129,6 @@ def announced(ready: Callable[[str], None]) -> Iterator[None]:
         _listeners.remove(ready)
 
 
-@contextmanager
-def _no_garbage_collected() -> Iterator[None]:
-    """Switch the collector of cycles off: it took an eighth of the time of compiling, whose objects are few."""
-    on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if on:
-            gc.enable()
-
-
 def _decorator(allocates: bool = False, **flags: Any) -> Callable[[_Function], _Function]:
     """Return a decorator with these flags; each kernel is compiled or read by one process at a time.
 
@@ -169,19 +157,23 @@ def _decorator(allocates: bool = False, **flags: Any) -> Callable[[_Function], _
 
         def compile_alone(signature: Any) -> Any:
             # This process's compiler first, then the kernel's file; a process that dies releases both.
-            with global_compiler_lock, _no_garbage_collected():
+            with global_compiler_lock:
                 folder.mkdir(parents=True, exist_ok=True)
                 cache.for_kernels = dispatcher.targetoptions["no_cpython_wrapper"] = bool(_compiling)
                 if not _compiling and signature in for_kernels:
                     for_kernels.remove(signature)
                     del dispatcher.overloads[signature]
                 _compiling.append(name)
+                collecting = gc.isenabled()
+                gc.disable()  # the collector of cycles took an eighth of the time of compiling
                 try:
                     # A lock made before a fork would refuse to work in the child.
                     with FileLock(folder / f"{name}.lock", thread_local=False):
                         result = compile_or_load(signature)
                 finally:
                     _compiling.pop()
+                    if collecting:
+                        gc.enable()
             returned = list(dispatcher.overloads.values())[-1].signature.return_type
             if not allocates and _holds_array(returned):
                 raise TypeError(f"{name} returns {returned}: it must be an allocating_kernel")

@@ -56,7 +56,11 @@ def fit_bsdf(
     thickness, steps = max(LEAST_THICKNESS, least), 2 * len(drafts) + 4
     geometries, optics, scores = {}, {}, {}
     for draft in drafts:
-        geometries[draft] = _closed(draft) if closed else fit_geometry(scattering.basis, straight, draft)
+        if closed:
+            fabric = cloth(draft, (1.0, 1.0), (_USUAL_BEND,) * 2, (1.0, 1.0))
+            geometries[draft] = Geometry(fabric, 0.0, np.empty((0, 6)), np.empty(0))
+        else:
+            geometries[draft] = fit_geometry(scattering.basis, straight, draft)
         fabric = geometries[draft].fabric.model_copy(update={"optical_thickness": thickness})
         optics[draft] = fit_optics(scattering, band, lights, fabric)
         scores[draft] = math.hypot(geometries[draft].error / STRAIGHT_NOISE, optics[draft].error)
@@ -75,10 +79,6 @@ def fit_bsdf(
 def known_lights(scattering: Scattering, band: str) -> Mask:
     """Return the patches of the light of which something is known, (P,)."""
     return np.asarray(np.isfinite(scattering.bands[band]).any(axis=(0, 1, 2)))
-
-
-def _closed(draft: str) -> Geometry:
-    return Geometry(cloth(draft, (1.0, 1.0), (_USUAL_BEND,) * 2, (1.0, 1.0)), 0.0, np.empty((0, 6)), np.empty(0))
 
 
 def _assumed(closed: bool) -> list[str]:

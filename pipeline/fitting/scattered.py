@@ -26,7 +26,6 @@ from pipeline.per_fabric import PerFabric
 from pipeline.scenes.bounces import Tables, light_between, seen_light
 from pipeline.scenes.shade import colours_of
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND
-from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 COLOURS: Final = ("specular", "diffuse", "diffuse_transmission")
@@ -110,7 +109,8 @@ class Scatterer:
                 viewed = (self.queries.wo[:, 2] < 0.0) == bool(side)
                 rows = np.flatnonzero(viewed & ((self.pairs.kind == 1) == behind))
                 if rows.size:
-                    seen = _in_front(self.queries.take(rows), side)
+                    seen = self.queries.take(rows)
+                    seen = seen.turned() if side else seen
                     unit[rows] = read_behind(table, seen)[:, :4] if behind else read_queries(table, seen).components
         unit /= self._cosine[:, None]
         through = self.pairs.kind[:, None] == 1
@@ -166,7 +166,3 @@ def with_colours(fabric: Fabric, colours: Float64, optics: YarnOptics | None = N
             update |= {"roughness": float(optics.roughness[family]), "blend": float(optics.blend)}
         yarns[name] = getattr(fabric, name).model_copy(update=update)
     return fabric.model_copy(update=yarns)
-
-
-def _in_front(queries: Queries, side: int) -> Queries:
-    return queries.turned() if side else queries

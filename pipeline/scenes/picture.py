@@ -239,7 +239,8 @@ class _UnderWay:
         planes = {name: _mean(plane, side) for name, plane in planes.items()}
         planes["rgb"] = np.sum([planes["backdrop"], *(planes[name] for name in kept)], axis=0)
         if layers:
-            planes |= {name: _middle(plane, side) for name, plane in _seen(frame).items()}
+            middle = slice(side // 2, None, side)  # one of the middle rays of each pixel
+            planes |= {name: plane[middle, middle] for name, plane in _seen(frame).items()}
         fallback = sum(int(np.isfinite(values[:, 4]).sum()) for values in answers.values())
         return PicturePart(self._window, planes, sum(map(len, answers.values())), fallback)
 
@@ -289,8 +290,3 @@ def _mean(plane: npt.NDArray[np.generic], side: int) -> Plane:
     height, width, channels = plane.shape
     rays = plane.reshape(height // side, side, width // side, side, channels)
     return np.asarray(rays.mean(axis=(1, 3), dtype=np.float64).astype(np.float32))
-
-
-def _middle(plane: Plane, side: int) -> Plane:
-    """Return one of the middle rays of each pixel."""
-    return plane[side // 2 :: side, side // 2 :: side]

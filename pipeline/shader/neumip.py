@@ -36,7 +36,6 @@ from pipeline.shader.descriptor import (
 from pipeline.shader.golden import GROUPS, golden_of
 from pipeline.shader.limits import MOST_HEIGHT
 from pipeline.shader.tables import Place, constants_slang
-from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -173,7 +172,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         golden_of(
             {"front": GROUPS["front"]},
             fabric.weave.repeat,
-            partial(_neumip_answers, method, fabric),
+            lambda queries: np.tile(method.predict(fabric, queries), 2),  # components are their own bounds
             lambda queries: np.tile(linear_colours(fabric), (len(queries.u), 1, 1)),
             stretched=False,
         ),
@@ -224,8 +223,3 @@ def _after_elements(rows: Float32, channels: int) -> Float32:
     """Return weights whose rows of channels are filled up to whole elements, before those of directions."""
     empty = np.zeros((-channels % 4, rows.shape[1]), np.float32)
     return np.concatenate([rows[:channels], empty, rows[channels:]])
-
-
-def _neumip_answers(method: Neumip, fabric: Fabric, queries: Queries) -> Float32:
-    """Return the components twice, (N, 8): they are their own bounds."""
-    return np.tile(method.predict(fabric, queries), 2)

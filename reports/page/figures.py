@@ -211,12 +211,12 @@ def timing(scheme: Scheme, table: pd.DataFrame) -> Figure:
     colours = scheme.colours(table["method"])
     for measured in rows(table):
         colour, row = colours[measured.method], places[measured.method, measured.setting]
-        spread = _bounds(measured.median_ns, measured.first_quartile_ns, measured.third_quartile_ns)
-        _mark(axes, measured.median_ns, row, colour, "seen", scheme.marker(measured.method), xerr=spread)
-        axes.annotate(
-            _nanoseconds(measured.median_ns), (measured.third_quartile_ns, row), xytext=(8, 0),
-            textcoords="offset points", va="center", fontsize=9, color=scheme.muted,
-        )  # fmt: skip
+        median = measured.median_ns
+        spread = _bounds(median, measured.first_quartile_ns, measured.third_quartile_ns)
+        _mark(axes, median, row, colour, "seen", scheme.marker(measured.method), xerr=spread)
+        text = f"{median:,.0f} ns" if median < 1e4 else f"{median / 1e3:,.1f} µs"
+        beside: dict[str, Any] = {"xytext": (8, 0), "textcoords": "offset points", "va": "center", "fontsize": 9}
+        axes.annotate(text, (measured.third_quartile_ns, row), color=scheme.muted, **beside)
     axes.set(xscale="log", xlabel="time of a query, ns: median and quartiles of interleaved calls")
     axes.margins(x=0.12)
     axes.grid(axis="y", visible=False)
@@ -266,7 +266,3 @@ def _mark(axes: Axes, x: float, y: float, colour: str, role: str, shape: Marker,
 
 def _bounds(value: float, low: float, high: float) -> list[list[float]]:
     return [[max(value - low, 0.0)], [max(high - value, 0.0)]]
-
-
-def _nanoseconds(value: float) -> str:
-    return f"{value:,.0f} ns" if value < 1e4 else f"{value / 1e3:,.1f} µs"

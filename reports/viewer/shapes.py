@@ -162,7 +162,8 @@ def _on_sphere(eye: Float64, ray: Float64, radius: float) -> _Places:
     inside = b * b - (_dot(eye, eye) - radius * radius)
     hit = (inside > 0.0) & (b < 0.0)
     reach = np.where(hit, -b - np.sqrt(np.maximum(inside, 0.0)), -1.0)
-    n = _unit(eye + reach[:, None] * ray)
+    n = eye + reach[:, None] * ray
+    n /= np.linalg.norm(n, axis=-1, keepdims=True)
     level = np.maximum(np.hypot(n[:, 0], n[:, 1]), 1e-4)
     x = np.stack([-n[:, 1], n[:, 0], np.zeros(len(n))], axis=-1) / level[:, None]
     uv = radius * np.stack([np.arctan2(n[:, 0], -n[:, 1]), np.arcsin(np.clip(n[:, 2], -1.0, 1.0))], axis=-1)
@@ -198,7 +199,3 @@ def _on_drape(eye: Float64, ray: Float64) -> _Places:
 
 def _dot(a: Float64, b: Float64) -> Float64:
     return np.asarray((a * b).sum(axis=-1))
-
-
-def _unit(a: Float64) -> Float64:
-    return np.asarray(a / np.linalg.norm(a, axis=-1, keepdims=True))

@@ -65,12 +65,7 @@ def seconds_of(kinds: Index, answers: Sequence[Answer], fabric: Fabric) -> Float
     return result
 
 
-def _none(fabric: Fabric) -> dict[int, Float64]:
-    """Return no seconds by kind, which are measured one by one."""
-    return {}
-
-
-_KNOWN: Final = PerFabric(_none)
+_KNOWN: Final = PerFabric[dict[int, Float64]](lambda fabric: {})  # seconds by kind, measured one by one
 
 
 def _measure(kind: int, answers: Sequence[Answer], fabric: Fabric) -> Float64:

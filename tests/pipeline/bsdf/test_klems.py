@@ -78,6 +78,7 @@ def voile():
     return fabric_bsdf(load_fabric("voile"), basis=QUARTER, points=1)
 
 
+@pytest.mark.slow
 def test_a_fabric_scatters_what_random_directions_find(voile):
     """Transmittance and reflectance for light from straight above, against 4,000 random viewers."""
     random, fabric, count = np.random.default_rng(3), load_fabric("voile"), 4000

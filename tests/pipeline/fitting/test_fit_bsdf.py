@@ -29,6 +29,7 @@ def test_colours_are_linear_without_bounces(geometry):
     assert solve(components, components @ COLOURS, np.ones(len(components))) == pytest.approx(COLOURS, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_optics_are_found_again_from_light_of_all_bounces(geometry):
     """Other viewers within the patches, and 3 % of noise: numbers within their intervals, widened by a tenth."""
     pairs = Pairs(*(index.ravel() for index in np.indices((2, 2, QUARTER.patches, QUARTER.patches))))

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.cores import cores
 from pipeline.truth.query import Queries
-from reports.measure.timing import Contender, affordable, thread_counts, time_side_by_side
+from reports.measure.timing import Contender, affordable, time_side_by_side
 
 
 def many_queries(rows):
@@ -71,10 +70,6 @@ def test_slow_methods_answer_fewer_queries(cost, rows):
 
     chosen = affordable(Contender(predict, many_queries(1000) * 2), longest=0.05, clock=clock)
     assert [len(queries.u) for _, queries in chosen.queries] == [rows, rows]
-
-
-def test_thread_counts_are_said_once():
-    assert thread_counts([0, 1]) == sorted({1, cores()}) and thread_counts([4, 2, 4]) == [2, 4]
 
 
 def test_real_time_passes_on_one_thread_of_torch_and_what_a_method_did_not_run_is_waiting():

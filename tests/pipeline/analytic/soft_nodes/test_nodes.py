@@ -4,6 +4,7 @@ import pytest
 from pipeline.analytic.soft_nodes.nodes import AZIMUTHS, BLOCK_NODES, LEVELS, _ramps, tabulate
 from pipeline.compiled.arrays import nbytes
 from tests.pipeline.truth.cloths import irregular
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
@@ -13,7 +14,7 @@ from weaves.fabric import load_fabric
         (load_fabric("polyester_lining"), 3.5e5),
         (load_fabric("satin_8"), 1e6),
         (irregular(8, seed=4, width=1.0), 1.3e6),
-        (irregular(8, seed=4, width=0.8), 2e6),
+        slow(irregular(8, seed=4, width=0.8), 2e6),
     ],
     ids=["plain", "satin", "irregular", "irregular with gaps"],
 )

@@ -78,7 +78,7 @@ def _differ(found, truth):
         (LOPSIDED, "round", 0.05),
         slow(woven("denim"), "stretch", 0.05),
         slow(woven("denim"), "behind", 0.07),
-        (woven("voile"), "behind", 0.08),
+        slow(woven("voile"), "behind", 0.08),
         slow(woven("denim"), "curvature", 0.06),
         (woven("denim"), "rising", 0.04),
         slow(woven("satin_8"), "rising", 0.07),
