@@ -1,5 +1,6 @@
 """What all tests share: one cache of compiled kernels, the lane of programs that are started, the order."""
 
+import gc
 import os
 import sys
 from functools import partial
@@ -69,6 +70,8 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish(session):
     """Note the number of tests when the whole lane is collected; tests/test_lint.py compares it with its budget."""
+    gc.freeze()  # a tenth of the time went into looking through modules and tests for garbage
+    gc.set_threshold(20_000)
     config = session.config
     if config.args_source is config.ArgsSource.TESTPATHS and config.option.markexpr == QUICK:
         config.cache.set("budgets/tests", len(session.items))
