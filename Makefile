@@ -10,7 +10,7 @@ READY := .venv/installed
 # A run and its tests start many processes: compiled modules are kept, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: pictures viewer-shader gallery report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults lint budgets rooms pins wheel clean
+.PHONY: pictures viewer-shader gallery report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults fuzz lint budgets rooms pins wheel clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -65,6 +65,11 @@ test-slow: $(READY)
 # Kills, full disks, wrong clocks, signals and damaged files; every run ends with the bytes of an undisturbed one.
 faults: $(READY)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m faults tests/faults
+
+# Every test of random inputs, eight times with others: files, tables and bytes are read, or refused in one sentence.
+fuzz: $(READY)
+	for round in $$(seq 8); do OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "hypothesis and not faults" \
+		--hypothesis-profile=default || exit 1; done
 
 # A site of all presets in out/gallery: pictures, live pages, maps, samples, shaders and files. A fabric takes about a minute of one core.
 gallery: $(READY)

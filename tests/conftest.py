@@ -70,8 +70,7 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish(session):
     """Note the number of tests when the whole lane is collected; tests/test_lint.py compares it with its budget."""
-    gc.freeze()  # a tenth of the time went into looking through modules and tests for garbage
-    gc.set_threshold(20_000)
+    gc.set_threshold(20_000)  # a tenth of the time went into looking through modules and tests for garbage
     config = session.config
     if config.args_source is config.ArgsSource.TESTPATHS and config.option.markexpr == QUICK:
         config.cache.set("budgets/tests", len(session.items))

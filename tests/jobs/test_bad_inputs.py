@@ -22,10 +22,15 @@ from hypothesis import strategies as st
 
 from jobs.cli import main
 from jobs.recipe.load import load_recipe
+from pipeline.folders import own_files
+from pipeline.models.added.describe import describe
 from pipeline.scenes.catalogue import load_scene
-from reports.record import Record, this_machine, write_records
+from pipeline.shards.query_file import check_columns, open_queries, refuse_bad
+from reports.record import Record, read_records, this_machine, write_records
+from tests.presets import slow
 from tests.refusals import accepted, ends
 from tests.weaves.draft_files.drafts import wif
+from weaves.draft_files.read import read_draft
 from weaves.draft_files.write import wif_text
 from weaves.errors import MOST_LETTERS, BadInput
 from weaves.fabric import load_fabric
@@ -191,6 +196,7 @@ def surroundings():
     texts |= {"file": "no table and no folder", "broken.toml": "name = \n", "neither.toml": 'name = "x"\n'}
     texts |= {"threadless.wif": wif(THREADING=None)}
     texts |= {"bare.xml": '<scene version="3.0.0"><shape type="sphere"/></scene>'}
+    texts |= {"own.py": "def own(fabric, queries):\n    return queries.u", "maps.json": '{"files": {"good.wif": "0"}}'}
     for name, text in texts.items():
         Path(name).write_text(text, encoding="utf-8")
     for folder in ("folder.ply", "folder.png", "twill_4_4"):
@@ -385,3 +391,39 @@ def test_a_file_with_any_value_at_any_key_is_read_or_one_sentence(place, subject
     inner[last] = value
     Path("any.toml").write_text(tomli_w.dumps(table), encoding="utf-8", errors="surrogatepass")
     accepted(read, "any.toml")
+
+
+def read_queries(path):
+    with open_queries(path) as file:
+        check_columns(path, file.schema_arrow)
+        refuse_bad(path, file, (2, 2))
+
+
+def export_again(path):
+    with own_files(path.parent, path.name):
+        pass
+
+
+READERS = {
+    "recipe": ("names_toml.toml", load_recipe), "fabric": ("satin.toml", load_fabric),
+    "scene": ("bare.xml", load_scene),
+    "draft": ("good.wif", read_draft), "queries": ("good.parquet", read_queries), "export": ("maps.json", export_again),
+    "records": ("records.json", lambda path: read_records([path])),
+    "method": ("own.py", lambda path: describe(f"{path}:own", {}, {})),
+}  # fmt: skip
+"""A good file of every kind that comes from outside, and what reads it."""
+
+
+@pytest.mark.parametrize("subject", [slow(subject) if subject == "method" else subject for subject in READERS])
+@settings(deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 8), st.binary(max_size=8)), min_size=1, max_size=4))
+def test_a_file_with_any_other_bytes_is_read_or_one_sentence(place, subject, changes):
+    file, read = READERS[subject]
+    content = bytearray(Path(file).read_bytes())
+    for start, length, new in changes:
+        start %= len(content) + 1
+        content[start : start + length] = new
+    path = Path(f"bad.{file}").absolute()
+    path.write_bytes(content)
+    with ends(60):
+        accepted(read, path)

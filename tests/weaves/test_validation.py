@@ -107,16 +107,6 @@ def test_any_text_is_toml_or_one_sentence(tmp_path_factory, text):
     accepted(read_toml, path)
 
 
-@settings(deadline=None, max_examples=200)
-@given(st.integers(0, 10**6), st.integers(0, 255))
-def test_a_fabric_file_with_one_wrong_byte_is_a_fabric_or_one_sentence(tmp_path_factory, place, byte):
-    content = bytearray(load_fabric("silk_charmeuse").to_toml().encode())
-    content[place % len(content)] = byte
-    path = tmp_path_factory.mktemp("byte") / "cloth.toml"
-    path.write_bytes(content)
-    accepted(load_fabric, path)
-
-
 @settings(deadline=None)
 @given(st.text())
 def test_any_name_is_a_preset_or_one_sentence(name):

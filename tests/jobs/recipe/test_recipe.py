@@ -1,15 +1,12 @@
 import json
-import tomllib
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from jobs.plan.measurements.models import AtExtremes
 from jobs.recipe.load import load_recipe
 from jobs.recipe.shipped import recipe_names
 from pipeline.scenes.catalogue import load_scene
-from tests.refusals import refusal, sentence_of
+from tests.refusals import refusal
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -234,34 +231,6 @@ def test_trade_trains_the_published_woven_as_long_as_ours_and_lists_how_it_diffe
     assert differs == ("an encoder of the maps with fewer channels", "maps of 32 texels")
     assert published.seeds == ours.seeds == 3
     assert published.training == ours.training and recipe.dataset == load_recipe("standard").dataset
-
-
-VALUES = st.sampled_from(
-    ["nan", "-inf", "0", "-1", "1e300", "99999999999999999999", '""', '"x"', "true", "[]", "[[]]", "{}", "1979-05-27"]
-)
-
-
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.integers(0, 99), VALUES, st.sampled_from(["value", "key", "drop", "cut"]))
-def test_a_broken_recipe_raises_bad_input_and_nothing_else(files, index, value, kind):
-    """Exchange a line's value or key, leave it out, or cut the file there: a Recipe or BadInput comes, nothing else."""
-    lines = files.recipe.splitlines()
-    assigning = [number for number, line in enumerate(lines) if "=" in line]
-    index = assigning[index % len(assigning)]
-    key, _, before = lines[index].partition(" = ")
-    changed = {"value": [f"{key} = {value}"], "key": [f"{key}_{index} = {before}"], "drop": []}
-    cut = [lines[index][: len(lines[index]) // 2]]
-    files.text = "\n".join([*lines[:index], *(changed[kind] + lines[index + 1 :] if kind != "cut" else cut)])
-    path = files.write()
-    try:
-        load_recipe(path)
-    except BadInput as error:
-        assert sentence_of(error)
-        if kind == "key" and key != "model":
-            assert "unknown key" in str(error)
-    else:
-        assert kind != "key"
-        tomllib.loads(files.text)
 
 
 @pytest.mark.parametrize("name", ["stability", "sampler", "a\0b.toml"])
