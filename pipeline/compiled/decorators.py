@@ -11,7 +11,7 @@ compile different kernels at the same time. Of one kernel, one process alone: th
 because numba lets two processes overwrite each other's index of a kernel. A kernel is compiled while the locks of its
 callers are held; calls form no circle, so no two processes wait for each other.
 
-What other kernels call is compiled for them alone, in two thirds of the time; if Python calls it too, once more.
+What other kernels call is compiled for them alone, without machine code; if Python calls it too, once more.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from pipeline.truth.query import Queries
-from reports.measure.timing import Contender, affordable, time_side_by_side
+from reports.measure.timing import Contender, affordable, thread_counts, time_side_by_side
 
 
 def many_queries(rows):
@@ -57,7 +57,7 @@ def test_on_several_threads_each_makes_the_call_at_the_same_time():
 
     contender = Contender(predict, many_queries(10), threads=3)
     time_side_by_side([contender], repeats=2, warm_up=1)
-    assert contender.rows == 30 and len(names) == 3
+    assert contender.rows == 30 and len(names) == 3 and thread_counts([4, 2, 4]) == [2, 4]
 
 
 @pytest.mark.parametrize(("cost", "rows"), [(1, 1000), (10_000, 1000), (40_000, 512), (300_000, 64), (10**9, 16)])
