@@ -91,7 +91,7 @@ def over_seeds(
 
     The `keys` name a row, `method` and `setting` among them; `ranged` are the columns of numbers that get a range,
     None: all but the keys. The decorated function adds the columns `seeds`, the number of trainings (0 where nothing is
-    trained), and <name>_least and <name>_most, which are NaN for less than two trainings.
+    trained), and <name>_least and <name>_most, which are NaN where less than two trainings have the row.
 
     Columns in `means` are no linear function of errors, such as a maximum over fabrics: their number is not that of the
     mean errors, which may lie outside the range, but this mean of the numbers of the trainings.
@@ -113,7 +113,7 @@ def over_seeds(
             several = [counts[key] > 1 for key in zip(lines["method"], lines["setting"], strict=True)]
             every = lines[several].groupby([*keys])
             ends = every[names].min().add_suffix(LEAST).join(every[names].max().add_suffix(MOST))
-            frame = frame.merge(ends, on=[*keys], how="left")
+            frame = frame.merge(ends[every.size() > 1], on=[*keys], how="left")
             for name, mean in means.items():
                 of_trainings = every[name].agg(mean).reindex(pd.MultiIndex.from_frame(frame[[*keys]]))
                 frame[name] = frame[name].where(frame["seeds"] < 2, of_trainings.to_numpy())

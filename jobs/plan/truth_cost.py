@@ -20,7 +20,7 @@ SECONDS_A_POINT: Final = 5.5e-7
 _POINTS_A_ROW: Final = 1100  # for 2 % relative error, on average
 _SAMPLED: Final = 0.15  # share of the points of sampling that `auto` takes where tables answer most rows
 _ROW, _ROW_A_CELL, _MOST_CELLS = 1.2e-5, 3e-6, 8  # a row of a table: seconds, and more for each of the first cells
-_TABLE_A_CELL, _OPEN_TABLE = 0.17, 4.5  # seconds of making one; the factor of open cloth
+_TABLE_A_CELL, _OPEN_TABLE = 0.17, 7.0  # seconds of making one; the factor of open cloth
 _OPEN_POINT: Final = 5.0  # a point takes longer by this for each yarn spacing of gap
 _BOUNCES, _BOUNCES_THROUGH = 4.0, 16.0  # seconds of a table of light between yarns; of light through them too
 

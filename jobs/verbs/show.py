@@ -91,23 +91,27 @@ def _drawn(fabric: Fabric, folder: Path, *draws: Callable[[Fabric], bytes]) -> l
 
 
 def write_maps(fabric: Fabric, folder: Path) -> list[Path]:
-    """Write height and normals as pictures, and the geometry as EXR, into a folder and return the paths.
+    """Write height and normals as pictures, and the geometry as EXR, into a folder and return the paths."""
+    paths = [*_drawn(fabric, folder, tiles.height, tiles.normals), folder / f"{fabric.name}-maps.exr"]
+    write_geometry(fabric, paths[-1], TEXELS_PER_YARN)
+    return paths
 
-    The EXR holds one repeat, first pick at the bottom, first end on the left: height in yarn spacings, normal and fibre
-    tangent as X (along the weft), Y (along the warp) and Z, the yarn (0 warp, 1 weft, 2 gap), and A = 0 in gaps.
+
+def write_geometry(fabric: Fabric, path: Path, texels: int) -> None:
+    """Write one repeat as EXR, with so many texels across a yarn if its sides stay within `MOST_TEXELS`.
+
+    First pick at the bottom, first end on the left: height in yarn spacings, normal and fibre tangent as X (along the
+    weft), Y (along the warp) and Z, the yarn (0 warp, 1 weft, 2 gap), and A = 0 in gaps.
     """
-    paths = _drawn(fabric, folder, tiles.height, tiles.normals)
-    texels = min(TEXELS_PER_YARN, MOST_TEXELS // max(fabric.weave.repeat))
+    texels = min(texels, MOST_TEXELS // max(fabric.weave.repeat))
     surface = surface_maps(fabric, texels)
     solid = surface.yarn != GAP
     channels = {"A": solid, "height": np.where(solid, surface.height, 0.0), "yarn": surface.yarn}
     for axis, name in enumerate("XYZ"):
         channels[f"normal.{name}"] = surface.normal[..., axis]
         channels[f"tangent.{name}"] = surface.tangent[..., axis]
-    paths.append(folder / f"{fabric.name}-maps.exr")
     about: dict[str, str | int | float] = {"fabric": fabric.name, "texels_per_yarn": texels}
-    write_exr(paths[-1], {name: plane[::-1] for name, plane in channels.items()}, about)
-    return paths
+    write_exr(path, {name: plane[::-1] for name, plane in channels.items()}, about)
 
 
 def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:

@@ -14,9 +14,9 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.analytic.summed_area.horizon_map import SLOTS, HorizonMap, horizon_map
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.materials.horizon_map import SLOTS, HorizonMap, horizon_map
 from pipeline.materials.planes import Layout, samples
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, HeightField, surface_at

@@ -42,7 +42,7 @@ CLASSES: dict[str, type[Options]] = {
 }
 """The options' class of every model of the package, by its name."""
 
-REPLACED_MODELS: Final = {"gauss_nodes": "soft_nodes"}
+REPLACED_MODELS: Final = {"gauss_nodes": "soft_nodes", "summed_area": "soft_nodes"}
 """Models of earlier versions, and those to take in their place."""
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ import torch
 from torch import Tensor, nn
 
 from pipeline.models.method import Around, Method
-from pipeline.models.network import PerQuery, Portable
+from pipeline.models.network import PerQuery, Portable, one_thread
 from pipeline.per_fabric import PerFabric
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
@@ -70,12 +70,13 @@ def _eager(module: nn.Module, example: Sequence[Tensor], rows: int, dtype: torch
 
 
 def _compiled(module: nn.Module, example: Sequence[Tensor], rows: int, dtype: torch.dtype | None) -> _Program:
-    torch._dynamo.config.recompile_limit = _MODULES
-    for column in example[:rows]:
-        torch._dynamo.mark_dynamic(column, 0)
+    torch._dynamo.config.recompile_limit = _MODULES  # in this thread alone: others must not have to compile again
     run = _rounding(torch.compile(module, fullgraph=True), dtype)
     with _quiet(), torch.inference_mode():
-        run(*example)
+        columns = [column.clone() for column in example[:rows]]  # made in inference mode, as those of queries are
+        for column in columns:
+            torch._dynamo.mark_dynamic(column, 0)
+        run(*columns, *example[rows:])
     return _Program(run)
 
 
@@ -245,10 +246,10 @@ class RunBy(Around):
             return part, self._programs[key][1]
         queries = draw_queries(QueryOptions(), fabric.weave.repeat, _STREAM, 0, _COMPARED)
         inputs = [torch.from_numpy(column) for column in part.inputs(queries)]
-        with _LOADING:
+        with _LOADING, one_thread():  # what is compiled for several threads would be compiled again for one
             program = RUNTIMES[self._runtime].load(part.module, [*inputs, *part.constants], len(inputs))
-        if self._runtime in EXACT:
-            self._compare(fabric, part, program, queries)
+            if self._runtime in EXACT:
+                self._compare(fabric, part, program, queries)
         # The module is kept beside its program: an identity is another object's once its own is gone.
         self._programs[key] = part.module, program
         return part, program

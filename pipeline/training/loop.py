@@ -135,6 +135,7 @@ def train(
 
         weights = state.best_weights()
         card |= {"curve": state.curve, "steps_taken": int(state.curve[-1]["step"]), "kept": _kept(state)}
+        card["last_bits"] = _last_bits(device)
         card["validation"] = held_out.figures(weights)
     _write(folder, weights, card, identity)
     (folder / CHECKPOINT).unlink(missing_ok=True)
@@ -207,6 +208,12 @@ def _reproducible(threads: int, device: torch.device) -> Iterator[None]:
     finally:
         torch.set_num_threads(before[0])
         torch.use_deterministic_algorithms(before[1])
+
+
+def _last_bits(device: torch.device) -> dict[str, str]:
+    """Return what the last bits of the weights depend on beside the options: the number of cores is not part of it."""
+    processor = torch.backends.cpu.get_cpu_capability()
+    return {"torch": torch.__version__, "processor": processor, "device": device.type}
 
 
 def _card(options: Any, training: TrainingOptions, manifest: Manifest, fabrics: Sequence[Fabric]) -> dict[str, Any]:

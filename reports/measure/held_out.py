@@ -46,6 +46,7 @@ from weaves.fabric import Fabric
 
 EDITS: Final = 5
 """Fabrics never seen before that a method is timed to prepare."""
+_LONGEST_EDITS: Final = 10_000.0  # milliseconds
 
 _COMPONENT_METRICS: Final[tuple[Metric, ...]] = tuple(f"rrmse_{name}" for name in COMPONENTS)
 
@@ -161,8 +162,12 @@ def _times(
     for (subject, contender), timing in zip(runs, timings, strict=True):
         about = subject.model_copy(update={"note": f"{len(contender.queries[0][1].u)} queries a fabric"})
         records.append(timed(about, "time", timing.samples))
-        if math.isfinite(timing.waited):
-            records.append(subject.of("waited", timing.waited, len(timing.samples)))
+        repeats = len(timing.samples)
+        records.append(subject.of("processor_time", 1e-3 * timing.processor, repeats))
+        if contender.threads == 1:
+            records.append(subject.of("waited", timing.waited, repeats))
+        if math.isfinite(timing.joules):
+            records.append(subject.of("energy", 1e6 * timing.joules, repeats))
     return records
 
 
@@ -182,6 +187,7 @@ def _prepare(methods: Sequence[Method], fabrics: Sequence[Fabric]) -> None:
 def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits: Iterator[int]) -> list[Record]:
     """Return the time to prepare fabrics that no cache holds: the named ones in turn, each with an edit of its own.
 
+    A method that takes long is measured less often: until `_LONGEST_EDITS` have passed.
     An edit lowers the warp's relief by a few parts in ten thousand, so that no cache of any method helps.
     """
     times = []
@@ -191,4 +197,6 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
         if not method.covers(new):
             return []
         times.append(milliseconds(partial(method.prepare, new)))
+        if sum(times) > _LONGEST_EDITS:
+            break
     return [timed(subject, "prepare_time", times)]

@@ -4,8 +4,9 @@ All methods answer the same queries; they take turns, so that whatever else the 
 called a few times before the clock counts. A GPU is waited for before both readings of the clock. One call answers the
 queries of several fabrics in turn, because the cost of the point model depends on the weave. On several threads every
 thread makes that call, as a renderer gives each of its threads a tile of the picture; a method itself never uses more
-than one. Numbers of different machines are never compared. How long a method's only thread waited for others to leave
-the processor is measured beside its time: on a quiet machine next to nothing.
+than one. Numbers of different machines are never compared. Beside the time, the processor time is measured, and the
+energy where the system reports it. On one thread, time in which the processor did other work is waiting: on a quiet
+machine next to nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import numpy as np
 
 from pipeline.cores import cores
 from pipeline.truth.query import Queries
+from reports.measure import energy
 from reports.record import Metric, Record
 from weaves.fabric import Fabric
 
@@ -57,12 +59,19 @@ class Contender(NamedTuple):
 
 
 class CallTiming(NamedTuple):
-    """Cost of a query in nanoseconds."""
+    """Cost of a query."""
 
     samples: tuple[float, ...]
-    """Times of all repeats, in their order."""
-    waited: float = math.nan
-    """Share of the time on one thread in which that thread did not run, because others did; NaN on several threads."""
+    """Times of all repeats in nanoseconds, in their order."""
+    processor: float = math.nan
+    """Mean processor time in nanoseconds, of all threads together."""
+    joules: float = math.nan
+    """Mean energy of the processor; NaN where it cannot be read (`reports.measure.energy`)."""
+
+    @property
+    def waited(self) -> float:
+        """Share of the time on one thread in which the process did not run, because others did."""
+        return max(0.0, 1.0 - self.processor * len(self.samples) / sum(self.samples))
 
     @property
     def quartiles(self) -> tuple[float, float, float]:
@@ -83,7 +92,7 @@ def time_side_by_side(
     """
     set_threads(1)
     elapsed: list[list[int]] = [[] for _ in contenders]
-    ran = [0] * len(contenders)
+    ran, used = [0] * len(contenders), [0.0] * len(contenders)
     with ThreadPoolExecutor(max((contender.threads for contender in contenders), default=1)) as pool:
         for turn in range(warm_up):
             for contender in contenders:
@@ -92,15 +101,16 @@ def time_side_by_side(
         for turn in range(repeats):
             for index, contender in enumerate(contenders):
                 _synchronise()
-                start, ran_before = clock(), time.thread_time_ns()
+                counters, start, ran_before = energy.counters(), clock(), time.process_time_ns()
                 _call(contender, pool)
                 _synchronise()
                 elapsed[index].append(clock() - start)
-                ran[index] += time.thread_time_ns() - ran_before
+                ran[index] += time.process_time_ns() - ran_before
+                used[index] += energy.joules(counters)
             progress((warm_up + turn + 1) / (warm_up + repeats))
     return [
-        CallTiming(tuple(reading / contender.rows for reading in readings), _waited(contender, readings, own))
-        for contender, readings, own in zip(contenders, elapsed, ran, strict=True)
+        CallTiming(tuple(reading / rows for reading in readings), own / rows / repeats, joules / rows / repeats)
+        for rows, readings, own, joules in zip((one.rows for one in contenders), elapsed, ran, used, strict=True)
     ]
 
 
@@ -173,12 +183,6 @@ def _call(contender: Contender, pool: ThreadPoolExecutor) -> None:
         _answer(contender)
     else:
         list(pool.map(_answer, [contender] * contender.threads))
-
-
-def _waited(contender: Contender, readings: Sequence[int], ran: int) -> float:
-    """Return the share of the readings in which the one thread of a contender did not run."""
-    total = sum(readings)
-    return max(0.0, 1.0 - ran / total) if contender.threads == 1 and total > 0 else math.nan
 
 
 def _answer(contender: Contender) -> None:

@@ -35,7 +35,6 @@ METHODS: Final[Mapping[str, tuple[Marker, str, str]]] = {
     "prefiltered": ("P", "#6f7484", "#a7adbd"),
     "map_material": ((8, 1, 0), "#b3263f", "#ff8fa3"),
     "soft_nodes": (">", "#d24fa2", "#f9a8d8"),
-    "summed_area": ((5, 0, 0), "#2e8b3c", "#7fe08c"),
 }
 """Mark and colours, light and dark, of each method. No two marks are alike: no method is known by colour alone."""
 

@@ -190,8 +190,8 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
 
     Columns: method, setting; on the fewest threads that were timed median_ns, first_quartile_ns, third_quartile_ns (a
     query), repeats, threads and frame_ms; on the most, where those are more, most_threads, most_threads_ns and
-    most_threads_frame_ms; bytes_stored, memory (bytes a call adds), prepare_ms; time_ratio, the time over that of 2
-    points. A frame is 1920 × 1080 queries.
+    most_threads_frame_ms; processor_time and energy on the fewest, where measured; bytes_stored, memory (bytes a call
+    adds), prepare_ms; time_ratio, the time over that of 2 points. A frame is 1920 × 1080 queries.
     """
     table = to_table(records)
     times = table[table["metric"] == "time"]
@@ -203,8 +203,12 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
     result = result.join(more.set_axis(["most_threads", "most_threads_ns"], axis=1))
     result["frame_ms"] = result["median_ns"] * FRAME / 1e6
     result["most_threads_frame_ms"] = result["most_threads_ns"] * FRAME / 1e6
-    for metric, name in (("bytes_stored", "bytes_stored"), ("peak_memory", "memory"), ("prepare_time", "prepare_ms")):
-        result = result.join(table[table["metric"] == metric].set_index(_KEYS)["value"].rename(name))
+    names = {"bytes_stored": "bytes_stored", "peak_memory": "memory", "prepare_time": "prepare_ms"}
+    names |= {metric: metric for metric in ("processor_time", "energy") if metric in {*table["metric"]}}
+    for metric, name in names.items():
+        costs = table[table["metric"] == metric]
+        costs = costs[costs["threads"] == costs["threads"].min()]
+        result = result.join(costs.set_index(_KEYS)["value"].rename(name))
     result = result.reset_index()
     base = result.loc[of_baseline(result), "median_ns"]
     result["time_ratio"] = result["median_ns"] / float(base.iloc[0]) if len(base) else math.nan

@@ -74,6 +74,9 @@ def test_a_table_is_that_of_means_with_the_range_of_the_trainings():
     for method in ("b", "points"):
         assert math.isnan(table["ratio_least"][method]) and math.isnan(table["ratio_most"][method])
     assert [*table.columns] == ["setting", "ratio", "seeds", "ratio_least", "ratio_most"]
+    # A second training of which something else is known gives no range.
+    known = ratios([*RECORDS, trained("b", 1, metric="extreme_error")]).set_index("method")
+    assert math.isnan(known["ratio_most"]["b"]) and known["ratio_most"]["a"] == pytest.approx(0.1)
 
 
 @over_seeds(["method", "setting"], ["worst"], {"worst": max})

@@ -120,8 +120,9 @@ class OnFabric(_OnHeldOut):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         width, height = self.frame_options.frame_size
+        queries = self.frame_options.frames * width * height + self.errors.rows
         pixels = sum(math.prod(self.picture_options.size(view)) for view in self.views)
-        return 0.3 + self.model.seconds(self.frame_options.frames * width * height + self.errors.rows + pixels)
+        return 0.3 + self.model.seconds(queries + pixels, 1.0, self.ways)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""
@@ -178,7 +179,7 @@ class OnUnseenPopulation(Measurement):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        return 0.3 + self.model.seconds(len(self.fabrics) * self.errors.rows, len(self.fabrics))
+        return 0.3 + self.model.seconds(len(self.fabrics) * self.errors.rows, len(self.fabrics), self.ways)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""

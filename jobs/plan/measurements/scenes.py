@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from reports.record import Record
 
 _QUERIES_A_PIXEL = 5.0  # roughly
+_FALLBACK = 2.5e-5  # seconds of a query of a kind that a model does not know, times the share of such queries
 
 
 class SceneCloth(TaskPart):
@@ -191,7 +192,9 @@ class _OnShot(Measurement):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         queries = self.extent[0] * self.extent[1] * _QUERIES_A_PIXEL * self.frames
-        return 0.5 + self.model.seconds(queries, fabrics=3.0)  # tables know light from behind and curved cloth
+        unknown = queries if {"behind", "curvature"} - self.model.options.kinds else 0.0
+        # Tables know light from behind and curved cloth.
+        return 0.5 + self.model.seconds(queries, fabrics=3.0) + _FALLBACK * unknown
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure it; of a larger picture there are no Records."""

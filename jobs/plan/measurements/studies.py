@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from reports.record import Record
 
 _UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced", "measured_cloth")
+_LONG: Final[dict[StudyName, float]] = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0}  # seconds
 
 
 class Study(Measurement):
@@ -23,7 +24,6 @@ class Study(Measurement):
 
     kind: Literal["study"] = "study"
     code: ClassVar = ("truth", "bench")
-    seconds: ClassVar = 60.0
     study: StudyName
     """Name of the module."""
 
@@ -32,6 +32,11 @@ class Study(Measurement):
         """Yield those that the recipe names."""
         for name in subjects.recipe.bench.studies:
             yield cls(study=name)
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return _LONG.get(self.study, 40.0)
 
     @property
     def slots(self) -> Literal["one", "all"]:

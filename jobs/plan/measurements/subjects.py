@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from reports.measure.held_out import HeldOutFabric
 
 
+_EXPORT = 2.5  # seconds in which a network is exported to another runtime and compiled there
+
+
 class HeldOutRows(TaskPart):
     """Held-out rows of a data set that a measurement reads."""
 
@@ -74,10 +77,15 @@ class Trained(TaskPart):
         shown = (self.options.setting_of(k) for k in settings if k in counts or k == usual)
         return tuple(shown) if settings else (self.options.variant,)
 
-    def seconds(self, queries: float, fabrics: float = 1.0) -> float:
-        """Return the estimated seconds in which one core answers queries with every setting, of so many fabrics."""
-        # Tables of all settings share what takes longest.
-        return fabrics * self.options.prepare_seconds + queries * self.options.seconds[1] * self.options.work
+    def seconds(self, queries: float, fabrics: float = 1.0, ways: RunOptions | None = None) -> float:
+        """Return the estimated seconds in which one core answers queries with every setting, of so many fabrics.
+
+        With `ways`, trained networks answer in these too; they are exported for each runtime and fabric.
+        """
+        options = self.options
+        runtimes, bounds = (len(ways.runtimes), ways.bounds) if ways and self.networks else (0, False)
+        prepared = options.prepare_seconds + _EXPORT * runtimes
+        return fabrics * prepared + (1 + bounds + runtimes) * queries * options.seconds[1] * options.work
 
     def methods(self, out: Path) -> list[Method]:
         """Load its methods, one a setting."""

@@ -63,7 +63,7 @@ class TimeOfMethods(Measurement):
     def cost(self) -> float:
         """Estimated seconds; a shard of test rows is about one fabric."""
         rows = sum(len(model.options.settings) or 1 for model in self.models)
-        prepared = sum(model.seconds(0.0, len(self.dataset.rows)) for model in self.models)
+        prepared = sum(model.seconds(0.0, len(self.dataset.rows), model.ways) for model in self.models)
         return 5.0 + rows * self.options.timing_repeats * _SECONDS_A_CALL + 0.7 * prepared
 
     @property

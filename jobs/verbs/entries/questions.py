@@ -19,6 +19,7 @@ from jobs.recipe.load import load_recipe
 from jobs.recipe.recipe import Recipe
 from jobs.terminal import print_lines
 from jobs.verbs.parameters import NOTHING, Add, Local, RecipeName
+from jobs.verbs.show import write_geometry
 from pipeline import versions
 from pipeline.folders import own_files
 from pipeline.models.domain import PHYSICS
@@ -32,6 +33,8 @@ from reports.tables.table import markdown_table
 from weaves.draft_files.write import wif_text
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
+
+_TEXELS: Final = 16  # of a map of the geometry, across a yarn
 
 _LISTING: Final = "questions.json"  # lists the fabrics, and all files with their hashes
 
@@ -65,6 +68,7 @@ def questions(
             (folder / name).write_text(text, encoding="utf-8")
         for fabric, _ in loaded.tested:
             (folder / "fabrics" / f"{fabric.name}.png").write_bytes(drawdown(fabric))
+            write_geometry(fabric, folder / "fabrics" / f"{fabric.name}.exr", _TEXELS)
     print_lines(f"{to}: {count:,} questions about {len(loaded.tested)} fabrics; README.md says how to answer them")
 
 

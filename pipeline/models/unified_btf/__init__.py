@@ -17,6 +17,7 @@ class BtfOptions(ComponentLossOptions):
 
     fixed: ClassVar[tuple[str, ...]] = ("directions", "log_samples")
     any_physics: ClassVar[bool] = True
+    prepare_seconds: ClassVar[float] = 4.0
 
     texels_per_yarn: int = Field(default=8, ge=1, le=64)
     """Texels along one yarn spacing."""

@@ -7,7 +7,6 @@ import pytest
 
 from pipeline.analytic import exact_points, prefiltered
 from pipeline.analytic.soft_nodes import components, nodes
-from pipeline.analytic.summed_area import answer, tables
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
 
@@ -18,14 +17,6 @@ def soft_table(fabric, level=2, behind=False, rims=True):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(nodes, "_GRID_BYTES", 1 << 18)
         return nodes.tabulate(fabric, level=level, behind=behind, rims=rims)
-
-
-@lru_cache(maxsize=32)
-def _clusters(fabric, clusters):
-    """Return tables whose finest level is that of a cloth of many different cells: a quarter of the texels."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tables, "_finest", lambda cells: 8)
-        return tables.tabulate(fabric, clusters)
 
 
 _maps = lru_cache(maxsize=32)(prefiltered.tabulate)
@@ -47,10 +38,6 @@ def soft_nodes_behind(fabric, queries, rims=True):
     )
 
 
-def summed_area(fabric, queries):
-    return answer.answer(_clusters(fabric, 64), queries)
-
-
 def points(fabric, queries, count=256, rims=True):
     options = TruthOptions(walls="rim" if rims else "left_out")
     return exact_points.sample_points(cloth_side(fabric, options), queries, count, 3, True)
@@ -60,8 +47,8 @@ def averaged_normals(fabric, queries):
     return prefiltered.answer(_maps(fabric, 16), queries, prefiltered.LEAN)
 
 
-PLACED = [soft_nodes, unshadowed, soft_nodes_behind, summed_area, averaged_normals]
+PLACED = [soft_nodes, unshadowed, soft_nodes_behind, averaged_normals]
 """Methods without random numbers."""
 
-ALL = [soft_nodes, summed_area, points, averaged_normals]
+ALL = [soft_nodes, points, averaged_normals]
 """Methods that return the four components with the light in front."""

@@ -29,7 +29,6 @@ def asked(size, behind=0.0):
 
 BOUNDS = {
     methods.soft_nodes: (0.15, 0.04, 0.025),
-    methods.summed_area: (0.15, 0.05, 0.035),
     methods.points: (0.03, 0.03, 0.03),
 }
 """For the three sizes: those of random cloths (reports/LOG.md); of points what 256 leave."""

@@ -83,8 +83,6 @@ REAL = """
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.analytic.summed_area.answer import answer
-from pipeline.analytic.summed_area.tables import tabulate
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
@@ -93,7 +91,6 @@ queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
 asked = {
     "auto": lambda: np.hstack(estimate(fabric, queries, TruthOptions(), 1)[:2]),
     "soft_nodes": lambda: SoftNodes().predict(fabric, queries),
-    "summed_area": lambda: answer(tabulate(fabric, 16), queries),
 }
 """
 
@@ -276,7 +273,7 @@ def test_kernels_that_borrow_arrays_call_none_that_returns_them():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "order"),
-    [(SMALL, ("fast", "plain", "twice", "smooth", "shared")), (REAL, ("auto", "soft_nodes", "summed_area"))],
+    [(SMALL, ("fast", "plain", "twice", "smooth", "shared")), (REAL, ("auto", "soft_nodes"))],
     ids=["small", "real"],
 )
 def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies, asked, order):

@@ -29,6 +29,7 @@ def sheet(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_a_fabric_has_the_shares_of_its_sheet(sheet):
     (fitted,) = fit_sheet(read_sheet(sheet()), "screen")
     assert fitted.errors["shares"] < 1e-3

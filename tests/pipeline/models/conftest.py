@@ -3,20 +3,12 @@
 import pytest
 import torch
 
-from pipeline.models.analytic.summed_area import SummedAreaOptions
-from pipeline.models.registry import load_methods
 from pipeline.models.selvage.model import Selvage
 
 
 @pytest.fixture(autouse=True)
 def _fixed_weights():
     torch.manual_seed(0)
-
-
-@pytest.fixture(scope="session")
-def clusters():
-    (method,) = load_methods(SummedAreaOptions(clusters=[64]))
-    return method
 
 
 @pytest.fixture(scope="session")

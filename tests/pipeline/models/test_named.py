@@ -34,8 +34,7 @@ def test_every_method_answers_any_query_and_knows_what_the_fallback_lets_through
     expected = fallback_rows(denim, queries, 0)
     assert 0 < expected[1, 4] < 1
     for name in ("selvage", *untrained_names()):
-        # The number of clusters changes nothing here, and 128 of them take seconds to tabulate.
-        method = named_method("summed_area:16" if name == "summed_area" else name, "render", "--method")
+        method = named_method(name, "render", "--method")
         method.prepare(denim)
         rows = method.rows(denim, queries, 0)
         assert np.isfinite(rows[:, :4]).all() and np.isnan(rows[0, 4])
@@ -58,8 +57,7 @@ def test_every_method_answers_any_query_and_knows_what_the_fallback_lets_through
         ("woven", "must be trained first"),
         ("soft_nodes:3", "1, 2, 4 or 8"),
         ("prefiltered:4", "prefiltered has no settings"),
-        ("summed_area:1000", "less than or equal to 512"),
-        ("summed_area:x", "a number k after the colon"),
+        ("point_sampled:x", "a number k after the colon"),
         ("", "the folder of a trained model or a name"),
     ],
 )

@@ -10,7 +10,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.models import runtimes
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.method import CHUNK_ROWS, refuse_other
-from pipeline.models.network import Answering, PerQuery
+from pipeline.models.network import Answering, PerQuery, one_thread
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.models.runtimes import RUNTIME_TOLERANCE, RUNTIMES, RunBy, Runtime, not_run, runs
@@ -104,14 +104,18 @@ def test_eight_bits_cost_a_percent_and_save_three_bytes_of_four():
 
 
 @pytest.mark.slow
-def test_torch_compiles_a_module_and_any_thread_may_call_it():
+def test_torch_compiles_a_module_once_and_any_thread_may_call_it():
     if reason := RUNTIMES["compile"].missing():
         pytest.skip(reason)
     method = Linear(np.arange(12).reshape(4, 3), constant=2.0)
     run = RunBy(method, "compile")
-    run.prepare(DENIM)
     several = [asked(rows) for rows in (1, 50, 600)]
     with ThreadPoolExecutor(2) as pool:
+        pool.submit(run.prepare, DENIM).result()
+        compiled = torch._dynamo.utils.counters["stats"]["unique_graphs"]
+        with one_thread():
+            run.predict(DENIM, asked(50))
+        assert torch._dynamo.utils.counters["stats"]["unique_graphs"] == compiled > 0
         found = list(pool.map(lambda queries: run.predict(DENIM, queries), several))
     for queries, answers in zip(several, found, strict=True):
         np.testing.assert_allclose(answers, method.predict(DENIM, queries), rtol=1e-5, atol=1e-5)

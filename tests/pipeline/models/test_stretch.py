@@ -2,7 +2,6 @@ import pytest
 
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.soft_nodes import SoftNodesOptions
-from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.models.fallback import Fallback
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -14,18 +13,17 @@ from weaves.fabric import load_fabric
     ("options", "bound"),
     [
         (SoftNodesOptions(levels=[2]), 0.04),
-        (SummedAreaOptions(clusters=[64]), 0.05),
         (PointSampledOptions(counts=[4096], sequence="r2"), 0.03),
     ],
-    ids=["soft nodes", "clusters", "points"],
+    ids=["soft nodes", "points"],
 )
-def test_ellipses_are_answered_as_such(options, bound, clusters):
+def test_ellipses_are_answered_as_such(options, bound):
     """RMSE of the colour over the mean; asked for the round footprint of equal area half as much again at least."""
     fabric = load_fabric("cotton_twill")
     kinds = QueryOptions(sigma=(0.25, 0.6), max_angle=60.0, stretch=8.0)
     queries = draw_queries(kinds, fabric.weave.repeat, 9, 0, 96)
     truth = truth_of(fabric, queries)
-    method = clusters if options.model == clusters.name else load_methods(options)[0]
+    (method,) = load_methods(options)
     assert "stretch" in options.kinds
     known, unknown = (colour_error(Fallback(method, k).predict(fabric, queries, 3), truth) for k in ({"stretch"}, ()))
     assert known < bound

@@ -17,6 +17,7 @@ from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
+from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -108,7 +109,7 @@ def test_a_result_read_alone_is_understood(case):
     assert not schema.field("count").nullable
 
 
-@pytest.mark.parametrize("estimator", ["owen", "auto"])
+@pytest.mark.parametrize("estimator", ["owen", slow("auto")])
 def test_no_byte_depends_on_the_cut_nor_on_the_number_of_threads(case, monkeypatch, estimator):
     """Queries from both sides, lit from both, some bad; chunks of any size, blocks that end inside row groups."""
     case.options = OPTIONS.model_copy(update={"estimator": estimator})

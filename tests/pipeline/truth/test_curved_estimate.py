@@ -9,6 +9,7 @@ from pipeline.truth.scattering.point import directions_of, point_share
 from tests.directions import unit
 from tests.pipeline.truth.cloths import equal_queries, fixed
 from tests.pipeline.truth.geometry.marches import leaves
+from tests.presets import slow
 from weaves.fabric import load_fabric
 from weaves.surface import WARP, WEFT, surface_at
 
@@ -66,9 +67,9 @@ def _brute(fabric, wi, wo, curvature, x, y):
     ("name", "curvature", "light", "viewer"),
     [
         ("denim", 0.0, (30, 20), (70, 150)),
-        ("polyester_lining", 0.2, (20, 40), (35, 200)),
+        slow("polyester_lining", 0.2, (20, 40), (35, 200)),
         ("polyester_lining", 0.2, (-4, 30), (25, 185)),
-        ("denim", 0.4, (-8, 250), (50, 85)),
+        slow("denim", 0.4, (-8, 250), (50, 85)),
     ],
 )
 def test_estimates_match_brute_force(name, curvature, light, viewer):

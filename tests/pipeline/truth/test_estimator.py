@@ -10,7 +10,7 @@ from pipeline.truth.estimator import estimate, uncalibrated
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
 from tests.pipeline.truth.cloths import answering, direction, equal_queries, fixed, woven
-from tests.presets import PRESETS, slow
+from tests.presets import PRESETS
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.population import Population, Ranges, population_fabrics
@@ -26,7 +26,8 @@ def test_diffuse_matches_a_mitsuba_rendering_of_the_geometry():
     np.testing.assert_allclose(answer.mean[0, 2:], [0.099296, 0.109176], rtol=1e-3)
 
 
-@pytest.mark.parametrize("estimator", [slow("mc"), "owen"])
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ["mc", "owen"])
 def test_reported_errors_cover_the_true_error(estimator):
     """z-scores against a reference with 64 times the points, footprints of a yarn and more. With 16 randomisations z
     follows Student's t with 15 degrees of freedom: .9 % lie beyond 3, and the ratio estimator's skewness at fixed count

@@ -17,7 +17,6 @@ from tests.pipeline.truth.cloths import (
     reversed_axes,
     woven,
 )
-from tests.presets import slow
 
 REPEAT = LOPSIDED.weave.repeat
 ALL = get_args(EstimatorName)
@@ -57,7 +56,8 @@ def assert_equal(one, other, worst):
     assert difference.mean() < 0.1 * worst
 
 
-@pytest.mark.parametrize("estimator", ["quadrature", slow("node_table")])
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ["quadrature", "node_table"])
 def test_a_cloth_drawn_in_another_way_has_the_same_answers(estimator):
     """A mirror reverses the sense of the twists: without that the mirrored cloth answers otherwise."""
     queries = on_lattice(any_asked(estimator))

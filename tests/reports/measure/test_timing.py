@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from pipeline.truth.query import Queries
+from reports.measure import energy
 from reports.measure.timing import Contender, affordable, thread_counts, time_side_by_side
 
 
@@ -77,8 +78,28 @@ def test_real_time_passes_on_one_thread_of_torch_and_what_a_method_did_not_run_i
     before = torch.get_num_threads()
     asleep = Contender(lambda fabric, queries: time.sleep(0.01), many_queries(10))
     try:
-        idle, many = time_side_by_side([asleep, asleep._replace(threads=2)], repeats=5, warm_up=1)
+        (idle,) = time_side_by_side([asleep], repeats=5, warm_up=1)
         assert torch.get_num_threads() == 1
     finally:
         torch.set_num_threads(before)
-    assert idle.quartiles[1] >= 1e6 and 0.85 < idle.waited < 1.0 and math.isnan(many.waited)
+    assert idle.quartiles[1] >= 1e6 and 0.85 < idle.waited < 1.0
+
+
+def test_energy_is_that_of_all_packages_whose_counters_begin_again(tmp_path, monkeypatch):
+    """Each call of ten queries takes 2 J of one package, whose counter begins again at 5 J, and 1 J of another."""
+    used, zones = 0, [tmp_path / f"intel-rapl:{k}" for k in range(2)]
+    for zone in (*zones, zones[0] / "intel-rapl:0:0"):
+        zone.mkdir()
+        (zone / "max_energy_range_uj").write_text("4999999\n")
+        (zone / "energy_uj").write_text("0\n")
+
+    def predict(fabric, queries):
+        nonlocal used
+        used += 1
+        for zone, microjoules in zip(zones, (2_000_000 * used % 5_000_000, 1_000_000 * used % 5_000_000), strict=True):
+            (zone / "energy_uj").write_text(f"{microjoules}\n")
+
+    for folder, joules in ((tmp_path, 0.3), (tmp_path / "none", math.nan)):
+        monkeypatch.setattr(energy, "_ZONES", folder)
+        (timing,) = time_side_by_side([Contender(predict, many_queries(10))], repeats=7, warm_up=1)
+        assert timing.joules == pytest.approx(joules, nan_ok=True)

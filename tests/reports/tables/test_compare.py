@@ -87,6 +87,7 @@ def test_a_difference_exceeds_the_interval_and_the_range_over_trainings(a, b, sp
     assert row.a.value == pytest.approx(np.mean(a)) and row.b.value == pytest.approx(np.mean(b))
 
 
+@pytest.mark.slow
 def test_the_range_of_three_trainings_is_exceeded_by_chance_as_often_as_stated():
     """5 of 100; 4.85 % by 400,000 draws. Of 4,000 pairs 132 to 256 lie within 4.6 standard deviations."""
     random = np.random.default_rng(3)

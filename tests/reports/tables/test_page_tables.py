@@ -64,12 +64,14 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
         subject.model_copy(update={"threads": threads}).of("time", time, 25, low=0.9 * time, high=1.1 * time)
         for threads, time in ((4, 120.0), (1, 400.0), (2, 210.0))
     ]
+    records += [one.of("processor_time", one.value / 1000.0, 25) for one in records]
     records += [subject.of("prepare_time", 12.5, 9), subject.of("peak_memory", 3e7, 3)]
     (timing,) = sections_of(records)["time"]
     shown = {title: cell.text for title, cell in cells_of(timing, "woven").items()}
     assert shown["ns a query"] == "400" and shown["ns a query, 4 threads"] == "120"
     assert shown["ms a frame"] == "829" and shown["ms a frame, 4 threads"] == "249"
     assert shown["ms to add a fabric"] == "12.5" and shown["memory of a call"] == "30.00 MB"
+    assert shown["processor s a million"] == ".400" and "J a million" not in shown
 
 
 def test_records_of_before_intervals_are_shown_without_one():

@@ -13,10 +13,12 @@ from pipeline.shards.generate import ShardTask, generate_shard
 from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
 from pipeline.shards.store import read_columns
 from pipeline.truth.options import TruthOptions
+from reports.images.exr import read_exr
 from tests.jobs import made_up
 from weaves.draft_files.read import read_draft
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
+from weaves.surface import surface_at
 from weaves.validation import validated
 from weaves.yarn import Yarn
 
@@ -62,6 +64,10 @@ def test_a_folder_has_all_that_is_known_of_the_fabrics_and_no_other_file(folder)
         assert fabric.weave.rows() == about["drawdown"] and [*fabric.weave.repeat] == about["repeat"]
         drafted = read_draft(folder / "fabrics" / f"{about['name']}.wif")
         assert len(drafted.ends.colours) % fabric.weave.repeat[0] == 0
+        height = read_exr(folder / "fabrics" / f"{about['name']}.exr").channels["height"][::-1]
+        assert height.shape == tuple(16 * n for n in fabric.weave.repeat[::-1])
+        place = surface_at(fabric, np.array([2.5 / 16]), np.array([17.5 / 16]))
+        assert height[17, 2] == pytest.approx(place.height[0], abs=1e-6)
         colours = [fabric.warp.specular_rgb, fabric.weft.specular_rgb, fabric.warp.diffuse_rgb, fabric.weft.diffuse_rgb]
         np.testing.assert_allclose(about["colours"], colours, atol=1e-8)
     words = (folder / "README.md").read_text(encoding="utf-8")

@@ -55,7 +55,7 @@ def test_bounces_grow_with_every_colour(closed):
         pytest.param(CLOSED, 0.98, id="closed"),
         pytest.param(woven("silk_charmeuse", width=1.0, blend=1.0), 0.98, id="satin", marks=pytest.mark.slow),
         pytest.param(LOPSIDED, 0.3, id="narrow", marks=pytest.mark.slow),
-        pytest.param(woven("voile"), 0.2, id="open"),
+        pytest.param(woven("voile"), 0.2, id="open", marks=pytest.mark.slow),
     ],
 )
 def test_white_cloth_in_a_furnace_makes_no_light(fabric, least):

@@ -12,7 +12,7 @@ from weaves.fabric import load_fabric
     ("fabric", "most"),
     [
         (load_fabric("polyester_lining"), 3.5e5),
-        (load_fabric("satin_8"), 1e6),
+        slow(load_fabric("satin_8"), 1e6),
         (irregular(8, seed=4, width=1.0), 1.3e6),
         slow(irregular(8, seed=4, width=0.8), 2e6),
     ],

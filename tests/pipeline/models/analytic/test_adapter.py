@@ -4,7 +4,6 @@ import pytest
 from pipeline.models.analytic.map_material import MapMaterialOptions
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodesOptions
-from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.models.method import Method
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -12,13 +11,12 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 DENIM = load_fabric("denim")
-BEHIND, BENT = ({"behind": 0.5}, "light from the viewer's side"), ({"curvature": (0.1, 0.5)}, "flat cloth")
+BENT = {"curvature": (0.1, 0.5)}, "flat cloth"
 # 128 x 128 texels of 16 bytes, or 64 x 64 of 27 numbers, and all coarser ones.
 CASES = [
     (MapMaterialOptions(size=128), "", sum(4**level for level in range(8)) * 16, [BENT]),
     (PrefilteredOptions(), "", sum(4**level for level in range(7)) * 27 * 4, [BENT]),
     (SoftNodesOptions(levels=[1]), "k = 1", None, []),
-    (SummedAreaOptions(clusters=[16]), "k = 16", None, [BEHIND, BENT]),
 ]
 
 

@@ -47,6 +47,7 @@ def test_highlights_have_the_energy_of_the_truth(name):
     assert 0.8 < highlights / reflectance(cloth).specular.sum() < 1.0
 
 
+@pytest.mark.slow
 def test_an_even_sky_is_not_made_brighter_and_the_size_of_maps_is_checked():
     cloth, (method,) = load_fabric("denim"), load_methods(MapMaterialOptions(size=128))
     for angle in (0.0, 1.4):

@@ -14,7 +14,6 @@ from pipeline.models.analytic.map_material import MapMaterialOptions
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.models.analytic.summed_area import SummedAreaOptions
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.geometry.pieces import reference_plane
@@ -187,7 +186,6 @@ def test_points_along_view_rays_converge_to_the_truth(kind):
 
 
 TABLES = {
-    "summed_area": partial(SummedAreaOptions, clusters=[64]),
     "prefiltered": PrefilteredOptions,
     "map_material": partial(MapMaterialOptions, size=128),
 }
@@ -203,9 +201,6 @@ def rays_and_plane(name):
 @pytest.mark.parametrize(
     ("name", "fabric", "most", "ratio"),
     [
-        slow("summed_area", woven("denim"), 0.05, 1.3),
-        slow("summed_area", woven("satin_8"), 0.07, 4.0),
-        slow("summed_area", LOPSIDED, 0.08, 1.3),
         ("prefiltered", woven("silk_shantung"), 0.35, 1.2),
         ("map_material", woven("silk_shantung"), 0.45, 1.1),
     ],
@@ -232,18 +227,3 @@ def test_neither_wide_footprints_nor_views_from_above_see_parallax(name):
     np.testing.assert_array_equal(rays.predict(fabric, above), plane.predict(fabric, above))
     np.testing.assert_allclose(rays.predict(fabric, wide), plane.predict(fabric, wide), rtol=1e-5, atol=1e-9)
     assert not np.allclose(rays.predict(fabric, narrow), plane.predict(fabric, narrow), rtol=0.05)
-
-
-def test_close_ups_are_as_bright_as_wide_views():
-    """Pieces of an integral over view rays add up to it: 256 places of a repeat; walls take 3 % of it at most.
-
-    Without parallax the mean of close-ups is .86 of the wide view at 60 degrees on such cloth, or .96.
-    """
-    fabric, light, viewer = woven("wool_gabardine"), direction(30.0, 200.0), direction(60.0, 20.0)
-    rays, _ = rays_and_plane("summed_area")
-    ends, picks = fabric.weave.repeat
-    u, v = ((np.arange(16) + 0.5) / 16 * extent for extent in (ends, picks))
-    near = equal_queries(light, viewer, sigma=0.15, rows=256)
-    near = near._replace(u=np.float32(np.tile(u, 16)), v=np.float32(np.repeat(v, 16)))
-    wide = rays.predict(fabric, equal_queries(light, viewer, sigma=16.0))[0].sum()
-    assert abs(rays.predict(fabric, near).sum(axis=1).mean() / wide - 1.0) < 0.05

@@ -9,7 +9,6 @@ from pipeline.models.analytic.soft_nodes import SoftNodes, SoftNodesOptions
 from pipeline.models.registry import load_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
 from tests.pipeline.models.against_truth import colour_error, truth_of
-from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
@@ -24,8 +23,9 @@ def test_each_level_is_its_sums_in_chunks():
         assert method.bytes_stored(fabric) == nbytes(table)
 
 
-@pytest.mark.parametrize("sigma", [(0.06, 0.3), slow((0.3, 1.5))])
-@pytest.mark.parametrize("name", ["cotton_twill", slow("wool_gabardine")])
+@pytest.mark.slow
+@pytest.mark.parametrize("sigma", [(0.06, 0.3), (0.3, 1.5)])
+@pytest.mark.parametrize("name", ["cotton_twill", "wool_gabardine"])
 def test_curved_cloth_is_as_near_to_the_truth_as_flat_cloth(name, sigma):
     """Views or lights beyond 70 degrees; left out, curvature would be more than a tenth of the squared error."""
     fabric, method = load_fabric(name), SoftNodes()

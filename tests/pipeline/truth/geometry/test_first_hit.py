@@ -8,6 +8,7 @@ from pipeline.truth.geometry.heightfield import GAP, height_field, surface_at
 from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.pieces import reference_plane
 from tests.pipeline.truth.cloths import LOPSIDED, cylinders, direction, woven
+from tests.presets import slow
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at as oracle
 
@@ -30,7 +31,7 @@ def _marched(fabric, x, y, towards, start, lowest):
 
 
 @pytest.mark.parametrize("fabric", [LOPSIDED, woven("silk_charmeuse"), woven("voile")], ids=["narrow", "satin", "open"])
-@pytest.mark.parametrize(("degrees", "curvature"), [(20.0, 0.0), (55.0, 0.0), (80.0, 0.0), (80.0, 0.1)])
+@pytest.mark.parametrize(("degrees", "curvature"), [(20.0, 0.0), slow(55.0, 0.0), slow(80.0, 0.0), (80.0, 0.1)])
 def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
     field = height_field(fabric)
     random = np.random.default_rng(int(degrees))

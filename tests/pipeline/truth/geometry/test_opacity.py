@@ -10,6 +10,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from tests.pipeline.truth.cloths import CORDUROY, fixed, woven
 from tests.pipeline.truth.geometry.marches import leaves
+from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.surface import GAP, surface_at
@@ -138,7 +139,7 @@ def test_limits_known_without_sampling():
 
 
 @pytest.mark.parametrize(
-    ("width", "curvature", "depth"), [(0.8, 0.0, 2.5), (0.8, 0.01, 312.0), (0.1, 1.0, 0.03), (0.1, 1.0, 0.12)]
+    ("width", "curvature", "depth"), [(0.8, 0.0, 2.5), slow(0.8, 0.01, 312.0), slow(0.1, 1.0, 0.03), (0.1, 1.0, 0.12)]
 )
 def test_gaps_let_rays_through(width, curvature, depth):
     """Narrow yarns against a march through yarns with two sides, per ray, and their share of a patch. `depth` says how

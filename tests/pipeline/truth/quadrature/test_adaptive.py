@@ -12,7 +12,6 @@ from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows, quadrature_rows
 from pipeline.truth.quadrature.rules import rectangles
 from tests.pipeline.truth.cloths import answering, direction, equal_queries, fixed, woven
-from tests.presets import slow
 from weaves.fabric import load_fabric
 
 CUT, NEVER = 2, 9  # level from which on lines are cut; the second is never reached
@@ -111,10 +110,10 @@ def test_cutting_lines_at_shadow_edges_pays():
     assert used.mean() < 8192 * 1.1 and first < 0.5 * second
 
 
-@pytest.mark.parametrize("rows", [5, slow(100)])
-def test_stated_bounds_cover_the_true_error(rows):
+@pytest.mark.slow
+def test_stated_bounds_cover_the_true_error():
     """The norm of the bounds covers that of the true errors in 95 % of rows at least, walls left out."""
-    covered, left_out = [], TruthOptions(walls="left_out")
+    covered, rows, left_out = [], 100, TruthOptions(walls="left_out")
     for name, changes in (("polyester_lining", {}), ("satin_8", {}), ("cotton_twill", {"width": 0.7})):
         fabric = woven(name, **changes)
         queries = draw_queries(QueryOptions(max_angle=80.0), fabric.weave.repeat, 17, 0, rows)

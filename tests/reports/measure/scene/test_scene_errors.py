@@ -85,6 +85,7 @@ def measured(frames, folder):
     return found
 
 
+@pytest.mark.slow
 def test_the_same_work_gives_the_same_bytes(frames, folder):
     shoot("dinner_table", SCENES, folder / "again.npz")
     assert (folder / "again.npz").read_bytes() == (folder / "dinner_table.npz").read_bytes()
