@@ -108,6 +108,16 @@ def test_a_killed_training_on_rows_that_stay_in_their_shards_goes_on_to_the_same
     assert contents(tmp_path / "resumed") == contents(tmp_path / "whole")
 
 
+def test_no_bit_depends_on_the_threads_of_the_process(folder, tmp_path, whole):
+    before = torch.get_num_threads()
+    torch.set_num_threads(before + 3)
+    try:
+        train(WOVEN, SHORT, folder, FABRICS["woven"], tmp_path)
+    finally:
+        torch.set_num_threads(before)
+    assert contents(tmp_path) == contents(whole("woven"))
+
+
 def test_a_network_from_outside_learns_and_answers(folder, theirs, whole):
     out = whole("theirs")
     (method,) = load_methods(theirs(), [out])
