@@ -1,7 +1,7 @@
 """A horizon map of the repeat: the horizons at a grid of nodes on every piece of yarn.
 
-Every piece of yarn that is seen from above in a cell is one block of GRID x GRID nodes, evenly spaced in the angle v
-across the yarn and evenly along it; cells that a translation of the cloth carries into one another share their blocks.
+Every piece of yarn that is seen from above in a cell is one block of nodes, as many across the yarn, evenly spaced in
+the angle v, as along it; cells that a translation of the cloth carries into one another share their blocks.
 A node holds the sine of its horizon's elevation for evenly spaced azimuths, as in Max's horizon maps (1988).
 """
 

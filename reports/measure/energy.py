@@ -1,7 +1,7 @@
 """Energy of the processor, where Linux lets it be read: that of all packages, cores that do nothing included.
 
-The counters are those of RAPL, which renew each millisecond and begin again at their range. Most systems let only the
-administrator read them, and most virtual machines nobody. Memory and GPUs are not part of it.
+The counters are those of RAPL, which begin again at their range. Some systems let only the administrator read them, and
+some machines have none. GPUs are not part of it.
 """
 
 from __future__ import annotations

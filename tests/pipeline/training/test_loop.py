@@ -192,11 +192,7 @@ def test_the_card_tells_what_was_trained_and_how_well(whole):
     folder = whole("woven")
     card = card_in(folder)
     assert card["model"] == "woven"
-    assert card["last_bits"]["torch"] == torch.__version__ and set(card["last_bits"]) == {
-        "torch",
-        "processor",
-        "device",
-    }
+    assert card["last_bits"].keys() == {"torch", "processor", "device"}
     assert WovenOptions.model_validate(card["options"]) == WOVEN
     assert card["dataset"] == {"name": "tiny", "fingerprint": "0"}
     assert [fabric["name"] for fabric in card["fabrics"]] == FABRICS["woven"]

@@ -58,9 +58,7 @@ def test_what_answers_cost_is_measured_of_every_method_and_the_truth(dataset, po
     stored = {r.setting: r.value for r in records if r.metric == "bytes_stored" and r.method == "point_sampled"}
     assert stored == {one.setting: np.mean([one.bytes_stored(rows.fabric) for rows in dataset]) for one in methods[:2]}
     running = {(r.method, r.setting, r.threads): r.value for r in records if r.metric == "processor_time"}
-    assert running.keys() == times.keys() and all(
-        0 < seconds < 1e-2 * times[key].value for key, seconds in running.items()
-    )
+    assert running.keys() == times.keys() and all(0 < running[key] < 1e-2 * times[key].value for key in times)
     # The oracle knows denim alone: no fabric can be added to it.
     adding = [r for r in records if r.metric == "prepare_time"]
     assert [(r.method, r.setting) for r in adding] == names[:2]
