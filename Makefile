@@ -10,7 +10,7 @@ READY := .venv/installed
 # A run and its tests start many processes: compiled modules are kept, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: pictures viewer-shader gallery report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults fuzz lint budgets rooms pins wheel clean
+.PHONY: pictures viewer-shader gallery board report run list plan generate check train bench status savings readme results test tests test-all test-external test-slow faults fuzz lint budgets rooms pins wheel clean
 
 report run: $(READY)
 	@$(BIN)/twillight run $(RECIPE)
@@ -70,6 +70,10 @@ faults: $(READY)
 fuzz: $(READY)
 	for round in $$(seq 8); do OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "hypothesis and not faults" \
 		--hypothesis-profile=default || exit 1; done
+
+# reports/BOARD.md from the entries of this repository.
+board: $(READY)
+	@$(BIN)/twillight challenge board reports/entries/* --to reports/BOARD.md
 
 # A site of all presets in out/gallery: pictures, live pages, maps, samples, shaders and files. A fabric takes about a minute of one core.
 gallery: $(READY)

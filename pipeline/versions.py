@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-TRUTH: Final = 8
+TRUTH: Final = 9
 """Ground truth, its random sequences, the queries that are drawn: every shard and every picture of the truth."""
 
 TRAINING: Final = 4

@@ -14,7 +14,6 @@ import math
 
 from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.geometry.first_hit import Hit
 from pipeline.truth.geometry.heightfield import (
     AXIS_DROP,
     BEND_RADIUS,
@@ -32,7 +31,6 @@ from pipeline.truth.geometry.heightfield import (
 
 _CLOSE = 1e-5  # distance that counts as met
 _EXACT = 0.5  # distances to all tubes are exact below this
-_STEP = 0.02  # of marches over the envelope, in the plane
 
 
 @kernel
@@ -131,21 +129,6 @@ def tube_surface(
 
 
 @kernel
-def tube_above(field: HeightField, family: int, hit: Hit, z: float, wo: Float64) -> float:
-    """Return the distance along wo from a wall at height z to the first meeting with the tube of its yarn, or inf."""
-    column = hit.end if family == WARP else hit.pick
-    t = 0.5 / math.hypot(wo[0], wo[1])  # in front of the wall, where the ray is outside
-    while tube_distance(field, family, column, hit.x + t * wo[0], hit.y + t * wo[1], z + t * wo[2]) < 0.0:
-        t *= 2.0
-    while z + t * wo[2] > field.lowest - field.yarn[family, RADIUS]:
-        distance = tube_distance(field, family, column, hit.x + t * wo[0], hit.y + t * wo[1], z + t * wo[2])
-        if distance < _CLOSE:
-            return t
-        t -= distance
-    return math.inf
-
-
-@kernel
 def top_of(field: HeightField, family: int, column: int, across: float, along: float) -> float:
     """Return the height of a yarn seen from above, which goes on along its tori from float to float."""
     rho = math.sqrt(max(field.yarn[family, RADIUS] ** 2 - across * across, 0.0))
@@ -175,20 +158,3 @@ def envelope(field: HeightField, x: float, y: float) -> tuple[float, int]:
             if height > best:
                 best, which = height, family
     return best, which
-
-
-@kernel
-def envelope_met(field: HeightField, x: float, y: float, z: float, wx: float, wy: float, wz: float) -> float:
-    """Return the distance at which a ray meets the envelope; infinity if it leaves the cloth, or enters a gap."""
-    step, t = _STEP / max(math.hypot(wx, wy), _STEP), 0.0
-    while field.lowest <= z + t * wz <= field.highest + 1e-9:
-        t += step
-        height, family = envelope(field, x + t * wx, y + t * wy)
-        if family == GAP and z + t * wz < 0.0:
-            return math.inf
-        if height > z + t * wz:
-            for k in range(30):
-                height, _ = envelope(field, x + t * wx, y + t * wy)
-                t += step * 0.5 ** (k + 1) * (-1.0 if height > z + t * wz else 1.0)
-            return t
-    return math.inf

@@ -64,7 +64,7 @@ TRANSPARENCY_FACTORS: Final = {
     COARSE_TABLE: Factors(0.8, math.inf, 0.0008, 7.0),
     FINE_TABLE: Factors(0.8, math.inf, 0.0003, 10.0),
     REFINED: Factors(0.5, math.inf, 0.0007, 8.0),
-    SAMPLED: Factors(1.0, math.inf, 0.0, 6.5),
+    SAMPLED: Factors(1.0, math.inf, 0.0, 4.7),
     QUADRATURE: Factors(0.14, math.inf, 0.0003, 10.0),
     QUADRATURE_CURVED: Factors(0.14, math.inf, 0.0003, 10.0),
 }

@@ -21,7 +21,7 @@ from pipeline.truth.calibration import SAMPLED, squared_norm
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, Raw, WideQueries
 from pipeline.truth.footprint.place import BOX_SIDE, GAUSSIAN, Axis, place
 from pipeline.truth.footprint.sequences import derive, independent_pair, owen_pair, r2_pair
-from pipeline.truth.geometry.heightfield import GAP
+from pipeline.truth.geometry.heightfield import GAP, has_gaps
 from pipeline.truth.geometry.march import wrap
 from pipeline.truth.options import Limits
 from pipeline.truth.query import HIDDEN_SHARE
@@ -56,6 +56,8 @@ HIDDEN_PATIENCE: Final = 16
 
 INDEPENDENT, R2, OWEN = range(3)
 
+_CORNER: Final = 0.5
+"""Points that may pass through a gap, or may not, beyond what the spread of the randomisations says."""
 
 _EVEN: Final = 1.0
 """Both axes of a Gaussian of so many repeats cover the repeat evenly, to 4e-16."""
@@ -190,6 +192,9 @@ def sample_rows(
             for c in range(4):
                 # One more visible point may show what none has shown so far.
                 error[c] = math.hypot(error[c], math.sqrt(size) / max(visible, 1))
+            if has_gaps(cloth.front):
+                # Stratified points may all agree on a gap whose corner none of them has met.
+                error[4] = math.hypot(error[4], _CORNER / (done * RANDOMISATIONS))
             if size == 0.0:
                 # So many points without light: a share of 1 / count may have been missed.
                 error[2] = error[3] = abs(directions.light.z) / (math.pi * done * RANDOMISATIONS)

@@ -102,11 +102,11 @@ class Calibration:
 
     @property
     def holds(self) -> bool:
-        """True unless errors of the components are not calibrated, or beyond their bounds."""
-        values = 4 * self.count
-        beyond = stats.binomtest(round(self.exceeded * values), values, EXCEEDED, alternative="greater")
+        """True unless errors of the components are not calibrated, or too many errors are beyond their bounds."""
         low, high = (self.ratio if end is None else end for end in (self.low, self.high))
-        return low <= RATIOS[1] and high >= RATIOS[0] and float(beyond.pvalue) > 1.0 - _LEVEL
+        shares = (self.exceeded, 4 * self.count), (self.exceeded_through, self.count)
+        tests = [stats.binomtest(round(share * n), n, EXCEEDED, alternative="greater") for share, n in shares]
+        return low <= RATIOS[1] and high >= RATIOS[0] and min(test.pvalue for test in tests) > 1.0 - _LEVEL
 
 
 def measure(

@@ -1,4 +1,4 @@
-"""Whole yarns, the reference of `tests/fits/measure_walls.py`: against the height field of floats, and in Mitsuba."""
+"""Whole yarns: against the height field of floats, and in Mitsuba."""
 
 import math
 

@@ -8,11 +8,8 @@ with at least `LEAST` answers, and the cover k that `SHARE` of the errors of eac
 triples whose ratios are closest to 1 in the worst class, narrow bounds preferred. Single queries dominate a ratio:
 differences below a fifth between classes are chance.
 
-The factors in use lie between the best triples of this grid on two other sets of random fabrics (reports/LOG.md). This
-script itself was not run yet. Factors of tables in front of the cloth were lowered by a twentieth after the seed 1000
-had shown a ratio of .79 for `auto` on solid cloth. Those of refined answers were raised by 1.3 after six presets (600
-queries each, 1 %) had shown a ratio of 1.33 for 280 of them, when nodes were first cut; the slow test of
-reports.truth.calibration then held on other fabrics.
+The factors in use lie between the best triples of this grid on two other sets of random fabrics; reports/LOG.md says
+which were changed since, and why.
 """
 
 from __future__ import annotations

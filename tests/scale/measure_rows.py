@@ -4,12 +4,12 @@ Command: ``PYTHONPATH=. python tests/scale/measure_rows.py [--rows 100000 --rows
 
 The rows are training rows of one plain fabric, answered by 64 points each, which costs a hundredth of what real rows
 cost, in shards of the default size. Each step is a process of its own: `twillight generate`, `twillight check`, and the
-reading of a training up to its first batch. Printed for each: seconds of the clock and (in brackets) of processor time,
-the peak memory of the largest process (resident set, pages of mapped files included), and the most files that one
-process had open; for the reading, the same two times from its start to the first batch, imports left out.
+reading of a training: its first batch and 1,000 more. Printed for each: seconds of the clock and (in brackets) of
+processor time, the peak memory of the largest process (resident set, pages of mapped files included), and the most
+files that one process had open; for the reading, the same two times of the first batch, imports left out.
 
-With ``--links 100`` only the reading is measured, of so many shards of 10^6 rows that are links to one file: also the
-times of a thousand batches.
+With ``--links 100`` only the reading is measured, of so many shards of 10^6 rows that are links to one file; with
+``--dataset FOLDER`` that of a data set.
 """
 
 from __future__ import annotations
@@ -37,22 +37,6 @@ truth = {{ estimator = "owen", relative_error = 0.5, min_count = 64, max_count =
 model = "neumip"
 """
 SECONDS_BETWEEN_LOOKS = 0.2
-
-
-def read(folder: Path) -> None:
-    """Read a data set as a training does, and print the seconds to the first batch."""
-    import torch
-
-    from pipeline.shards.manifest import Manifest
-    from pipeline.training.dataset import Batches, Order, load_rows
-
-    Manifest.load(folder)  # imports what it needs
-    start, cpu = time.perf_counter(), time.process_time()
-    rows = load_rows(Manifest.load(folder), folder, ["polyester_lining"], folder.parents[1] / "rows.npy")
-    batch = Batches(rows, Order(rows.windows, 4096, 1, 0), torch.device("cpu")).step(0)
-    assert batch.u.shape == (1, 4096)
-    wall, cpu = time.perf_counter() - start, time.process_time() - cpu
-    print(f"{wall:.1f} ({cpu:.1f})")
 
 
 FABRICS = ["denim", "satin_8", "gauze", "organza", "herringbone", "silk_charmeuse", "basket", "houndstooth"]
@@ -85,20 +69,21 @@ def write_links(folder: Path, shards: int, rows: int = 10**6) -> None:
     )
 
 
-def read_links(folder: Path) -> None:
-    """Read the first batch and a thousand more of 8,192 rows; print seconds and memory."""
+def read(folder: Path) -> None:
+    """Read the first batch of a training and a thousand more, of 8,192 rows; print seconds and memory."""
     import torch
 
     from pipeline.shards.manifest import Manifest
     from pipeline.training.dataset import Batches, Order, load_rows
 
-    Manifest.load(folder)  # imports what it needs
+    fabrics = list(Manifest.load(folder).fabrics)  # imports what it needs
     for first, last in ((0, 1), (1, 1001)):
         wall, cpu = time.perf_counter(), time.process_time()
         if first == 0:
-            rows = load_rows(Manifest.load(folder), folder, FABRICS, folder / "rows.npy")
+            with tempfile.TemporaryDirectory() as cache:
+                rows = load_rows(Manifest.load(folder), folder, fabrics, Path(cache) / "rows.npy")
             rows.spread(2**16)
-            batches = Batches(rows, Order(rows.windows, 8192, len(FABRICS), 0), torch.device("cpu"))
+            batches = Batches(rows, Order(rows.windows, 8192, len(fabrics), 0), torch.device("cpu"))
         for step in range(first, last):
             batches.step(step)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
@@ -133,12 +118,12 @@ def main(
 ) -> None:
     """Measure each number of rows and print a table; with a data set, only read it."""
     if dataset:
-        (read_links if links else read)(dataset)
+        read(dataset)
         return
     if links:
         with tempfile.TemporaryDirectory() as name:
             write_links(Path(name), links)
-            subprocess.run([sys.executable, __file__, "--dataset", name, "--links", "1"], check=True)
+            subprocess.run([sys.executable, __file__, "--dataset", name], check=True)
         return
     print("| rows | step | seconds | memory | files | first batch |\n|---|---|---|---|---|---|")
     for count in rows:
@@ -152,7 +137,7 @@ def main(
                 if step == "read":
                     command = [sys.executable, __file__, "--dataset", str(next(out.glob("datasets/*")))]
                 cells, said = watched(command)
-                first = said[-1] if step == "read" else ""
+                first = said[0] if step == "read" else ""
                 print(f"| {count:,} | {step} | {' | '.join(cells)} | {first} |", flush=True)
 
 

@@ -35,9 +35,7 @@ from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import ClothSide, cloth_side
 from pipeline.truth.geometry.heightfield import (
     GAP,
-    HALF_LENGTH,
     RADIUS,
-    TOP,
     WARP,
     WEFT,
     HeightField,
@@ -82,8 +80,6 @@ class SoftNodeTable(NamedTuple):
     """`HeightField.yarn`, (2, 8)."""
     thickness: np.float32
     """Optical thickness T."""
-    float_length: Float32
-    """Mean length of the floats of each family over the cells that show them; 1 if none does, (2,)."""
     uniform: float
     """Deviation from which on a Gaussian covers the cloth evenly."""
     starts: Index
@@ -210,7 +206,6 @@ def tabulate(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
-        float_length=_float_lengths(front),
         uniform=EVEN * (max(ends, picks) if by_thread else longest_period(front)),
         starts=np.array(starts, np.int64),
         kinds=np.array(kinds, np.int64),
@@ -385,13 +380,6 @@ def _rules(group: PieceGroup) -> tuple[Rule, Rule]:
 def _bounds(piece: CellPiece) -> tuple[float, ...]:
     x, y = piece.box
     return (*x, *y, piece.offset, piece.sign * piece.curve, min(piece.steepest, LARGEST_SINE))
-
-
-def _float_lengths(front: HeightField) -> Float32:
-    # A float that never ends counts as long as the repeat.
-    longest = ((family, 0.5 * front.top.shape[family]) for family in (WARP, WEFT))
-    shown = [np.minimum(front.floats[front.top == family, TOP, HALF_LENGTH], most) for family, most in longest]
-    return np.array([2.0 * own.mean() if own.size else 1.0 for own in shown], np.float32)
 
 
 def _grid_places(samples: list[tuple[int, int, CellPiece]], size: int) -> tuple[Float64, Float64, Mask]:

@@ -36,7 +36,7 @@ from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import component_error, perceptron, to_components, to_network
 from pipeline.models.networks.texture import LAYERS, TextureNetwork, level_shapes, random_pyramid
 from pipeline.truth.cloth import cloth_side
-from pipeline.truth.geometry.opacity import has_gaps
+from pipeline.truth.geometry.heightfield import has_gaps
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput

@@ -97,6 +97,12 @@ def _rise(side: int, rows: Float64, radius: float) -> Float64:
 
 
 @kernel
+def has_gaps(field: HeightField) -> bool:
+    """Return whether there are points that no yarn covers."""
+    return bool(field.yarn[WARP, RADIUS] < 0.5 and field.yarn[WEFT, RADIUS] < 0.5)
+
+
+@kernel
 def torus_height(yarn: Float64, own: Float64, x: float, y: float) -> tuple[float, float, float]:
     """Return height and its slopes along local x and y, for a float on top; |x| <= r.
 

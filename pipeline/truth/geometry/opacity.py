@@ -26,7 +26,7 @@ from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, owen_pair
-from pipeline.truth.geometry.heightfield import GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
+from pipeline.truth.geometry.heightfield import GAP, UNDER, HeightField, has_gaps, surface_at
 from pipeline.truth.geometry.march import Ray, ray, wrap
 from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.monte_carlo import RANDOMISATIONS, place_point
@@ -94,12 +94,6 @@ def _passes(front: HeightField, back: HeightField, x: float, y: float, towards: 
     x, y = x + length * dx, y + length * dy
     empty, _ = _open_at(front, x, y)
     return empty and visible(front, wrap(x, ends), wrap(y, picks), 0.0, UNDER, onward)
-
-
-@kernel
-def has_gaps(field: HeightField) -> bool:
-    """Return whether there are points that no yarn covers."""
-    return bool(field.yarn[WARP, RADIUS] < 0.5 and field.yarn[WEFT, RADIUS] < 0.5)
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.truth.cloth import ClothSide
-from pipeline.truth.geometry.heightfield import BLEND
+from pipeline.truth.geometry.heightfield import BLEND, RADIUS, WARP, WEFT
 from pipeline.truth.node_table.build import ExactNodes
 from pipeline.truth.node_table.displaced import DensityRoom, read_density
 from pipeline.truth.node_table.kernels import (
@@ -78,8 +78,8 @@ def sum_walls(
         if b > a:
             _write_seen_deep(
                 first[:, a:b], second[:, a:b], walls.passing[viewer.first, :, a:b],
-                walls.passing[viewer.second, :, a:b], viewer, walls.places[2, a:b], walls.height[a:b],
-                room.seen[a:b], room.places[2, a:b],
+                walls.passing[viewer.second, :, a:b], viewer, walls.places[:, a:b], walls.height[a:b],
+                cloth.front.yarn[:, RADIUS], room.seen[a:b], room.places[2, a:b],
             )  # fmt: skip
     weight = walls.evenly
     if points > 0:
@@ -142,25 +142,33 @@ def _write_seen_deep(
     passing: Float32,
     passing_second: Float32,
     viewer: Direction,
-    top: Float32,
+    places: Float32,
     height: Float32,
+    radius: Float64,
     seen: Float32,
     middle: Float32,
 ) -> None:
-    """Do the same for deep walls, which end where rays pass."""
+    """Do the same for deep walls, which end where rays pass: those that clear the back and cross the plane in a gap.
+
+    `places` are those of the tops, (3, W), `radius` half the width of warps and of wefts.
+    """
     for k in range(len(seen)):
-        total, deepest = _0, _0
+        total, deepest, top = _0, _0, places[2, k]
         for side in range(2):
             own, free = (first, passing) if side == 0 else (second, passing_second)
             share = viewer.turn if side == 1 else _1 - viewer.turn
             for h in range(HEIGHTS - 1):
                 clear = (viewer.slope - own[h, k]) / max(own[h + 1, k] - own[h, k], _STEP)
                 met = (free[h, k] - viewer.slope) / max(free[h, k] - free[h + 1, k], _STEP)
+                back = (height[k] * _OF_STEPS * (np.float32(h) + _HALF) - top) / viewer.z
+                x, y = places[0, k] + back * viewer.x, places[1, k] + back * viewer.y
+                if min(abs(x - math.floor(x) - 0.5) - radius[WARP], abs(y - math.floor(y) - 0.5) - radius[WEFT]) < 0.0:
+                    met = _1
                 part = share * min(max(min(clear, met), _0), _1)
                 total += part
                 deepest += part * (np.float32(h) + _HALF)
         seen[k] = height[k] * _OF_STEPS * total
-        middle[k] = top[k] - height[k] * _OF_STEPS * deepest / max(total, _STEP)
+        middle[k] = top - height[k] * _OF_STEPS * deepest / max(total, _STEP)
 
 
 @fast_kernel

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy import stats
 
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.calibration import FRONT_FACTORS, SAMPLED, calibrate
@@ -37,3 +38,13 @@ def test_a_component_that_no_point_has_shown_has_an_error():
     unseen = (raw.mean[:, :4] == 0.0) & (size > 0.0)
     assert unseen.sum() > 20
     assert (raw.error[:, :4] >= size / 64 * (1 - 1e-12))[unseen].all()
+
+
+def test_points_that_agree_on_a_gap_have_an_error():
+    """Four stratified points in each randomisation often agree although a corner of a gap was met by none."""
+    fabric, options = load_fabric("gauze"), fixed(64, "owen")
+    queries = draw_queries(QueryOptions(sigma=(0.05, 0.3), max_angle=60.0), fabric.weave.repeat, 5, 0, 400)
+    answers, exact = estimate(fabric, queries, options, 1), estimate(fabric, queries, fixed(4096, "owen"), 3)
+    wrong = np.abs(answers.transparency - exact.transparency)
+    beyond = wrong > answers.transparency_bound + 3.0 * exact.transparency_standard_error
+    assert stats.binomtest(int(beyond.sum()), len(wrong), 0.003, alternative="greater").pvalue > 0.001
