@@ -178,8 +178,7 @@ def _joined(parts: Sequence[Raw]) -> Raw:
 def compared(wrong: Float64, error: Float64, bound: Float64, doubt: Float64) -> tuple[float, float]:
     """Return the ratio and the share beyond bounds of errors, all of one shape; `doubt` is that of the reference."""
     square = max(float(np.mean(wrong**2 - doubt**2)), 0.0)
-    ratio = math.sqrt(square / float(np.mean(error**2)))
-    return ratio, float(np.mean(np.abs(wrong) > bound + 3.0 * doubt))
+    return math.sqrt(square / float(np.mean(error**2))), float(np.mean(np.abs(wrong) > bound + 3.0 * doubt))
 
 
 def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, float]:

@@ -162,8 +162,7 @@ def _write_seen_deep(
                 met = (free[h, k] - viewer.slope) / max(free[h, k] - free[h + 1, k], _STEP)
                 back = (height[k] * _OF_STEPS * (np.float32(h) + _HALF) - top) / viewer.z
                 x, y = places[0, k] + back * viewer.x, places[1, k] + back * viewer.y
-                if min(abs(x - math.floor(x) - 0.5) - radius[WARP], abs(y - math.floor(y) - 0.5) - radius[WEFT]) < 0.0:
-                    met = _1
+                met = _1 if min(abs(x % 1.0 - 0.5) - radius[WARP], abs(y % 1.0 - 0.5) - radius[WEFT]) < 0.0 else met
                 part = share * min(max(min(clear, met), _0), _1)
                 total += part
                 deepest += part * (np.float32(h) + _HALF)
