@@ -154,15 +154,14 @@ def _write_seen_deep(
     """
     for k in range(len(seen)):
         total, deepest, top = _0, _0, places[2, k]
-        for side in range(2):
-            own, free = (first, passing) if side == 0 else (second, passing_second)
-            share = viewer.turn if side == 1 else _1 - viewer.turn
+        for own, free, share in ((first, passing, _1 - viewer.turn), (second, passing_second, viewer.turn)):
             for h in range(HEIGHTS - 1):
                 clear = (viewer.slope - own[h, k]) / max(own[h + 1, k] - own[h, k], _STEP)
                 met = (free[h, k] - viewer.slope) / max(free[h, k] - free[h + 1, k], _STEP)
-                back = (height[k] * _OF_STEPS * (np.float32(h) + _HALF) - top) / viewer.z
-                x, y = places[0, k] + back * viewer.x, places[1, k] + back * viewer.y
-                met = _1 if min(abs(x % 1.0 - 0.5) - radius[WARP], abs(y % 1.0 - 0.5) - radius[WEFT]) < 0.0 else met
+                if clear > _0 and met < _1:
+                    back = (height[k] * _OF_STEPS * (np.float32(h) + _HALF) - top) / viewer.z
+                    x, y = places[0, k] + back * viewer.x, places[1, k] + back * viewer.y
+                    met = _1 if min(abs(x % 1.0 - 0.5) - radius[WARP], abs(y % 1.0 - 0.5) - radius[WEFT]) < 0.0 else met
                 part = share * min(max(min(clear, met), _0), _1)
                 total += part
                 deepest += part * (np.float32(h) + _HALF)
