@@ -49,7 +49,7 @@ def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int)
     for orbit in orbits(field):
         pick, end = orbit[0]
         # One horizon will do for all gaps of a cell: the first one's, so that it comes last here.
-        for slot, piece in {slot_of(piece): piece for piece in reversed(cell_pieces(field, pick, end))}.items():
+        for slot, piece in {_slot_of(piece): piece for piece in reversed(cell_pieces(field, pick, end))}.items():
             for p, e in orbit:
                 blocks[p, e, slot] = len(xs) * size
             x, y = _nodes(piece, grid)
@@ -63,7 +63,7 @@ def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int)
     return HorizonMap(blocks.ravel(), horizon, grid, azimuths)
 
 
-def slot_of(piece: CellPiece) -> int:
+def _slot_of(piece: CellPiece) -> int:
     """Return which of the SLOTS of its cell a piece is."""
     if piece.family == GAP:
         return 3

@@ -27,8 +27,7 @@ from pipeline.truth.options import Limits
 from pipeline.truth.query import HIDDEN_SHARE
 from pipeline.truth.scattering.point import Directions, directions_of, point_share, ray_share
 
-_CERTAIN: Final = 0.001
-"""Probability of a wrong decision that is not worth more points."""
+_CERTAIN: Final = 0.001  # probability of a wrong decision that is not worth more points
 
 
 @kernel
@@ -56,11 +55,9 @@ HIDDEN_PATIENCE: Final = 16
 
 INDEPENDENT, R2, OWEN = range(3)
 
-_CORNER: Final = 0.5
-"""Points that may pass through a gap, or may not, beyond what the spread of the randomisations says."""
+_CORNER: Final = 0.5  # points that may pass through a gap or not, beyond what the randomisations' spread says
 
-_EVEN: Final = 1.0
-"""Both axes of a Gaussian of so many repeats cover the repeat evenly, to 4e-16."""
+_EVEN: Final = 1.0  # repeats: a Gaussian with both axes as wide covers the repeat evenly, to 4e-16
 
 
 @inlined_kernel

@@ -66,7 +66,7 @@ def cases_of(queries: Queries) -> Index:
 
 
 @kernel
-def write_terms(queries: Queries, n: int, terms: Float32) -> None:
+def _write_terms(queries: Queries, n: int, terms: Float32) -> None:
     """Write the terms of query n, (TERMS,)."""
     sigma, minor = queries.sigma[n], queries.sigma_minor[n]
     size = min(max(_HALF * np.log(sigma * minor), _SMALLEST), _LARGEST)
@@ -87,7 +87,7 @@ def write_terms(queries: Queries, n: int, terms: Float32) -> None:
 def _write_logarithms(queries: Queries, cases: Index, coefficients: Float32, terms: Float32, result: Float32) -> None:
     """Write the logarithms of the mean squared errors of N queries, (N, answers)."""
     for n in range(len(result)):
-        write_terms(queries, n, terms)
+        _write_terms(queries, n, terms)
         own, place = coefficients[cases[n]], TERMS
         for end in SIZES:
             place += int(terms[1] > end)
@@ -121,7 +121,7 @@ def terms_of(queries: Queries) -> Float32:
 @kernel
 def _write_all_terms(queries: Queries, result: Float32) -> None:
     for n in range(len(result)):
-        write_terms(queries, n, result[n])
+        _write_terms(queries, n, result[n])
 
 
 def coefficients_of(fabric: Fabric, behind: bool) -> Float32:

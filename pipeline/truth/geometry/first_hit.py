@@ -20,17 +20,16 @@ from pipeline.truth.geometry.march import (
     Ray,
     first_cell,
     float_on_top,
-    height_along,
     next_cell,
     span_on_top,
     span_over,
     wrap,
 )
+from pipeline.truth.geometry.visibility import above, over_strip
 
 ON_YARN, ON_WALL, MISSED = 0, 1, 2
 """Ends of a ray."""
 
-_STRIP_POINTS = 16
 _MAX_CELLS = 100_000
 _NEWTON_STEPS = 60
 _HALVINGS = 48
@@ -79,28 +78,18 @@ def _level_at(towards: Ray, height: float) -> float:
 
 
 @inlined_kernel
-def _above(
-    field: HeightField, side: int, x: float, y: float, z: float, towards: Ray, distance: float, cell: Cell
-) -> tuple[float, float]:
-    """Return how far a piece of a cell is above the ray at a distance, and how fast that grows."""
-    height, slope = height_along(field, side, x, y, towards, distance, cell)
-    altitude = z + distance * (towards.rise + 0.5 * towards.bend * distance)
-    return height - altitude, slope - (towards.rise + towards.bend * distance)
-
-
-@inlined_kernel
 def _meets_top(
     field: HeightField, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
 ) -> float:
     """Return the distance at which a ray above the top piece of a cell at `start` meets it; more than `stop`: never."""
     s = start
     for _ in range(_NEWTON_STEPS):
-        above, growth = _above(field, TOP, x, y, z, towards, s, cell)
-        if above >= 0.0:
+        over, growth = above(field, TOP, x, y, z, towards, s, cell)
+        if over >= 0.0:
             return s
         if growth <= 0.0:
             return math.inf
-        step = -above / growth
+        step = -over / growth
         s += step
         if s > stop:
             return math.inf
@@ -114,22 +103,14 @@ def _meets_strip(
     field: HeightField, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
 ) -> float:
     """Return the same for the yarn beneath, whose height is not concave; meetings are sought between points."""
-    before = start
-    for k in range(1, _STRIP_POINTS):
-        s = start + (stop - start) * k / (_STRIP_POINTS - 1.0)
-        above, _ = _above(field, UNDER, x, y, z, towards, s, cell)
-        if above > 0.0:
-            low, high = before, s
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                above, _ = _above(field, UNDER, x, y, z, towards, middle, cell)
-                if above > 0.0:
-                    high = middle
-                else:
-                    low = middle
-            return high
-        before = s
-    return math.inf
+    low, high = over_strip(field, x, y, z, towards, start, stop, 1, cell)
+    if high == math.inf:
+        return high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        over, _ = above(field, UNDER, x, y, z, towards, middle, cell)
+        low, high = (low, middle) if over > 0.0 else (middle, high)
+    return high
 
 
 @inlined_kernel
@@ -141,8 +122,8 @@ def _ends_in(
         start, stop = span_over(field, 1 - int(field.top[cell.pick, cell.end]), x, y, towards, start, stop, cell)
     if stop <= start:
         return MISSED, 0.0
-    above, _ = _above(field, side, x, y, z, towards, start, cell)
-    if above > _LEVEL:
+    over, _ = above(field, side, x, y, z, towards, start, cell)
+    if over > _LEVEL:
         return ON_WALL, start
     if side == TOP:
         s = _meets_top(field, x, y, z, towards, start, stop, cell)

@@ -6,7 +6,7 @@ falls from the start, or rises to the end, has its greatest value there; two tan
 nothing in between reaches it. What remains is narrowed by the tangent at the meeting point. On a cylinder the base
 falls away under the ray by kappa s^2 / 2 [Kuznetsov2022Curved], which bends the ray up and keeps all of this true. The
 float that a ray starts on cannot hide it: its surface is concave and the ray leaves above its tangent plane. Strips
-where a narrow yarn lets the one beneath show are not concave; they are searched at `_STRIP_POINTS` points.
+where a narrow yarn lets the one beneath show are not concave: points are tested, then uphill from the highest of them.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from pipeline.truth.geometry.march import (
     span_over,
 )
 
-_STRIP_POINTS = 16
+_STRIP_POINTS = 8
 _MAX_CELLS = 100_000  # a ray this long is as good as parallel to the cloth
 _NARROWINGS = 40
+_UPHILL_STEPS = 8
 
 
 @inlined_kernel
@@ -38,19 +39,25 @@ def _altitude(z: float, towards: Ray, distance: float) -> float:
 
 
 @inlined_kernel
+def above(
+    field: HeightField, side: int, x: float, y: float, z: float, towards: Ray, distance: float, cell: Cell
+) -> tuple[float, float]:
+    """Return how far a piece of a cell is above the ray at a distance, and how fast that grows."""
+    height, slope = height_along(field, side, x, y, towards, distance, cell)
+    return height - _altitude(z, towards, distance), slope - (towards.rise + towards.bend * distance)
+
+
+@inlined_kernel
 def _piece_blocks(
     field: HeightField, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
 ) -> bool:
     """Return whether the top piece of a cell reaches the ray between distances `start` and `stop`."""
-    rise, bend = towards.rise, towards.bend
-    low, low_slope = height_along(field, TOP, x, y, towards, start, cell)
-    low, low_slope = low - _altitude(z, towards, start), low_slope - (rise + bend * start)
+    low, low_slope = above(field, TOP, x, y, z, towards, start, cell)
     if low > 0.0:
         return True
     if low_slope <= 0.0:
         return False
-    high, high_slope = height_along(field, TOP, x, y, towards, stop, cell)
-    high, high_slope = high - _altitude(z, towards, stop), high_slope - (rise + bend * stop)
+    high, high_slope = above(field, TOP, x, y, z, towards, stop, cell)
     if high > 0.0:
         return True
     if high_slope >= 0.0:
@@ -63,8 +70,7 @@ def _piece_blocks(
         # Near a yarn's edge a tangent is vertical and meets at the end itself: stay inside.
         width = stop - start
         meet = min(max(meet, start + 0.125 * width), stop - 0.125 * width)
-        middle, slope = height_along(field, TOP, x, y, towards, meet, cell)
-        middle, slope = middle - _altitude(z, towards, meet), slope - (rise + bend * meet)
+        middle, slope = above(field, TOP, x, y, z, towards, meet, cell)
         if middle > 0.0:
             return True
         if slope > 0.0:
@@ -75,21 +81,42 @@ def _piece_blocks(
 
 
 @inlined_kernel
+def over_strip(
+    field: HeightField, x: float, y: float, z: float, towards: Ray, start: float, stop: float, first: int, cell: Cell
+) -> tuple[float, float]:
+    """Return distances at which the yarn beneath is below and above the ray, the latter infinity if it never is.
+
+    `first` is 0 or 1: whether the start counts.
+    """
+    step = (stop - start) / (_STRIP_POINTS - 1.0)
+    highest, best = -math.inf, start
+    for k in range(first, _STRIP_POINTS):
+        s = start + step * k
+        over, _ = above(field, UNDER, x, y, z, towards, s, cell)
+        if over > 0.0:
+            return max(s - step, start), s
+        if over > highest:
+            highest, best = over, s
+    _, uphill = above(field, UNDER, x, y, z, towards, best, cell)
+    # A sliver may lie between two points.
+    low, high = (best, min(best + step, stop)) if uphill > 0.0 else (max(best - step, start), best)
+    for _ in range(_UPHILL_STEPS if highest + step * abs(uphill) > 0.0 else 0):
+        s = 0.5 * (low + high)
+        over, growth = above(field, UNDER, x, y, z, towards, s, cell)
+        if over > 0.0:
+            return low, s
+        low, high = (s, high) if growth > 0.0 else (low, s)
+    return start, math.inf
+
+
+@inlined_kernel
 def _strip_blocks(
     field: HeightField, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
 ) -> bool:
-    """Return whether the yarn beneath reaches the ray between `start` and `stop`; tested at `_STRIP_POINTS` points."""
-    family = 1 - int(field.top[cell.pick, cell.end])
+    """Return whether the yarn beneath reaches the ray between `start` and `stop`."""
     # A yarn may be narrower than the distance of points along the whole way.
-    start, stop = span_over(field, family, x, y, towards, start, stop, cell)
-    if stop < start:
-        return False
-    for k in range(_STRIP_POINTS):
-        s = start + (stop - start) * k / (_STRIP_POINTS - 1.0)
-        height, _ = height_along(field, UNDER, x, y, towards, s, cell)
-        if height > _altitude(z, towards, s):
-            return True
-    return False
+    start, stop = span_over(field, 1 - int(field.top[cell.pick, cell.end]), x, y, towards, start, stop, cell)
+    return stop >= start and over_strip(field, x, y, z, towards, start, stop, 0, cell)[1] < math.inf
 
 
 @inlined_kernel

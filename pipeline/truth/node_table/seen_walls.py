@@ -148,10 +148,7 @@ def _write_seen_deep(
     seen: Float32,
     middle: Float32,
 ) -> None:
-    """Do the same for deep walls, which end where rays pass: those that clear the back and cross the plane in a gap.
-
-    `places` are those of the tops, (3, W), `radius` half the width of warps and of wefts.
-    """
+    """Do the same for deep walls below `places`, but for rays that pass: over a gap of the plane, clear of the back."""
     for k in range(len(seen)):
         total, deepest, top = _0, _0, places[2, k]
         for own, free, share in ((first, passing, _1 - viewer.turn), (second, passing_second, viewer.turn)):

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.truth.geometry.heightfield import GAP, height_field, surface_at
+from pipeline.truth.geometry.heightfield import GAP, UNDER, height_field, surface_at
 from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.visibility import visible
 from tests.directions import unit
@@ -28,6 +28,17 @@ def test_visibility_matches_a_march(name, width, degrees):
     marched = leaves(fabric, x, y, np.array([p[2] for p in points]), w, step=0.004)
     # A march misses what it steps over: it may see more than there is, by about the step's share of an edge.
     assert (exact != marched)[above].mean() < 0.005 and above.sum() > 500
+
+
+@pytest.mark.parametrize("degrees", [30.0, 50.0])
+def test_rays_that_leave_a_gap_find_the_yarn_beneath(degrees):
+    """What a march meets is there: it hides a direction, however thin the sliver of yarn."""
+    fabric, w, random = load_fabric("gauze"), unit(degrees, 20.0), np.random.default_rng(int(degrees))
+    field, half = height_field(fabric), 0.5 * (1.0 - fabric.warp.width)
+    x, y = (random.integers(0, 2, (2, 20_000)) + random.uniform(-half, half, (2, 20_000))) % 2.0
+    sees = [visible(field, a, b, 0.0, UNDER, ray(*w, 0.0)) for a, b in zip(x, y, strict=True)]
+    free = leaves(fabric, x, y, np.zeros(len(x)), w)
+    assert 0.05 < free.mean() < 0.95 and not (np.array(sees) & ~free).any()
 
 
 def test_the_normal_is_always_visible_and_a_crest_sees_the_horizon():
