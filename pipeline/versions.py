@@ -15,13 +15,13 @@ TRUTH: Final = 9
 TRAINING: Final = 4
 """The training loop and the files that it writes."""
 
-MODELS: Final[dict[str, int]] = {"curved": 2, "point_sampled": 5, "prefiltered": 2, "selvage": 10, "soft_nodes": 9}
+MODELS: Final[dict[str, int]] = {"curved": 2, "point_sampled": 6, "prefiltered": 2, "selvage": 10, "soft_nodes": 9}
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
 BOUND: Final = 2
 """How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
 
-FALLBACK: Final = 9
+FALLBACK: Final = 10
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
 SCENES: Final = 3
