@@ -9,11 +9,12 @@ from pipeline.truth.geometry.visibility import visible
 from tests.directions import unit
 from tests.pipeline.truth.cloths import woven
 from tests.pipeline.truth.geometry.marches import leaves
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
 @pytest.mark.parametrize(("name", "width"), [("denim", 1.0), ("silk_charmeuse", 1.0), ("basket", 0.8)])
-@pytest.mark.parametrize("degrees", [25.0, 55.0, 75.0])
+@pytest.mark.parametrize("degrees", [25.0, slow(55.0), 75.0])
 def test_visibility_matches_a_march(name, width, degrees):
     fabric = woven(name, width=width)
     field = height_field(fabric)
@@ -30,7 +31,7 @@ def test_visibility_matches_a_march(name, width, degrees):
     assert (exact != marched)[above].mean() < 0.005 and above.sum() > 500
 
 
-@pytest.mark.parametrize("degrees", [30.0, 50.0])
+@pytest.mark.parametrize("degrees", [slow(30.0), 50.0])
 def test_rays_that_leave_a_gap_find_the_yarn_beneath(degrees):
     """What a march meets is there: it hides a direction, however thin the sliver of yarn."""
     fabric, w, random = load_fabric("gauze"), unit(degrees, 20.0), np.random.default_rng(int(degrees))
