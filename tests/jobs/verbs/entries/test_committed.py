@@ -42,4 +42,4 @@ def test_answers_still_have_the_errors_of_their_records(count):
         errors = [own for own in errors if own.fabric]  # the others are of all named fabrics together
         assert {own.fabric for own in errors} == set(list(shard_of)[:count])
         for own in errors:
-            assert own.value == pytest.approx(stated[own.fabric, own.metric].value, rel=0.02), (folder.name, own)
+            assert own.value == pytest.approx(stated[own.fabric, own.metric].value, rel=0.01), (folder.name, own)
