@@ -86,7 +86,7 @@ def over_strip(
 ) -> tuple[float, float]:
     """Return distances at which the yarn beneath is below and above the ray, the latter infinity if it never is.
 
-    `first` is 0 or 1: whether the start counts.
+    `first` is 0 if the start counts, else 1.
     """
     step = (stop - start) / (_STRIP_POINTS - 1.0)
     highest, best = -math.inf, start
