@@ -106,7 +106,7 @@ class Calibration:
         low, high = (self.ratio if end is None else end for end in (self.low, self.high))
         shares = (self.exceeded, 4 * self.count), (self.exceeded_through, self.count)
         tests = [stats.binomtest(round(share * n), n, EXCEEDED, alternative="greater") for share, n in shares]
-        return low <= RATIOS[1] and high >= RATIOS[0] and min(test.pvalue for test in tests) > 1.0 - _LEVEL
+        return low <= RATIOS[1] and high >= RATIOS[0] and min(float(test.pvalue) for test in tests) > 1.0 - _LEVEL
 
 
 def measure(
