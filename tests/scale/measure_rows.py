@@ -137,7 +137,7 @@ def main(
                 if step == "read":
                     command = [sys.executable, __file__, "--dataset", str(next(out.glob("datasets/*")))]
                 cells, said = watched(command)
-                first = said[0] if step == "read" else ""
+                first = said[0].partition(": ")[2].partition(" s,")[0] if step == "read" else ""
                 print(f"| {count:,} | {step} | {' | '.join(cells)} | {first} |", flush=True)
 
 
