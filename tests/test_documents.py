@@ -56,10 +56,6 @@ def commands_of(path, program):
     return [shlex.split(call, comments=True)[1:] for call in calls if call.startswith(f"{program} ")]
 
 
-def by_name(path):
-    return str(path.relative_to(ROOT))
-
-
 def test_the_readme_is_one_screen_and_a_half_and_no_number_of_it_is_typed_by_hand():
     text = text_of(ROOT / "README.md")
     assert len(text) <= LONGEST_README and "Recipe `quick`" in block(text, README_BLOCK, "README.md")
@@ -113,7 +109,7 @@ def check_targets_of_make_exist(path):
 CHECKS = (check_links_and_paths_exist, check_modules_exist, check_commands_are_understood, check_targets_of_make_exist)
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=by_name)
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_what_a_document_names_exists(path):
     for check in CHECKS:
         check(path)

@@ -68,7 +68,8 @@ def repeat_mesh(fabric: Fabric, vertices_per_cell: int = 64, repeats: tuple[int,
     pieces = _pieces(fabric, vertices_per_cell)
     floor = min(float(piece.z.min()) for piece in pieces)
     cells = fabric.weave.warp_over.shape
-    walls = [_walls(pieces, cells, floor), _walls([_turned(piece) for piece in pieces], cells[::-1], floor)]
+    turned = [_Piece(p.family, p.end, p.pick, p.y, p.x, p.z.transpose(0, 2, 1)) for p in pieces]
+    walls = [_walls(pieces, cells, floor), _walls(turned, cells[::-1], floor)]
     # The second walls were found in the turned cloth, x and y swapped, which also turns every triangle over.
     walls[1] = Mesh(walls[1].vertices[:, [1, 0, 2]], walls[1].faces[:, ::-1])
     yarns = (_joined([_grids(piece) for piece in pieces if piece.family == family]) for family in (WARP, WEFT))
@@ -105,11 +106,6 @@ def _pieces(fabric: Fabric, steps: int) -> list[_Piece]:
 def _ending(places: Floats, first: float, last: float) -> Floats:
     """Return the places with exact ends, by which neighbours are known."""
     return np.concatenate([[first], places[1:-1], [last]])
-
-
-def _turned(piece: _Piece) -> _Piece:
-    """Swap x and y."""
-    return _Piece(piece.family, piece.end, piece.pick, piece.y, piece.x, piece.z.transpose(0, 2, 1))
 
 
 def _grids(piece: _Piece) -> Mesh:

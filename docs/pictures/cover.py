@@ -70,9 +70,7 @@ def parts(mi: Any) -> dict[str, Any]:
 
 
 SCENE: Final = Scene(
-    name="cover",
-    source=parts,
-    cloths={"tartan": Cloth(fabric=str(HERE / "cover.toml"), yarns=(0.75, 0.75))},
+    name="cover", source=parts, cloths={"tartan": Cloth(fabric=str(HERE / "cover.toml"), yarns=(0.75, 0.75))}
 )
 
 

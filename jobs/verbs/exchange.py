@@ -32,9 +32,12 @@ class YarnFlags:
 
 
 @dataclass(frozen=True)
-class ShaderFlags:
-    """Choices of a shader on the command line."""
+class ExportFlags:
+    """Choices of single kinds of exports on the command line."""
 
+    vertices: Annotated[Whole | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None
+    repeats: Annotated[Whole | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None
+    size: Annotated[Whole | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None
     model: Annotated[
         str | None, Parameter(help="Of a shader: soft_nodes (default), or the folder of a trained neumip.")
     ] = None
@@ -47,12 +50,6 @@ class ShaderFlags:
         list[str],
         Parameter(help="Of a shader: behind, curvature or all, beside light and viewer in front of flat cloth."),
     ] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class BsdfFlags:
-    """Choices of a BSDF on the command line."""
-
     solar: Annotated[str | None, Parameter(help="Of a BSDF: the same fabric in the colours of the solar band.")] = None
     points: Annotated[Whole | None, Parameter(help="Of a BSDF: points of a pair of patches, a power of two; 4.")] = None
 
@@ -104,31 +101,21 @@ def export_fabric(
     wif: Annotated[Local | None, Parameter(help="Draft file for weaving programs to write, ending in .wif.")] = None,
     maps: Annotated[Local | None, Parameter(help="Folder of texture maps and materials to write.")] = None,
     shader: Annotated[Local | None, Parameter(help="Folder of a shader with its tables to write.")] = None,
+    osl: Annotated[Local | None, Parameter(help="Shader for Blender's Cycles to write, ending in .osl.")] = None,
     bsdf: Annotated[Local | None, Parameter(help="BSDF for daylight simulation to write, ending in .xml.")] = None,
-    vertices: Annotated[Whole | None, Parameter(help="Of a mesh: steps across a yarn and along a cell; 64.")] = None,
-    repeats: Annotated[Whole | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None,
-    size: Annotated[Whole | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None,
-    of_shader: Annotated[ShaderFlags, Parameter(name="*")] = ShaderFlags(),
-    of_bsdf: Annotated[BsdfFlags, Parameter(name="*")] = BsdfFlags(),
+    options: Annotated[ExportFlags, Parameter(name="*")] = ExportFlags(),
 ) -> None:
     """Write a fabric for other programs, and print what was written.
 
     BadInput if not one path is given, or as `reports.exports.export.export`.
     """
-    paths = {"mesh": mesh, "wif": wif, "maps": maps, "shader": shader, "bsdf": bsdf}
-    options: dict[str, Any] = {
-        "vertices": vertices,
-        "repeats": repeats,
-        "size": size,
-        **vars(of_shader),
-        **vars(of_bsdf),
-    }
+    paths = {"mesh": mesh, "wif": wif, "maps": maps, "shader": shader, "osl": osl, "bsdf": bsdf}
     chosen = {kind: path for kind, path in paths.items() if path is not None}
     if len(chosen) != 1:
-        allowed = "one of --mesh, --wif, --maps, --shader and --bsdf is needed"
+        allowed = "one of --mesh, --wif, --maps, --shader, --osl and --bsdf is needed"
         raise BadInput("export", "", " and ".join(f"--{kind}" for kind in chosen) or "nothing", allowed)
     ((what, path),) = chosen.items()
-    stated = {key: value for key, value in options.items() if value not in (None, [])}
+    stated = {key: value for key, value in vars(options).items() if value not in (None, [])}
     with Terminal().status(what):
         _write("export", fabric, what, path, stated)
 

@@ -129,7 +129,9 @@ def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> di
     physics = {name: getattr(truth, name) for name in PHYSICS}
     sampled = truth.model_copy(update={"estimator": SAMPLED.estimator}), SAMPLED.model_copy(update=physics)
     return {
-        name: _truth_table(stated if _knows(stated, queries, fabrics) else other)
+        name: _truth_table(
+            other if stated.estimator == "node_table" and table_refusal(stated, queries, fabrics) else stated
+        )
         for name, stated, other in zip(("truth", "training_truth"), (truth, training), sampled, strict=True)
         if stated is not None
     }
@@ -139,11 +141,6 @@ def _truth_table(truth: TruthOptions) -> dict[str, Any]:
     """Return a truth's table: its estimator, its error, and options other than the default."""
     stated = {"estimator": truth.estimator, "relative_error": truth.relative_error}
     return stated | truth.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
-
-
-def _knows(truth: TruthOptions, queries: QueryOptions, fabrics: list[Fabric]) -> bool:
-    """Return whether an estimator answers all queries of the distribution on all fabrics."""
-    return truth.estimator != "node_table" or not table_refusal(truth, queries, fabrics)
 
 
 def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:

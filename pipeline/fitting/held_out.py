@@ -1,25 +1,57 @@
 """Predictions of what a fit was not given, beside rivals.
 
-Rings of a BSDF are left out in turn: all light of one angle to the normal is predicted by a fit to the others.
+Rings of a BSDF are left out in turn: all light of one angle to the normal is predicted by a fit to the others. Rivals
+are formulas in use for light straight through shades, with the openness as their only number. Angles are in degrees:
+theta to the normal, profile angles those of the direction's projections onto the planes across warp and weft.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from pipeline.bsdf.klems import Scattering
-from pipeline.compiled.arrays import Mask
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.fitting.data_sheet import dyed, other_band, products, read_sheet
 from pipeline.fitting.fit_bsdf import fit_bsdf, known_lights
 from pipeline.fitting.fitted import DRAFTS, Interval
 from pipeline.fitting.geometry import straight_of
 from pipeline.fitting.predicted import Errors, Predicted, predict
-from pipeline.fitting.rivals import RIVALS
 from weaves.errors import BadInput
+
+_Formula = Callable[[float, Float64, Float64], Float64]
+"""Function of the openness and of theta and azimuth, (N,)."""
+
+
+def _cosine(openness: float, theta: Float64, azimuth: Float64) -> Float64:
+    """Return the openness times the cosine."""
+    return np.asarray(openness * np.cos(np.radians(theta)))
+
+
+def roller_blind(openness: float, theta: Float64, azimuth: Float64) -> Float64:
+    """Return the form of EnergyPlus for roller blinds, with a cut-off angle that the openness sets."""
+    c = math.cos(0.5 * math.pi * openness)
+    turn = np.minimum(theta / (90.0 - 25.0 * c), 1.0)
+    return np.where(turn < 1.0, openness * np.abs(np.cos(0.5 * math.pi * turn)) ** (0.6 * c**0.3), 0.0)
+
+
+def woven_shade(openness: float, theta: Float64, azimuth: Float64) -> Float64:
+    """Return the form of LBNL WINDOW: round threads of one diameter, evenly spaced in one plane."""
+    covered = 1.0 - math.sqrt(openness)
+    slope, turn = np.tan(np.radians(theta)), np.radians(azimuth)
+    profiles = (np.hypot(1.0, slope * np.cos(turn)), np.hypot(1.0, slope * np.sin(turn)))
+    return np.asarray(np.prod([np.maximum(1.0 - covered * secant, 0.0) for secant in profiles], axis=0))
+
+
+RIVALS: Final[Mapping[str, _Formula]] = MappingProxyType(
+    {"cosine": _cosine, "EnergyPlus roller blind": roller_blind, "LBNL WINDOW woven shade": woven_shade}
+)
+"""_Formulas by what they are called."""
 
 
 class SheetRow(NamedTuple):
@@ -47,15 +79,14 @@ def held_out_rings(
     whole = Predicted.nothing(basis.patches)
     for number, ring in enumerate(rings):
         left_out = lights & (basis.ring == ring)
-        share = _part(advance, number, len(rings))
-        fabric = fit_bsdf(scattering, band, "held_out", share, lights & ~left_out, drafts, 0).fabric
+
+        def part(share: float, done: int = number) -> None:
+            advance((done + share) / len(rings))
+
+        fabric = fit_bsdf(scattering, band, "held_out", part, lights & ~left_out, drafts, 0).fabric
         whole = whole.joined(predict(fabric, scattering, band, left_out))
     ours = {"fit, each ring by the others": whole.errors(scattering, band)}
     return ours | rivals(scattering, band, lights & (basis.ring > 0))
-
-
-def _part(advance: Callable[[float], None], number: int, count: int) -> Callable[[float], None]:
-    return lambda share: advance((number + share) / count)
 
 
 def rivals(scattering: Scattering, band: str, lights: Mask) -> dict[str, Errors]:

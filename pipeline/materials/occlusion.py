@@ -4,29 +4,96 @@ With the horizon's elevation e in the azimuth d, never below the tangent plane, 
 
     (1 / pi) integral of V(w) max(n.w, 0) dw  =  mean over d of  n_z cos^2 e + (n.d) (pi / 2 - e - sin e cos e)
 
-Horizons are those of the truth at the nodes of a horizon map, bilinear between them on one piece of yarn.
+Horizons are those of the truth at the nodes of a horizon map, bilinear between them on one piece of yarn. Every piece
+that is seen from above in a cell is one block of nodes, as many across the yarn, evenly spaced in the angle v, as along
+it; cells that a translation of the cloth carries into one another share their blocks. A node holds the sine of its
+horizon's elevation for evenly spaced azimuths, as in Max's horizon maps (1988).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from pipeline.analytic.gauss_rules import grid_middles
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.materials.horizon_map import SLOTS, HorizonMap, horizon_map
 from pipeline.materials.planes import Layout, samples
 from pipeline.truth.cloth import cloth_side
-from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, HeightField, surface_at
-from pipeline.truth.geometry.pieces import different_cells
+from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, WARP, WEFT, HeightField, surface_at
+from pipeline.truth.geometry.horizon import horizon_sines
+from pipeline.truth.geometry.pieces import CellPiece, cell_pieces, different_cells, orbits
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 
 _AZIMUTHS: Final = 16
 _GRIDS: Final = {64: 16, 1024: 8}  # nodes along a piece, by the most different cells
 _COARSEST: Final = 4
+_SLOTS: Final = 4
+"""Pieces of a cell: the yarn on top, the one beneath on its low and on its high side, the gap."""
+
+
+class _HorizonMap(NamedTuple):
+    """Horizons of one repeat."""
+
+    blocks: npt.NDArray[np.int32]
+    """Index of the first horizon of each piece, int32 (picks * ends * _SLOTS,)."""
+    horizon: Float32
+    """Sine of the horizon's elevation: azimuth by azimuth, line by line along the yarn, across it,
+    (blocks * azimuths * grid * grid,)."""
+    grid: int
+    azimuths: int
+    """Nodes a block and side; azimuths from +x, counter-clockwise."""
+
+
+def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int) -> _HorizonMap:
+    """Tabulate one side of a cloth, `grid` nodes a block and side; `back` is the other one, which hides gaps too.
+
+    `azimuths` is even.
+    """
+    picks, ends = field.top.shape
+    blocks = np.zeros((picks, ends, _SLOTS), np.int32)
+    xs: list[Float64] = []
+    ys: list[Float64] = []
+    gaps: list[bool] = []
+    size = azimuths * grid * grid
+    for orbit in orbits(field):
+        pick, end = orbit[0]
+        # One horizon will do for all gaps of a cell: the first one's, so that it comes last here.
+        for slot, piece in {_slot_of(piece): piece for piece in reversed(cell_pieces(field, pick, end))}.items():
+            for p, e in orbit:
+                blocks[p, e, slot] = len(xs) * size
+            x, y = _nodes(piece, grid)
+            gaps.append(piece.family == GAP)
+            xs.append(end + x)
+            ys.append(pick + y)
+    gap = np.repeat(gaps, grid * grid)
+    sines = horizon_sines(field, back, np.concatenate(xs), np.concatenate(ys), gap, azimuths)
+    sines = sines.reshape(azimuths, len(xs), grid * grid)
+    horizon = np.ascontiguousarray(sines.transpose(1, 0, 2), np.float32).ravel()
+    return _HorizonMap(blocks.ravel(), horizon, grid, azimuths)
+
+
+def _slot_of(piece: CellPiece) -> int:
+    """Return which of the slots of its cell a piece is."""
+    if piece.family == GAP:
+        return 3
+    if piece.side == TOP:
+        return 0
+    return 1 if piece.along[0] == 0.0 else 2
+
+
+def _nodes(piece: CellPiece, grid: int) -> tuple[Float64, Float64]:
+    """Return x and y of a block's nodes within the cell, (grid * grid,): across the yarn runs fastest."""
+    if piece.family == GAP:
+        x = np.full(grid * grid, 0.5 * min(piece.across[1], piece.along[1]))
+        return x, x
+    across = np.tile(grid_middles(*piece.across, grid, piece.radius), grid)
+    along = np.repeat(grid_middles(*piece.along, grid, 0.0), grid)
+    return (across, along) if piece.family != WEFT else (along, across)
 
 
 def lit_coverage(fabric: Fabric, shown: Layout) -> Float32:
@@ -43,7 +110,7 @@ def lit_coverage(fabric: Fabric, shown: Layout) -> Float32:
 
 
 @allocating_kernel
-def _texels(field: HeightField, table: HorizonMap, azimuths: Float64, shown: Layout, points: int) -> Float32:
+def _texels(field: HeightField, table: _HorizonMap, azimuths: Float64, shown: Layout, points: int) -> Float32:
     """Compute `lit_coverage`; each texel has points x points."""
     lit = np.zeros((shown.height, shown.width), np.float32)
     dx, dy = shown.ends / (shown.width * points), shown.picks / (shown.height * points)
@@ -60,7 +127,7 @@ def _texels(field: HeightField, table: HorizonMap, azimuths: Float64, shown: Lay
 
 
 @kernel
-def _at(field: HeightField, table: HorizonMap, azimuths: Float64, x: float, y: float) -> float:
+def _at(field: HeightField, table: _HorizonMap, azimuths: Float64, x: float, y: float) -> float:
     """Return the share of the light that reaches a point seen from above, 0 in gaps."""
     picks, ends = field.top.shape
     x, y = x % ends, y % picks
@@ -77,7 +144,7 @@ def _at(field: HeightField, table: HorizonMap, azimuths: Float64, x: float, y: f
     angle = math.asin(min(max((across - 0.5) / field.yarn[family, RADIUS], -1.0), 1.0)) / math.pi + 0.5
     column, of_column = _between(angle, table.grid)
     line, of_line = _between(along, table.grid)
-    start = table.blocks[(pick * ends + end) * SLOTS + slot]
+    start = table.blocks[(pick * ends + end) * _SLOTS + slot]
     total = 0.0
     for a in range(len(azimuths)):
         low = start + (a * table.grid + line) * table.grid + column

@@ -55,8 +55,8 @@ PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _BAND: Final = 1 << 18
 """Points evaluated at once."""
 
-_Factors = tuple[Float64, Float64, Float64]
-"""Factors of the diffuse, the specular and the transmitted colour, by family."""
+ThreadColours = list[tuple[Float64, Float64, Float64]]
+"""Base colours, F0 and transmitted colours of the ends and of the picks, linear RGB, each (threads, 3)."""
 
 
 class Layout(NamedTuple):
@@ -103,9 +103,7 @@ def layout(fabric: Fabric, size: int) -> Layout:
         raise BadInput("export", "size", size, f"must be a power of two from {SMALLEST_MAP} to {LARGEST_MAP}")
     best = min(_candidates(fabric.repeat, size), key=_order)
     if best.texels_per_yarn < LEAST_TEXELS_PER_YARN:
-        needed = size
-        while needed * best.texels_per_yarn / size < LEAST_TEXELS_PER_YARN:
-            needed *= 2
+        needed = size << math.ceil(math.log2(LEAST_TEXELS_PER_YARN / best.texels_per_yarn))
         ends, picks = fabric.repeat
         allowed = f"the repeat of {ends} ends and {picks} picks needs {needed}"
         if needed > LARGEST_MAP:
@@ -138,19 +136,28 @@ def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
     """Sum a fabric's surface over the texels of the finest level."""
     per_texel = samples(shown)
     width, height = shown.width * per_texel, shown.height * per_texel
-    lowest = _lowest(fabric)
-    factors = share.per_area(share.diffuse), white_f0(fabric, share), share.per_area(share.transmitted)
+    lowest = lowest_height(fabric)
+    colours = material_colours(fabric, share)
     x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (shown.ends / width)
     y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (shown.picks / height)
     rows = max(1, _BAND // width // per_texel) * per_texel
     bands = []
     for first in range(0, height, rows):
         surface = surface_at(fabric, x[None, :], y[first : first + rows, None])
-        sums = _sums(fabric, surface, x, y[first : first + rows], factors, lowest)
+        sums = _sums(fabric, surface, x, y[first : first + rows], colours, lowest)
         for _ in range(per_texel.bit_length() - 1):
             sums = sums.halved()
         bands.append(sums)
     return Planes(*(np.concatenate(parts) for parts in zip(*bands, strict=True)))
+
+
+def material_colours(fabric: Fabric, share: Reflectance) -> ThreadColours:
+    """Return the colours of a material's threads, by which it reflects what the truth does (`textures`)."""
+    base, f0, through = share.per_area(share.diffuse), white_f0(fabric, share), share.per_area(share.transmitted)
+    return [
+        (dyed.diffuse * base[family], dyed.specular * f0[family], dyed.diffuse_transmission * through[family])
+        for family, dyed in enumerate(fabric.thread_colours())
+    ]
 
 
 def yarn_ids(fabric: Fabric, shown: Layout) -> npt.NDArray[np.int32]:
@@ -169,13 +176,10 @@ def yarn_ids(fabric: Fabric, shown: Layout) -> npt.NDArray[np.int32]:
 
 def samples(shown: Layout) -> int:
     """Return the points of a texel along each side, a power of two."""
-    count = 1
-    while count * shown.texels_per_yarn < SAMPLES_PER_YARN:
-        count *= 2
-    return count
+    return 1 << max(0, math.ceil(math.log2(SAMPLES_PER_YARN / shown.texels_per_yarn)))
 
 
-def _lowest(fabric: Fabric) -> float:
+def lowest_height(fabric: Fabric) -> float:
     """Return the lowest height of the yarns."""
     ends, picks = fabric.weave.repeat
     count = max(8, min(64, 1024 // max(ends, picks)))
@@ -184,13 +188,15 @@ def _lowest(fabric: Fabric) -> float:
     return float(height[np.isfinite(height)].min())
 
 
-def _sums(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, factors: _Factors, lowest: float) -> Planes:
+def _sums(
+    fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, threads: ThreadColours, lowest: float
+) -> Planes:
     """Return the sums of single points."""
     yarn, covered = surface.yarn, (surface.yarn != GAP)[..., None]
     tangent = surface.tangent
     smooth = np.array([1.0 - f.roughness**2 for f in (fabric.warp, fabric.weft)] + [0.0])[yarn]
     fibres = np.stack([smooth * tangent[..., a] * tangent[..., b] for a, b in PAIRS], axis=-1)
-    colours = (_colours(fabric, surface, x, y, kind, factors) for kind in range(3))
+    colours = (_colours(surface, x, y, ends, picks) for ends, picks in zip(*threads, strict=True))
     return Planes(
         *(
             np.asarray(plane, np.float32)
@@ -205,12 +211,8 @@ def _sums(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, factors
     )
 
 
-def _colours(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, kind: int, factors: _Factors) -> Float64:
-    """Return the diffuse (0), specular (1) or transmitted (2) colour of points, 0 in gaps."""
-    name = ("diffuse", "specular", "diffuse_transmission")[kind]
-    ends, picks = (
-        getattr(colours, name) * factors[kind][family] for family, colours in enumerate(fabric.thread_colours())
-    )
+def _colours(surface: ClothSurface, x: Float64, y: Float64, ends: Float64, picks: Float64) -> Float64:
+    """Return the colour of points whose ends and picks have these colours, 0 in gaps."""
     of_end, of_pick = ends[x.astype(np.intp) % len(ends)], picks[y.astype(np.intp) % len(picks)]
     yarn = surface.yarn[..., None]
     on_yarn = np.where(yarn == WARP, of_end[None, :, :], of_pick[:, None, :])

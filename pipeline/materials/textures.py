@@ -28,7 +28,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.materials.lobes import Reflectance, ggx_reflectance, grazing_views, sheen_reflectance, white_f0
-from pipeline.materials.planes import PAIRS, Planes
+from pipeline.materials.planes import PAIRS, Planes, material_colours
 from weaves.fabric import Fabric
 
 _TINY: Final = 1e-6
@@ -77,14 +77,10 @@ class Textures(NamedTuple):
 
 def constants(fabric: Fabric, share: Reflectance) -> Constants:
     """Return the numbers of a fabric's material that hold for all texels."""
-    threads = fabric.thread_colours()
-    factor = white_f0(fabric, share)
-    largest = max(float((colours.specular * factor[f]).max()) for f, colours in enumerate(threads))
+    colours = zip(*material_colours(fabric, share), strict=True)
+    back, largest, through = (max(float(rows.max()) for rows in kind) for kind in colours)
     largest = min(max(largest, 1e-4), 0.9)
     root = largest**0.5
-    factors = share.per_area(share.diffuse), share.per_area(share.transmitted)
-    back = max(float(colours.diffuse.max() * factors[0][f]) for f, colours in enumerate(threads))
-    through = max(float(colours.diffuse_transmission.max() * factors[1][f]) for f, colours in enumerate(threads))
     open_cloth = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width) > 0.0
     return Constants(
         (1 + root) / (1 - root), largest, _sheen(fabric, share), through / max(1.0, back + through), open_cloth

@@ -27,6 +27,7 @@ EXPORTS: Final = {
     "bsdf": ExportKind("reports.exports.bsdf:write_bsdf", ".xml"),
     "mesh": ExportKind("reports.exports.mesh:write_mesh", ".ply"),
     "wif": ExportKind("reports.exports.export:write_draft", ".wif"),
+    "osl": ExportKind("reports.exports.osl:write_osl", ".osl"),
     "maps": ExportKind("reports.exports.maps:write_maps"),
     "shader": ExportKind("pipeline.shader.export_shader:write_shader"),
     "viewer": ExportKind("reports.viewer.view:write_page", ".html"),

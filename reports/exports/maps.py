@@ -120,8 +120,7 @@ def write_maps(fabric: Fabric, folder: Path, size: int = 2048) -> str:
     """
     for library in ("MaterialX", "pygltflib"):
         if find_spec(library) is None:
-            allowed = f"{library} is needed for materials: pip install 'twillight[materials]'"
-            raise BadInput("export", "maps", str(folder), allowed)
+            raise BadInput("export", "maps", str(folder), f"{library} is needed: pip install 'twillight[materials]'")
     shown = layout(fabric, size)
     with own_files(folder, LISTING) as made:
         count = _write(fabric, shown, made)

@@ -8,37 +8,27 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import NamedTuple
 
 _ZONES = Path("/sys/class/powercap")
 
 
-class Counter(NamedTuple):
-    """The counter of one package."""
-
-    folder: Path
-    value: int
-    """In microjoules."""
-
-
-def counters() -> list[Counter]:
-    """Read the counters of all packages; none where they cannot be read."""
+def counters() -> dict[Path, int]:
+    """Read the counters of all packages, in microjoules, by their folders; none where they cannot be read."""
     try:
-        return [Counter(zone, _number(zone / "energy_uj")) for zone in sorted(_ZONES.glob("intel-rapl:[0-9]"))]
+        return {zone: _number(zone / "energy_uj") for zone in sorted(_ZONES.glob("intel-rapl:[0-9]"))}
     except (OSError, ValueError):
-        return []
+        return {}
 
 
-def joules(before: list[Counter]) -> float:
+def joules(before: dict[Path, int]) -> float:
     """Return the energy since counters were read, in joules; NaN where they cannot be read."""
+    if not before:
+        return math.nan
     try:
-        passed = [
-            (_number(folder / "energy_uj") - value) % (_number(folder / "max_energy_range_uj") + 1)
-            for folder, value in before
-        ]
+        passed = ((_number(zone / "energy_uj") - value, zone) for zone, value in before.items())
+        return 1e-6 * sum(energy % (_number(zone / "max_energy_range_uj") + 1) for energy, zone in passed)
     except (OSError, ValueError):
         return math.nan
-    return 1e-6 * sum(passed) if passed else math.nan
 
 
 def _number(path: Path) -> int:

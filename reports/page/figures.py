@@ -93,7 +93,8 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
     colours = scheme.colours(table["method"])
     for axes, role in zip(panels, roles, strict=True):
         for (method, setting), row in places.items():
-            single = _values(fabrics, role, method, setting)
+            column = fabrics.reindex(columns=[f"{method} {setting}".strip()]).iloc[:, 0]
+            single = column[fabrics["role"] == role].dropna()
             axes.scatter(single, np.full(len(single), row), s=16, color=colours[method], alpha=0.3, linewidths=0)
             own = table[(table["method"] == method) & (table["setting"] == setting) & (table["role"] == role)]
             for mean in rows(own):
@@ -240,11 +241,6 @@ def _places(table: pd.DataFrame) -> dict[tuple[str, str], float]:
 
 def _height(places: Mapping[tuple[str, str], float]) -> float:
     return max(places.values(), default=0.0) + 1.0
-
-
-def _values(fabrics: pd.DataFrame, role: str, method: str, setting: str) -> pd.Series[float]:
-    """Return a method's MSE on each fabric of a role that it covers."""
-    return fabrics.reindex(columns=[f"{method} {setting}".strip()])[fabrics["role"] == role].iloc[:, 0].dropna()
 
 
 def _name_rows(axes: Axes, places: Mapping[tuple[str, str], float], above: float = 0.0) -> None:

@@ -15,16 +15,7 @@ from typing import NamedTuple
 
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER, HeightField, surface_at
-from pipeline.truth.geometry.march import (
-    Cell,
-    Ray,
-    first_cell,
-    float_on_top,
-    next_cell,
-    span_on_top,
-    span_over,
-    wrap,
-)
+from pipeline.truth.geometry.march import Cell, Ray, first_cell, float_on_top, next_cell, span_on_top, span_over, wrap
 from pipeline.truth.geometry.visibility import above, over_strip
 
 ON_YARN, ON_WALL, MISSED = 0, 1, 2

@@ -27,10 +27,7 @@ def asked(size, behind=0.0):
     return queries, exact, np.sqrt(np.mean((exact.standard_error @ GREY) ** 2)) / truth.mean()
 
 
-BOUNDS = {
-    methods.soft_nodes: (0.15, 0.04, 0.025),
-    methods.points: (0.03, 0.03, 0.03),
-}
+BOUNDS = {methods.soft_nodes: (0.15, 0.04, 0.025), methods.points: (0.03, 0.03, 0.03)}
 """For the three sizes: those of random cloths (reports/LOG.md); of points what 256 leave."""
 
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.bsdf.measured import read_bsdf
-from pipeline.fitting.held_out import rivals
+from pipeline.fitting.held_out import RIVALS, rivals, roller_blind, woven_shade
 from pipeline.fitting.measured import SHADE
-from pipeline.fitting.rivals import RIVALS, roller_blind, woven_shade
 
 
 @pytest.mark.parametrize("formula", RIVALS.values())

@@ -3,7 +3,7 @@ import pytest
 
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes.nodes import LEVELS
-from pipeline.materials.horizon_map import horizon_map
+from pipeline.materials.occlusion import horizon_map
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.analytic.methods import soft_table

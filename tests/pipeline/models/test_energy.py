@@ -108,11 +108,6 @@ def bounded(fabric, queries):
         return Bounded(bright).predict(fabric, queries), points(fabric, queries)[1]
 
 
-def in_front(answer):
-    """Return the answers of a method that knows no light from behind, and no transparency."""
-    return lambda fabric, queries: (_by_rows(queries, (queries.wi[:, 2] >= 0.0, lambda q: answer(fabric, q))), 0.0)
-
-
 def _by_rows(queries, *parts):
     result = np.zeros((len(queries.u), 4))
     for rows, answer in parts:
@@ -122,7 +117,10 @@ def _by_rows(queries, *parts):
 
 
 METHODS = {f.__name__: f for f in (truth, points, soft_nodes, bounded)}
-METHODS["averaged_normals"] = in_front(methods.averaged_normals)
+METHODS["averaged_normals"] = lambda fabric, queries: (  # it knows no light from behind, and no transparency
+    _by_rows(queries, (queries.wi[:, 2] >= 0.0, lambda q: methods.averaged_normals(fabric, q))),
+    0.0,
+)
 
 
 def scores(index, fabric, names=tuple(METHODS)):

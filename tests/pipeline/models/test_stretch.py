@@ -11,10 +11,7 @@ from weaves.fabric import load_fabric
 
 @pytest.mark.parametrize(
     ("options", "bound"),
-    [
-        (SoftNodesOptions(levels=[2]), 0.04),
-        (PointSampledOptions(counts=[4096], sequence="r2"), 0.03),
-    ],
+    [(SoftNodesOptions(levels=[2]), 0.04), (PointSampledOptions(counts=[4096], sequence="r2"), 0.03)],
     ids=["soft nodes", "points"],
 )
 def test_ellipses_are_answered_as_such(options, bound):

@@ -1,5 +1,8 @@
+import re
+
 import numpy as np
 import pytest
+import trimesh
 
 from reports.viewer import view
 from tests.reports.viewer.conftest import shown_of
@@ -50,26 +53,11 @@ def test_a_fabric_that_was_exported_is_imported(twillight, tmp_path):
     assert again.weave == first.weave and again.optics() == first.optics()
 
 
-FLOAT, BYTE = "<f4", "u1"
-
-
 def read_ply(path):
-    """Return places, colours and triangles of a binary PLY with float places, byte colours and triangles."""
-    content = path.read_bytes()
-    header, body = content.split(b"end_header\n", 1)
-    lines = header.decode("ascii").split("\n")
-    assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
-    count = {line.split()[1]: int(line.split()[2]) for line in lines if line.startswith("element")}
-    properties = [line for line in lines if line.startswith("property")]
-    assert properties[:3] == [f"property float {axis}" for axis in "xyz"]
-    assert properties[3:7] == [f"property uchar {name}" for name in ("red", "green", "blue", "alpha")]
-    assert properties[7].startswith("property list uchar int") and len(properties) == 8
-    vertex = np.dtype([("place", FLOAT, 3), ("colour", BYTE, 4)])
-    face = np.dtype([("corners", BYTE), ("index", "<i4", 3)])
-    vertices = np.frombuffer(body, vertex, count["vertex"])
-    faces = np.frombuffer(body[vertices.nbytes :], face)
-    assert len(faces) == count["face"] and (faces["corners"] == 3).all()
-    return vertices["place"], vertices["colour"], faces["index"]
+    """Return places, colours and triangles of a binary PLY."""
+    assert path.read_bytes().startswith(b"ply\nformat binary_little_endian 1.0\n")
+    mesh = trimesh.load(path, process=False)
+    return mesh.vertices.astype(np.float32), mesh.visual.vertex_colors, mesh.faces
 
 
 def test_the_file_holds_the_mesh_in_the_colours_of_its_yarns(twillight, tmp_path):
@@ -114,6 +102,19 @@ def test_every_end_and_pick_has_its_own_colour(twillight, tmp_path):
             places, colours = places[count:], colours[count:]
 
 
+def test_a_shader_of_yarns_has_the_weave_and_the_colours_of_all_threads(twillight, tmp_path):
+    code, text, _ = twillight("export", "houndstooth", "--osl", "a.osl")
+    assert code == 0 and "8 ends × 8 picks" in text
+    source = (tmp_path / "a.osl").read_text(encoding="utf-8")
+    (top,) = re.findall(r"int top\[16\] = \{(.*)\},", source)
+    fabric = load_fabric("houndstooth")
+    assert (np.array(top.split(", ")) == "0").tolist() == fabric.weave.warp_over.ravel().tolist()
+    for thread, threads in zip(("end", "pick"), fabric.thread_colours(), strict=True):
+        (rows,) = re.findall(rf"color {thread}_diffuse\[8\] = \{{color(.*)\}},", source)
+        shown = np.array([row.strip("()").split(", ") for row in rows.split(", color")], float)
+        np.testing.assert_allclose(shown / shown.max(), threads.diffuse / threads.diffuse.max(), rtol=1e-6)
+
+
 def _srgb(linear):
     """Encode as IEC 61966-2-1 does, in 8 bits."""
     linear = np.asarray(linear)
@@ -138,7 +139,6 @@ def test_a_page_of_a_fabric_is_written_whole_and_one_of_a_large_repeat_refused_b
     [
         (["--points", "3"], "--points = 3: a power of two from 1 to 256 is needed"),
         (["--solar", "denim"], "--solar = 'denim': has to be the cloth 'voile' in other colours"),
-        (["--level", "2"], "--level = 2: is not for bsdf; leave it out"),
     ],
 )
 def test_a_bsdf_that_cannot_be_written_gets_one_sentence(twillight, flags, allowed, tmp_path):

@@ -185,10 +185,7 @@ def test_points_along_view_rays_converge_to_the_truth(kind):
     assert _error(few, fabric, queries, truth) > 2.0 * error
 
 
-TABLES = {
-    "prefiltered": PrefilteredOptions,
-    "map_material": partial(MapMaterialOptions, size=128),
-}
+TABLES = {"prefiltered": PrefilteredOptions, "map_material": partial(MapMaterialOptions, size=128)}
 
 
 @cache
@@ -200,10 +197,7 @@ def rays_and_plane(name):
 
 @pytest.mark.parametrize(
     ("name", "fabric", "most", "ratio"),
-    [
-        ("prefiltered", woven("silk_shantung"), 0.35, 1.2),
-        ("map_material", woven("silk_shantung"), 0.45, 1.1),
-    ],
+    [("prefiltered", woven("silk_shantung"), 0.35, 1.2), ("map_material", woven("silk_shantung"), 0.45, 1.1)],
 )
 def test_tables_are_read_where_view_rays_end(name, fabric, most, ratio):
     """The error against the truth of view rays is below `most`, that of the fabric plane `ratio` times as large.

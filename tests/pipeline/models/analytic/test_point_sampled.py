@@ -9,15 +9,10 @@ from pipeline.truth.options import TruthOptions
 from weaves.fabric import load_fabric
 
 
-def _sampled(count, **options):
-    (method,) = load_methods(PointSampledOptions(counts=[count], **options))
-    return method
-
-
 def test_it_is_the_truth_package_s_baseline():
     fabric = load_fabric("polyester_lining")
     queries = draw_queries(QueryOptions(), fabric.weave.repeat, 1, 0, 64)
-    method = _sampled(4)
+    (method,) = load_methods(PointSampledOptions(counts=[4]))
     answer = method.predict(fabric, queries, seed=9)
     np.testing.assert_array_equal(answer, sample_points(cloth_side(fabric, TruthOptions()), queries, 4, 9))
     assert not np.array_equal(answer, method.predict(fabric, queries, seed=10))
