@@ -16,6 +16,7 @@ from pipeline.compiled.arrays import Mask
 from pipeline.fitting.fitted import DRAFTS, LEAST_THICKNESS, Fitted, Interval, cloth
 from pipeline.fitting.geometry import (
     LEAST_STRAIGHT,
+    SEARCHES,
     STRAIGHT_NOISE,
     Geometry,
     fit_geometry,
@@ -28,6 +29,7 @@ from pipeline.fitting.scattered import with_colours
 from weaves.errors import BadInput
 
 _RESAMPLINGS = 12
+_FITTED_AGAIN = 2  # drafts that more searches are for
 _USUAL_BEND = 25.0
 _WIDE = 0.6  # part of a number's range, beyond which the data are said not to determine it
 _RANGES = {"bend": 60.0, "relief": 1.95, "roughness": 0.97, "blend": 1.0, "width": 0.9}
@@ -55,17 +57,23 @@ def fit_bsdf(
     least = 0.0 if closed else -math.log(max(straight.share.min(), 1e-6))
     thickness, steps = max(LEAST_THICKNESS, least), 2 * len(drafts) + 4
     geometries, optics, scores = {}, {}, {}
-    for draft in drafts:
+
+    def fit_draft(draft: str, searches: int) -> None:
         if closed:
             fabric = cloth(draft, (1.0, 1.0), (_USUAL_BEND,) * 2, (1.0, 1.0))
             geometries[draft] = Geometry(fabric, 0.0, np.empty((0, 6)), np.empty(0))
         else:
-            geometries[draft] = fit_geometry(scattering.basis, straight, draft)
+            geometries[draft] = fit_geometry(scattering.basis, straight, draft, searches)
         fabric = geometries[draft].fabric.model_copy(update={"optical_thickness": thickness})
         optics[draft] = fit_optics(scattering, band, lights, fabric)
         scores[draft] = math.hypot(geometries[draft].error / STRAIGHT_NOISE, optics[draft].error)
-        advance(2 * len(scores) / steps)
-    best = min(scores, key=scores.__getitem__)
+
+    for number, draft in enumerate(drafts):
+        fit_draft(draft, 1)
+        advance(2 * number / steps)
+    for draft in _near(scores)[: 0 if closed else _FITTED_AGAIN]:
+        fit_draft(draft, SEARCHES)
+    best = _near(scores)[0]
     fit, numbers = optics[best], {} if closed else geometry_numbers(geometries[best], len(straight.patches))
     colours, of_optics = optics_numbers(fit, resamplings)
     numbers |= of_optics | {"optical_thickness": Interval(thickness, least, 100.0)}
@@ -81,6 +89,11 @@ def known_lights(scattering: Scattering, band: str) -> Mask:
     return np.asarray(np.isfinite(scattering.bands[band]).any(axis=(0, 1, 2)))
 
 
+def _near(scores: dict[str, float]) -> list[str]:
+    """Return the drafts whose scores are within a tenth of the least, which is first."""
+    return [draft for draft in sorted(scores, key=scores.__getitem__) if scores[draft] <= 1.1 * min(scores.values())]
+
+
 def _assumed(closed: bool) -> list[str]:
     geometry = [f"No light goes straight through: widths are 1, bends {_USUAL_BEND:g} degrees, reliefs 1."]
     return [
@@ -91,7 +104,7 @@ def _assumed(closed: bool) -> list[str]:
 
 
 def _unknown(numbers: dict[str, Interval], drafts: dict[str, float]) -> list[str]:
-    near = [draft for draft, score in drafts.items() if score <= 1.1 * min(drafts.values())]
+    near = _near(drafts)
     wide = [
         f"{key} ({number.low:.3g} to {number.high:.3g})"
         for key, number in numbers.items()

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from weaves.fabric import Fabric
 
-DRAFTS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType(
-    {
-        "plain": {"family": "plain"},
-        "rib 1x2": {"family": "rib", "ends": 1, "picks": 2},
-        "rib 2x1": {"family": "rib", "ends": 2, "picks": 1},
-        "basket": {"family": "basket"},
-        "twill 2/2": {"family": "twill", "over": 2, "under": 2},
-        "twill 2/1": {"family": "twill", "over": 2, "under": 1},
-        "twill 1/2": {"family": "twill", "over": 1, "under": 2},
-        "twill 3/1": {"family": "twill", "over": 3, "under": 1},
-        "twill 1/3": {"family": "twill", "over": 1, "under": 3},
-        "broken twill 3/1": {"family": "broken_twill", "over": 3, "under": 1},
-        "broken twill 1/3": {"family": "broken_twill", "over": 1, "under": 3},
-        "satin": {"family": "satin"},
-        "sateen": {"family": "sateen"},
-    }
-)
+DRAFTS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "plain": {"family": "plain"},
+    "rib 1x2": {"family": "rib", "ends": 1, "picks": 2},
+    "rib 2x1": {"family": "rib", "ends": 2, "picks": 1},
+    "basket": {"family": "basket"},
+    "twill 2/2": {"family": "twill", "over": 2, "under": 2},
+    "twill 2/1": {"family": "twill", "over": 2, "under": 1},
+    "twill 1/2": {"family": "twill", "over": 1, "under": 2},
+    "twill 3/1": {"family": "twill", "over": 3, "under": 1},
+    "twill 1/3": {"family": "twill", "over": 1, "under": 3},
+    "broken twill 3/1": {"family": "broken_twill", "over": 3, "under": 1},
+    "broken twill 1/3": {"family": "broken_twill", "over": 1, "under": 3},
+    "satin": {"family": "satin"},
+    "sateen": {"family": "sateen"},
+}
 """Drafts that a fit tries: a name, and the table of a fabric file."""
 
 LEAST_THICKNESS: Final = 8.0

@@ -1,7 +1,7 @@
 """Widths, bends and reliefs of a draft from the light that goes straight through its gaps.
 
 Differential evolution [Storn1997Differential] over six numbers: the logarithm of the openness, the part of it that is
-the warps', two bends, the logarithms of two reliefs. The interval of a number is a profile: everything that the search
+the warps', two bends, the logarithms of two reliefs. The interval of a number is a profile: everything that searches
 tried whose squared error exceeds the least by no more than noise explains (3.84 variances of a patch over the number
 of patches, 95 %). The noise is what the best fit leaves, at least that of measurements.
 """
@@ -25,6 +25,9 @@ STRAIGHT_NOISE: Final = 0.067
 
 LEAST_STRAIGHT: Final = 1e-4
 """Share of light that goes straight through a cloth with gaps, at least."""
+
+SEARCHES: Final = 4
+"""Searches for a geometry: what one has tried does not tell how far other geometries fit as well."""
 
 _RAYS = 256  # of a patch
 _GENERATIONS, _MEMBERS = 45, 7  # members for each number
@@ -75,8 +78,8 @@ def straight_of(scattering: Scattering, band: str, lights: Mask) -> Straight:
     return Straight(patches.astype(int), share, weight)
 
 
-def fit_geometry(basis: Basis, straight: Straight, draft: str) -> Geometry:
-    """Return the geometry of a draft with the least error."""
+def fit_geometry(basis: Basis, straight: Straight, draft: str, searches: int = SEARCHES) -> Geometry:
+    """Return the geometry of a draft with the least error that some searches find."""
     rays, top = gap_rays(basis, straight.patches, _RAYS), float(straight.share.max())
     tried: list[Float64] = []
     errors: list[float] = []
@@ -87,10 +90,12 @@ def fit_geometry(basis: Basis, straight: Straight, draft: str) -> Geometry:
         return errors[-1]
 
     openness = math.log(_SPREAD[0] * top), math.log(min(_SPREAD[1] * top, 0.9))
-    best = differential_evolution(
-        error, [openness, *_BOUNDS], maxiter=_GENERATIONS, popsize=_MEMBERS, tol=1e-3, rng=0, polish=False
-    )
-    return Geometry(_cloth(draft, best.x), float(best.fun), np.array(tried), np.array(errors))
+    for seed in range(searches):
+        differential_evolution(
+            error, [openness, *_BOUNDS], maxiter=_GENERATIONS, popsize=_MEMBERS, tol=1e-3, rng=seed, polish=False
+        )
+    best = int(np.argmin(errors))
+    return Geometry(_cloth(draft, tried[best]), errors[best], np.array(tried), np.array(errors))
 
 
 def _cloth(draft: str, numbers: Float64) -> Fabric:

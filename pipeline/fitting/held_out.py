@@ -8,9 +8,9 @@ theta to the normal, profile angles those of the direction's projections onto th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -23,9 +23,6 @@ from pipeline.fitting.fitted import DRAFTS, Interval
 from pipeline.fitting.geometry import straight_of
 from pipeline.fitting.predicted import Errors, Predicted, predict
 from weaves.errors import BadInput
-
-_Formula = Callable[[float, Float64, Float64], Float64]
-"""Function of the openness and of theta and azimuth, (N,)."""
 
 
 def _cosine(openness: float, theta: Float64, azimuth: Float64) -> Float64:
@@ -48,10 +45,8 @@ def woven_shade(openness: float, theta: Float64, azimuth: Float64) -> Float64:
     return np.asarray(np.prod([np.maximum(1.0 - covered * secant, 0.0) for secant in profiles], axis=0))
 
 
-RIVALS: Final[Mapping[str, _Formula]] = MappingProxyType(
-    {"cosine": _cosine, "EnergyPlus roller blind": roller_blind, "LBNL WINDOW woven shade": woven_shade}
-)
-"""_Formulas by what they are called."""
+RIVALS: Final = {"cosine": _cosine, "EnergyPlus roller blind": roller_blind, "LBNL WINDOW woven shade": woven_shade}
+"""Formulas by what they are called: functions of the openness and of theta and azimuth, (N,)."""
 
 
 class SheetRow(NamedTuple):
@@ -73,16 +68,11 @@ def held_out_rings(
     basis, lights = scattering.basis, known_lights(scattering, band)
     rings = [ring for ring in np.unique(basis.ring[lights]) if ring > 0]
     if len(rings) < 3:
-        raise BadInput(
-            "fit", "--held-out", f"{len(rings)} rings", "light at three or more angles to the normal is needed"
-        )
+        raise BadInput("fit", "--held-out", f"{len(rings)} rings", "light at three or more angles is needed")
     whole = Predicted.nothing(basis.patches)
     for number, ring in enumerate(rings):
         left_out = lights & (basis.ring == ring)
-
-        def part(share: float, done: int = number) -> None:
-            advance((done + share) / len(rings))
-
+        part = partial(lambda done, share: advance((done + share) / len(rings)), number)
         fabric = fit_bsdf(scattering, band, "held_out", part, lights & ~left_out, drafts, 0).fabric
         whole = whole.joined(predict(fabric, scattering, band, left_out))
     ours = {"fit, each ring by the others": whole.errors(scattering, band)}
@@ -127,7 +117,6 @@ def predicted_transmittances(path: Path) -> list[SheetRow]:
             rows.append(SheetRow(sheet.name, "visible", np.nan, dyed(sheet, white)))
         if sheet is not white and sheet.solar is not None and white.solar is not None:
             stated = np.nan if sheet.solar.transmittance is None else sheet.solar.transmittance
-            one_dye = sheet.transmittance is None
-            predicted = dyed(sheet.solar, white.solar) if one_dye else other_band(sheet, white)
+            predicted = other_band(sheet, white) if sheet.transmittance is not None else dyed(sheet.solar, white.solar)
             rows.append(SheetRow(sheet.name, "solar", stated, predicted))
     return rows

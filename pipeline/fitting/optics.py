@@ -68,9 +68,8 @@ def fit_optics(scattering: Scattering, band: str, lights: Mask, fabric: Fabric) 
     error = float(np.linalg.norm((once - values) * weights)) / SCATTERED_NOISE
     ours, theirs = (np.bincount(pairs.block, part, 4)[:2] for part in (once, values))
     off = np.abs(ours / np.maximum(theirs, 1e-9) - 1.0)[theirs > 0.0]
-    return OpticsFit(
-        scatterer, optics, colours, float(np.hypot(error, off.max(initial=0.0) / FACE_NOISE)), values, weights
-    )
+    error = float(np.hypot(error, off.max(initial=0.0) / FACE_NOISE))
+    return OpticsFit(scatterer, optics, colours, error, values, weights)
 
 
 def _refined(
