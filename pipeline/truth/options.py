@@ -95,8 +95,9 @@ class TruthOptions(Frozen):
     plane (`pipeline.truth.geometry.pieces`), as a camera sees the cloth. False: it is a patch of the fabric plane, in
     which heights displace nothing [Chen2024Woven]. `quadrature` knows it for Gaussians with walls left out."""
     walls: Walls = "rim"
-    """Meaning of a view ray that meets the step between two floats: it sees the rim of the yarn above, so that the mean
-    over all places does not depend on the footprint, or it does not count. Without parallax it is `left_out`."""
+    """Meaning of a view ray that meets the step between two floats: it sees the rim of the yarn above if that faces the
+    viewer, so that the mean over all places hardly depends on the footprint; or it does not count. Without parallax it
+    is `left_out`."""
     shadows: bool = True
     """True if points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
 

@@ -170,7 +170,7 @@ def test_finished_tasks_cost_one_request_a_receipt_and_then_none(switch, tmp_pat
     fake_stages.done(tmp_path, *tasks)
     s3fs.S3FileSystem().put(f"{tmp_path}/", "s3://products/many/", recursive=True)
     here, there = Ledger(tmp_path), place("s3://products/many")
-    listings = 2 + 3 * 3  # of five folders; s3fs asks twice more about each that is empty
+    listings = 2 + 4 * 3  # of six folders; s3fs asks twice more about each that is empty
     for expected in (len(tasks) + listings, listings):
         switch.paths.clear()
         assert Counter(map(Ledger(there).state, tasks)) == {"done": 200} and len(switch.paths) <= expected

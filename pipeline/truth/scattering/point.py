@@ -101,9 +101,9 @@ def ray_share(
     """Return the same for the view ray that crosses the reference plane at (x, y), and how far from there it ends.
 
     With dq the area in which the rays of a patch cross the plane, A(wo) dp = (n_s.wo) dq: every ray that meets a yarn
-    has the area n_s.wo. One that meets a wall has none, or sees the rim above. One that crosses the fabric plane in a
-    gap and meets nothing on either side is light that goes straight through. On curved cloth wo has the same angle to
-    the tangent plane everywhere, as in `pipeline.truth.geometry.opacity`.
+    has the area n_s.wo. One that meets a wall has none, or sees the rim above if that faces the viewer. One that meets
+    nothing on either side of a gap of the fabric plane is light that goes straight through. On curved cloth wo has the
+    same angle to the tangent plane everywhere, as in `pipeline.truth.geometry.opacity`.
     """
     viewer = directions.viewer
     towards, along, down = sinking(viewer, front.highest, plane)
