@@ -98,9 +98,8 @@ def _refuse_conflict(first: MergedTask, second: MergedTask) -> None:
         name = next(name for name in sorted(files) if files[name] != others.get(name))
         task = f"{first.receipt.stage} {first.receipt.title}"
         allowed = f"delete ledger/{first.receipt.task}.json in the folder whose product is not wanted"
-        raise BadInput(
-            f"{first.ledger.out} and {second.ledger.out}", "", f"{name} of {task} has other bytes in each", allowed
-        )
+        where = f"{first.ledger.out} and {second.ledger.out}"
+        raise BadInput(where, "", f"{name} of {task} has other bytes in each", allowed)
 
 
 def _numbers(files: dict[str, Product]) -> dict[str, Product]:

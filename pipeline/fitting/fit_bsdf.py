@@ -55,7 +55,7 @@ def fit_bsdf(
     straight = straight_of(scattering, band, lights & (scattering.basis.ring > 0))
     closed = not len(straight.patches) or straight.share.max() < LEAST_STRAIGHT
     least = 0.0 if closed else -math.log(max(straight.share.min(), 1e-6))
-    thickness, steps = max(LEAST_THICKNESS, least), 2 * len(drafts) + 4
+    thickness, steps = max(LEAST_THICKNESS, least), len(drafts) + _FITTED_AGAIN * SEARCHES + 2
     geometries, optics, scores = {}, {}, {}
 
     def fit_draft(draft: str, searches: int) -> None:
@@ -68,11 +68,12 @@ def fit_bsdf(
         optics[draft] = fit_optics(scattering, band, lights, fabric)
         scores[draft] = math.hypot(geometries[draft].error / STRAIGHT_NOISE, optics[draft].error)
 
-    for number, draft in enumerate(drafts):
+    for number, draft in enumerate(drafts, 1):
         fit_draft(draft, 1)
-        advance(2 * number / steps)
-    for draft in _near(scores)[: 0 if closed else _FITTED_AGAIN]:
+        advance(number / steps)
+    for number, draft in enumerate(_near(scores)[: 0 if closed else _FITTED_AGAIN], 1):
         fit_draft(draft, SEARCHES)
+        advance((len(drafts) + SEARCHES * number) / steps)
     best = _near(scores)[0]
     fit, numbers = optics[best], {} if closed else geometry_numbers(geometries[best], len(straight.patches))
     colours, of_optics = optics_numbers(fit, resamplings)

@@ -55,7 +55,7 @@ PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _BAND: Final = 1 << 18
 """Points evaluated at once."""
 
-ThreadColours = list[tuple[Float64, Float64, Float64]]
+MaterialColours = list[tuple[Float64, Float64, Float64]]
 """Base colours, F0 and transmitted colours of the ends and of the picks, linear RGB, each (threads, 3)."""
 
 
@@ -151,7 +151,7 @@ def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
     return Planes(*(np.concatenate(parts) for parts in zip(*bands, strict=True)))
 
 
-def material_colours(fabric: Fabric, share: Reflectance) -> ThreadColours:
+def material_colours(fabric: Fabric, share: Reflectance) -> MaterialColours:
     """Return the colours of a material's threads, by which it reflects what the truth does (`textures`)."""
     base, f0, through = share.per_area(share.diffuse), white_f0(fabric, share), share.per_area(share.transmitted)
     return [
@@ -189,7 +189,7 @@ def lowest_height(fabric: Fabric) -> float:
 
 
 def _sums(
-    fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, threads: ThreadColours, lowest: float
+    fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, threads: MaterialColours, lowest: float
 ) -> Planes:
     """Return the sums of single points."""
     yarn, covered = surface.yarn, (surface.yarn != GAP)[..., None]
