@@ -49,11 +49,8 @@ class _HorizonMap(NamedTuple):
     """Nodes a block and side; azimuths from +x, counter-clockwise."""
 
 
-def horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int) -> _HorizonMap:
-    """Tabulate one side of a cloth, `grid` nodes a block and side; `back` is the other one, which hides gaps too.
-
-    `azimuths` is even.
-    """
+def _horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int) -> _HorizonMap:
+    """Tabulate a side of a cloth, `grid` nodes a block and side, for even `azimuths`; its `back` hides gaps too."""
     picks, ends = field.top.shape
     blocks = np.zeros((picks, ends, _SLOTS), np.int32)
     xs: list[Float64] = []
@@ -104,7 +101,7 @@ def lit_coverage(fabric: Fabric, shown: Layout) -> Float32:
     side = cloth_side(fabric, TruthOptions())
     cells = different_cells(side.front)
     grid = next((nodes for most, nodes in _GRIDS.items() if cells <= most), _COARSEST)
-    table = horizon_map(side.front, side.back, grid, _AZIMUTHS)
+    table = _horizon_map(side.front, side.back, grid, _AZIMUTHS)
     turns = 2.0 * math.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
     return _texels(side.front, table, np.stack([np.cos(turns), np.sin(turns)], axis=-1), shown, samples(shown))
 

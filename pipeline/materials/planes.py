@@ -55,7 +55,7 @@ PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _BAND: Final = 1 << 18
 """Points evaluated at once."""
 
-MaterialColours = list[tuple[Float64, Float64, Float64]]
+YarnColours = list[tuple[Float64, Float64, Float64]]
 """Base colours, F0 and transmitted colours of the ends and of the picks, linear RGB, each (threads, 3)."""
 
 
@@ -101,7 +101,7 @@ def layout(fabric: Fabric, size: int) -> Layout:
     """
     if not SMALLEST_MAP <= size <= LARGEST_MAP or size & (size - 1):
         raise BadInput("export", "size", size, f"must be a power of two from {SMALLEST_MAP} to {LARGEST_MAP}")
-    best = min(_candidates(fabric.repeat, size), key=_order)
+    best = best_layout(fabric, size)
     if best.texels_per_yarn < LEAST_TEXELS_PER_YARN:
         needed = size << math.ceil(math.log2(LEAST_TEXELS_PER_YARN / best.texels_per_yarn))
         ends, picks = fabric.repeat
@@ -110,6 +110,11 @@ def layout(fabric: Fabric, size: int) -> Layout:
             allowed += f", and at most {LARGEST_MAP} are possible"
         raise BadInput("export", "size", size, allowed)
     return best
+
+
+def best_layout(fabric: Fabric, size: int) -> Layout:
+    """Return the same, whether or not its texels are too large for the yarns."""
+    return min(_candidates(fabric.repeat, size), key=_order)
 
 
 def _candidates(repeat: tuple[int, int], size: int) -> list[Layout]:
@@ -151,7 +156,7 @@ def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
     return Planes(*(np.concatenate(parts) for parts in zip(*bands, strict=True)))
 
 
-def material_colours(fabric: Fabric, share: Reflectance) -> MaterialColours:
+def material_colours(fabric: Fabric, share: Reflectance) -> YarnColours:
     """Return the colours of a material's threads, by which it reflects what the truth does (`textures`)."""
     base, f0, through = share.per_area(share.diffuse), white_f0(fabric, share), share.per_area(share.transmitted)
     return [
@@ -188,15 +193,13 @@ def lowest_height(fabric: Fabric) -> float:
     return float(height[np.isfinite(height)].min())
 
 
-def _sums(
-    fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, threads: MaterialColours, lowest: float
-) -> Planes:
+def _sums(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, dyed: YarnColours, lowest: float) -> Planes:
     """Return the sums of single points."""
     yarn, covered = surface.yarn, (surface.yarn != GAP)[..., None]
     tangent = surface.tangent
     smooth = np.array([1.0 - f.roughness**2 for f in (fabric.warp, fabric.weft)] + [0.0])[yarn]
     fibres = np.stack([smooth * tangent[..., a] * tangent[..., b] for a, b in PAIRS], axis=-1)
-    colours = (_colours(surface, x, y, ends, picks) for ends, picks in zip(*threads, strict=True))
+    colours = (_colours(surface, x, y, ends, picks) for ends, picks in zip(*dyed, strict=True))
     return Planes(
         *(
             np.asarray(plane, np.float32)

@@ -14,25 +14,24 @@ import numpy.typing as npt
 
 from pipeline.atomic import atomic_write
 from pipeline.materials.lobes import reflectance
-from pipeline.materials.planes import LARGEST_MAP, layout, lowest_height, material_colours
+from pipeline.materials.planes import LARGEST_MAP, SAMPLES_PER_YARN, best_layout, lowest_height, material_colours
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, RADIUS, SIN_TWIST, height_field
 from pipeline.truth.geometry.pieces import reference_plane
 from weaves.fabric import Fabric
 from weaves.surface import surface_maps
 
 _YARN_COLUMNS: Final = [RADIUS, SIN_TWIST, COS_TWIST, ALPHA, BETA, BLEND]
-_TEXELS_PER_YARN: Final = 16
 
 
 def write_osl(fabric: Fabric, path: Path) -> str:
-    """Write the shader of a fabric and return a sentence on it; BadInput if the repeat is too large for maps."""
-    field, shown, share = height_field(fabric), layout(fabric, LARGEST_MAP), reflectance(fabric)
+    """Write the shader of a fabric and return a sentence on it."""
+    field, shown, share = height_field(fabric), best_layout(fabric, LARGEST_MAP), reflectance(fabric)
     numbers = {"ends": field.top.shape[1], "Ends": float(shown.ends), "Picks": float(shown.picks)}
     numbers |= {"highest": field.highest, "lowest": lowest_height(fabric), "plane": reference_plane(field)}
     # Floats that never change side are endless.
     tables = {"top": field.top, "floats": np.minimum(field.floats, 1e9), "yarns": field.yarn[:, _YARN_COLUMNS]}
     tables = {name: table.ravel() for name, table in tables.items()}
-    seen = surface_maps(fabric, _TEXELS_PER_YARN)
+    seen = surface_maps(fabric, SAMPLES_PER_YARN)
     families = zip((fabric.warp, fabric.weft), ("end", "pick"), material_colours(fabric, share), strict=True)
     for family, (yarn, thread, colours) in enumerate(families):
         # Lobes of tilted normals lose what comes from below the cloth.

@@ -3,7 +3,7 @@ import pytest
 
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes.nodes import LEVELS
-from pipeline.materials.occlusion import horizon_map
+from pipeline.materials.occlusion import _horizon_map
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.analytic.methods import soft_table
@@ -33,7 +33,7 @@ def test_the_map_and_the_grid_have_the_tangents_of_cylinders(rows, relief):
     """The map to the root's tolerance; grids have 255 levels, between azimuths that are even in the angle."""
     fabric = woven("denim", rows, width=1.0, relief=relief)
     model, size, azimuths = cloth_side(fabric, TruthOptions()), 12, 32
-    table = horizon_map(model.front, model.back, size, azimuths)
+    table = _horizon_map(model.front, model.back, size, azimuths)
     v = np.pi * ((np.arange(size) + 0.5) / size - 0.5)
     own = table.horizon[table.blocks[0] :][: azimuths * size * size].reshape(azimuths, size, size)
     for azimuth, sines in enumerate(own):
