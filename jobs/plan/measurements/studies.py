@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from reports.record import Record
 
 _UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced", "measured_cloth")
-_LONG: Final[dict[StudyName, float]] = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0}  # seconds
+_LONG: Final[dict[StudyName, float]] = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0, "measured_cloth": 840.0}
 
 
 class Study(Measurement):
