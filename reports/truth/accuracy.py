@@ -1,7 +1,7 @@
 """Accuracy of the estimators: true errors beside stated errors and cost.
 
 Errors are of the four components as a vector, |mean - reference| / |reference|, over patches that return light; the
-reference is `owen` with `_REFERENCE` points and another seed. Plain Monte Carlo's error falls as N^-1/2: with its own
+reference is `owen` with 65,536 points and another seed. Plain Monte Carlo's error falls as N^-1/2: with its own
 median true errors e_N at N points, c is the geometric mean of e_N sqrt(N), and (c / e)^2 points of it have the median
 true error e. "Points saved" is that number over the points used.
 """
@@ -26,14 +26,9 @@ from weaves.fabric import Fabric, load_fabric
 FABRICS: Final = ("polyester_lining", "denim", "silk_charmeuse", "satin_8", "twill_4_4", "basket")
 """One of each family, and the largest repeats."""
 
-_REFERENCE: Final = 1 << 16
-"""Points of a converged answer."""
-
 COUNTS: Final = (64, 256, 1024)
 """Points of the estimators that sample."""
 
-_ROWS = 150
-_REPEATS = 3
 _SEED = 21
 _DARK = 1e-3  # 1/sr: patches below return too little for a relative error
 
@@ -42,23 +37,16 @@ _DARK = 1e-3  # 1/sr: patches below return too little for a relative error
 class Accuracy:
     """One setting of the truth on one fabric."""
 
-    setting: str
-    """Estimator, and requested points or error."""
+    setting: str  # estimator, and requested points or error
     fabric: str
-    """On which cloth."""
-    rmse: Annotated[float, "true_rmse"]
-    """Root-mean-square error of .3 (S_warp + S_weft) + .5 (C_warp + C_weft) over its mean."""
+    rmse: Annotated[float, "true_rmse"]  # of .3 (S_warp + S_weft) + .5 (C_warp + C_weft), over its mean
     true_error: Annotated[float, "true_error"]
     stated_error: Annotated[float, "stated_error"]
-    points: Annotated[float, "points"]
-    """Points, or nodes, a query; the mean."""
+    points: Annotated[float, "points"]  # or nodes, a query; the mean
     rate: Annotated[float, "query_rate"]
-    saved: Annotated[float, "points_saved"]
-    """Points that `mc` would need for the same true error over those used."""
-    reference: Annotated[float, "reference_error"]
-    """Median relative error that the reference states."""
-    count: int
-    """Queries."""
+    saved: Annotated[float, "points_saved"]  # points that `mc` would need for the same true error over those used
+    reference: Annotated[float, "reference_error"]  # median relative error that the reference states
+    count: int  # queries
 
 
 def default_queries(names: Sequence[str], rows: int, seed: int) -> Iterator[tuple[Fabric, Queries]]:
@@ -70,7 +58,7 @@ def default_queries(names: Sequence[str], rows: int, seed: int) -> Iterator[tupl
 
 def seconds_a_query(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:
     """Return the time of one query; the median of a few calls."""
-    calls = [milliseconds(lambda: estimate(fabric, queries, options, _SEED)) for _ in range(_REPEATS)]
+    calls = [milliseconds(lambda: estimate(fabric, queries, options, _SEED)) for _ in range(3)]
     return 1e-3 * float(np.median(calls)) / len(queries.u)
 
 
@@ -82,14 +70,12 @@ def fixed(estimator: EstimatorName, count: int) -> TruthOptions:
 _SAMPLED: Final[tuple[EstimatorName, ...]] = ("mc", "r2", "owen")
 SETTINGS: Final[dict[str, TruthOptions]] = {
     **{f"{name}, {count} points": fixed(name, count) for name in _SAMPLED for count in COUNTS},
-    "auto at 5 %": TruthOptions(relative_error=0.05, max_count=1 << 14),
-    "auto at 2 %": TruthOptions(relative_error=0.02, max_count=1 << 14),
-    "auto at 1 %": TruthOptions(relative_error=0.01, max_count=1 << 14),
+    **{f"auto at {error} %": TruthOptions(relative_error=error / 100, max_count=1 << 14) for error in (5, 2, 1)},
 }
 """Settings that are measured, by their names in tables."""
 
 
-def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = _REFERENCE) -> Iterator[Accuracy]:
+def measure(rows: int = 150, fabrics: Sequence[str] = FABRICS, reference: int = 1 << 16) -> Iterator[Accuracy]:
     """Measure every setting on so many default queries of every preset; `reference` is a power of two."""
     for fabric, queries in default_queries(fabrics, rows, _SEED):
         truth = estimate(fabric, queries, fixed("owen", reference), _SEED + 1)
@@ -98,8 +84,7 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
         random = [row for row in rows_of_fabric if row.setting.startswith("mc,")]
         spread = float(np.exp(np.mean([np.log(row.true_error * np.sqrt(row.points)) for row in random])))
         for row in rows_of_fabric:
-            needed = (spread / max(row.true_error, 1e-12)) ** 2
-            yield replace(row, saved=needed / row.points)
+            yield replace(row, saved=(spread / max(row.true_error, 1e-12)) ** 2 / row.points)
 
 
 def _compare(fabric: Fabric, queries: Queries, truth: Answers, setting: str, options: TruthOptions) -> Accuracy:
@@ -125,4 +110,3 @@ def _compare(fabric: Fabric, queries: Queries, truth: Answers, setting: str, opt
 
 
 RECORDS: Final = RowRecords(Accuracy, setting=("setting",))
-"""Accuracies as Records."""

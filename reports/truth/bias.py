@@ -30,8 +30,6 @@ LIMIT: Final = 0.003
 SIDES: Final = ("light in front", "light behind")
 """Where the light is; the viewer is in front."""
 
-_ROWS = 4000
-_REFERENCE = 1 << 13
 _SEED = 22
 _TABLE: Final = TruthOptions(estimator="node_table")
 
@@ -41,27 +39,21 @@ class Bias:
     """The bias of one component on one fabric."""
 
     fabric: str
-    """On which cloth."""
-    side: str
-    """One of `SIDES`."""
-    component: str
-    """One of `COMPONENTS`."""
-    value: Annotated[float, "bias"]
-    """Relative to the mean of the component."""
-    standard_error: float
-    """Of `value`, from the spread over queries."""
-    count: int
-    """Queries."""
+    side: str  # one of `SIDES`
+    component: str  # one of `COMPONENTS`
+    value: Annotated[float, "bias"]  # relative to the mean of the component
+    standard_error: float  # of `value`, from the spread over queries
+    count: int  # queries
 
     @property
     def result(self) -> Literal["below", "open", "above"]:
-        """True if it lies below `LIMIT`, two standard errors considered."""
+        """Where it lies beside `LIMIT`, two standard errors considered."""
         if abs(self.value) + 2.0 * self.standard_error <= LIMIT:
             return "below"
         return "above" if abs(self.value) - 2.0 * self.standard_error > LIMIT else "open"
 
 
-def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int = _REFERENCE) -> Iterator[Bias]:
+def measure(rows: int = 4000, fabrics: Sequence[str] = FABRICS, reference: int = 1 << 13) -> Iterator[Bias]:
     """Measure every component, of so many queries of every preset and side; `reference` is a power of two."""
     for fabric, drawn in default_queries(fabrics, rows, _SEED):
         queries = drawn.take(FINE.knows(cloth_side(fabric, _TABLE), columns_of(drawn)))
@@ -70,8 +62,7 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS, reference: int 
             truth = estimate(fabric, lit, fixed("owen", reference), _SEED + 1).mean.astype(np.float64)
             answers = estimate(fabric, lit, _TABLE, _SEED).mean.astype(np.float64)
             for component, own, other in zip(COMPONENTS, answers.T, truth.T, strict=True):
-                value, error = bias_of(own, other)
-                yield Bias(fabric.name, side, component, value, error, len(lit.u))
+                yield Bias(fabric.name, side, component, *bias_of(own, other), len(lit.u))
 
 
 def bias_of(found: Float64, truth: Float64) -> tuple[float, float]:
@@ -88,4 +79,3 @@ def bias_of(found: Float64, truth: Float64) -> tuple[float, float]:
 
 
 RECORDS: Final = RowRecords(Bias, setting=("side", "component"), once={"standard_error": "standard_error"}, joint=": ")
-"""Biases as Records."""

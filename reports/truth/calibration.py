@@ -53,7 +53,6 @@ _SOLID: Final = Ranges(width=(1.0, 1.0), **_OPTICS)
 _OPEN: Final = Ranges(width=(0.6, 0.95), **_OPTICS)
 _NARROW: Final = Ranges(width=(0.2, 0.6), **_OPTICS)
 
-_LEFT_OUT: Final = TruthOptions(walls="left_out")
 _PLANE: Final = TruthOptions(parallax=False)
 
 CLASSES: Final = {
@@ -63,7 +62,7 @@ CLASSES: Final = {
     "curved": (_OPEN, QueryOptions(sigma=_SIGMA, curvature=(0.001, 0.3)), TruthOptions()),
     "light behind": (_OPEN, QueryOptions(sigma=_SIGMA, behind=1.0), TruthOptions()),
     "rotated footprints": (_OPEN, QueryOptions(sigma=_SIGMA, stretch=16.0), TruthOptions()),
-    "walls left out": (_OPEN, QueryOptions(sigma=_SIGMA, behind=0.3, stretch=16.0), _LEFT_OUT),
+    "walls left out": (_OPEN, QueryOptions(sigma=_SIGMA, behind=0.3, stretch=16.0), TruthOptions(walls="left_out")),
     "fabric plane": (_OPEN, QueryOptions(sigma=_SIGMA, behind=0.3, stretch=16.0), _PLANE),
     "fabric plane, curved": (_OPEN, QueryOptions(sigma=_SIGMA, curvature=(0.001, 0.3)), _PLANE),
 }
@@ -72,7 +71,6 @@ CLASSES: Final = {
 SEED: Final = 4_000
 """Seed of the fabrics and queries. No factor was chosen by it; rows of 1,000 and 3,000 were looked at on the way."""
 
-_FABRICS, _ROWS, _REFERENCE = 4, 40, 1 << 15
 _PRECISE = 0.03
 _LEAST = 1e-4  # smallest squared ratio
 
@@ -82,23 +80,14 @@ class Calibration:
     """Errors of one estimator on one class of cloth."""
 
     estimator: str
-    """Name of the estimator."""
-    kind: str
-    """One of `CLASSES`."""
-    ratio: Annotated[float, "error_ratio"]
-    """rms(error) / rms(standard error), over the four components."""
-    exceeded: Annotated[float, "bound_exceeded"]
-    """Share of errors beyond their bound."""
-    low: float | None
-    """Lower end of the ratio's interval, at `_LEVEL`; None in Records of before intervals."""
+    kind: str  # one of `CLASSES`
+    ratio: Annotated[float, "error_ratio"]  # rms(error) / rms(standard error), over the four components
+    exceeded: Annotated[float, "bound_exceeded"]  # share of errors beyond their bound
+    low: float | None  # lower end of the ratio's interval, at `_LEVEL`; None in Records of before intervals
     high: float | None
-    """Upper end."""
-    ratio_through: Annotated[float, "error_ratio_through"]
-    """`ratio` of the transparency."""
+    ratio_through: Annotated[float, "error_ratio_through"]  # of the transparency
     exceeded_through: Annotated[float, "bound_exceeded_through"]
-    """`exceeded` of the transparency."""
-    count: int
-    """Queries."""
+    count: int  # queries
 
     @property
     def holds(self) -> bool:
@@ -109,16 +98,9 @@ class Calibration:
         return low <= RATIOS[1] and high >= RATIOS[0] and min(float(test.pvalue) for test in tests) > 1.0 - _LEVEL
 
 
-def measure(
-    fabrics: int = _FABRICS,
-    rows: int = _ROWS,
-    estimators: Sequence[EstimatorName] = tuple(ESTIMATORS),
-    reference: int = _REFERENCE,
-    seed: int = SEED,
-    kinds: Sequence[str] = tuple(CLASSES),
-) -> Iterator[Calibration]:
-    """Measure the calibration of estimators with their default options; parameters as for `samples`."""
-    for kind, name, behind, answers, exact in samples(fabrics, rows, estimators, reference, seed, kinds):
+def measure(fabrics: int = 4, rows: int = 40, kinds: Sequence[str] = tuple(CLASSES)) -> Iterator[Calibration]:
+    """Measure the calibration of all estimators with their default options; parameters as for `samples`."""
+    for kind, name, behind, answers, exact in samples(fabrics, rows, tuple(ESTIMATORS), 1 << 15, SEED, kinds):
         error, bound = calibrate(answers, behind)
         doubt, _ = calibrate(exact, behind)
         wrong = answers.mean - exact.mean
@@ -140,7 +122,6 @@ def samples(
     """Yield which queries see the cloth's back, answers and reference answers, for each class and estimator.
 
     Queries whose reference is not known to `_PRECISE` of its value are left out: hidden patches, hardly ever others.
-
     So are those that an estimator cannot answer. `fabrics` are random ones a class, `rows` queries a fabric, and
     `reference` fewest points of a reference answer, a power of two; doubtful ones take four times as many.
     """
@@ -168,11 +149,10 @@ def samples(
                     parts.setdefault(name, []).append((queries.behind[known], answers, exact.take(known)))
         for name, of_estimator in parts.items():
             behind, answered, truths = zip(*of_estimator, strict=True)
-            yield kind, name, np.concatenate(behind), _joined(answered), _joined(truths)
-
-
-def _joined(parts: Sequence[Raw]) -> Raw:
-    return Raw(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+            answers, exact = (
+                Raw(*(np.concatenate(columns) for columns in zip(*raws, strict=True))) for raws in (answered, truths)
+            )
+            yield kind, name, np.concatenate(behind), answers, exact
 
 
 def compared(wrong: Float64, error: Float64, bound: Float64, doubt: Float64) -> tuple[float, float]:
@@ -203,4 +183,3 @@ def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, flo
 
 
 RECORDS: Final = RowRecords(Calibration, setting=("estimator", "kind"), once={"low": "low", "high": "high"}, joint=": ")
-"""Calibrations as Records."""

@@ -20,7 +20,6 @@ CLASSES: Final = ("table alone", "borders refined", "sampled")
 RELATIVE_ERROR: Final = 0.01
 """Requested error."""
 
-_ROWS = 1000
 _SEED = 23
 _CLASS_OF: Final = {COARSE_TABLE: 0, FINE_TABLE: 0, REFINED: 1, SAMPLED: 2}
 
@@ -29,18 +28,15 @@ _CLASS_OF: Final = {COARSE_TABLE: 0, FINE_TABLE: 0, REFINED: 1, SAMPLED: 2}
 class Effort:
     """One way of answering on one fabric."""
 
-    kind: str
-    """One of `CLASSES`."""
+    kind: str  # one of `CLASSES`
     fabric: str
-    """Name of the cloth."""
     share: Annotated[float, "kind_share"]
     points: Annotated[float, "kind_points"]
     seconds: Annotated[float, "kind_time"]
-    count: int
-    """Queries of all kinds."""
+    count: int  # queries of all kinds
 
 
-def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Effort]:
+def measure(rows: int = 1000, fabrics: Sequence[str] = FABRICS) -> Iterator[Effort]:
     """Measure how `auto` at `RELATIVE_ERROR` answers so many default queries of every preset."""
     for fabric, queries in default_queries(fabrics, rows, _SEED):
         options = TruthOptions(relative_error=RELATIVE_ERROR, max_count=1 << 14)
@@ -54,4 +50,3 @@ def measure(rows: int = _ROWS, fabrics: Sequence[str] = FABRICS) -> Iterator[Eff
 
 
 RECORDS: Final = RowRecords(Effort, setting=("kind",))
-"""Efforts as Records."""

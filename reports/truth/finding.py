@@ -95,10 +95,10 @@ def judge(
     # What cannot be at all comes before what is merely wrong.
     impossible = ~finite | negative
     row = int(impossible.argmax() if impossible.any() else error.argmax())
-    other, lost = math.nan, 0
+    textbook: dict[str, Any] = {}
     if naive is not None:
         naive_error, naive_finite = _errors(naive, reference, floor, absolute)
-        other, lost = float(naive_error.max()), int((~naive_finite).sum())
+        textbook = {"naive": float(naive_error.max()), "naive_not_finite": int((~naive_finite).sum())}
     return Finding(
         expression=expression,
         corner=corner,
@@ -109,8 +109,7 @@ def judge(
         listed=listed,
         not_finite=int((~finite).sum()),
         negative=int(negative.sum()),
-        naive=other,
-        naive_not_finite=lost,
+        **textbook,
     )
 
 
@@ -119,8 +118,7 @@ def _errors(value: npt.ArrayLike, reference: npt.ArrayLike, floor: float, absolu
 
     Differences are taken in the better of the two arithmetics.
     """
-    truth = np.asarray(reference)
-    good = np.isfinite(np.asarray(value, np.float64))
+    truth, good = np.asarray(reference), np.isfinite(np.asarray(value, np.float64))
     values = np.where(good, value, 0.0)
     if truth.dtype == object:
         from reports.truth.formulas import exact
@@ -146,13 +144,10 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
 
 
 RECORDS: Final = RowRecords(Finding, setting=("expression", "corner"), method_field="arithmetic", once={"note": "at"})
-"""Findings as Records."""
 
 
 def _word(value: Any) -> str:
     """Write an input with the digits that matter."""
     if isinstance(value, str | np.str_):
         return str(value)
-    if np.ndim(value):
-        return "(" + " ".join(f"{float(part):.7g}" for part in value) + ")"
-    return f"{float(value):.7g}"
+    return f"({' '.join(map(_word, value))})" if np.ndim(value) else f"{float(value):.7g}"

@@ -33,9 +33,6 @@ from weaves.fabric import load_fabric
 
 _FABRICS: Final = ("gingham", "houndstooth")
 _SIZES: Final = (0.15, 0.5, 1.0, 2.0, 4.0, 16.0, 64.0)
-"""Standard deviations of footprints, in yarn spacings."""
-
-_ROWS = 400
 _SEED = 41
 _PRECISE = TruthOptions(relative_error=0.003, max_count=1 << 16)
 
@@ -45,20 +42,16 @@ class ColourLoss:
     """Loss by mean colours on one fabric, with footprints of one size."""
 
     fabric: str
-    """Name of the cloth."""
-    size: str
-    """Standard deviation of the footprints, in yarn spacings."""
+    size: str  # standard deviation of the footprints, in yarn spacings
     loss: Annotated[float, "colour_loss"]
     bias: Annotated[float, "colour_bias"]
     seconds: Annotated[float, "mean_colours_time"]
-    exact_seconds: Annotated[float, "exact_colours_time"]
-    """Time of a query's exact colours, to a standard error of .3 %."""
-    count: int
-    """Queries."""
+    exact_seconds: Annotated[float, "exact_colours_time"]  # to a standard error of .3 %
+    count: int  # queries
 
 
 def measure(
-    rows: int = _ROWS, fabrics: Sequence[str] = _FABRICS, sizes: Sequence[float] = _SIZES
+    rows: int = 400, fabrics: Sequence[str] = _FABRICS, sizes: Sequence[float] = _SIZES
 ) -> Iterator[ColourLoss]:
     """Measure the loss on every fabric by every size, single-threaded, with `rows` queries each."""
     set_threads(1)
@@ -82,4 +75,3 @@ def measure(
 
 
 RECORDS: Final = RowRecords(ColourLoss, setting=("size",))
-"""Losses as Records."""

@@ -26,23 +26,14 @@ from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from reports.truth.row_records import RowRecords
 
-_SCENES: Final = ("plane", "sphere", "drape")
-"""Scenes of which frames are rendered."""
-
 OURS: Final = "soft_nodes:2"
 """The method whose gain is stated."""
 
 OTHER: Final = "point_sampled:1"
 """One random point a sample."""
 
-_REFERENCE: Final = "truth"
-"""The method that renders the reference frames."""
-
 SAMPLES: Final[dict[str, tuple[int, ...]]] = {OURS: (1, 4, 16), OTHER: (1, 2, 4, 8, 16, 32, 64)}
 """Samples a pixel of each method."""
-
-_SIZE, _REFERENCE_SAMPLES, _FRAMES = 64, 16, 4
-_DEPTH = 4
 
 
 @dataclass(frozen=True)
@@ -50,30 +41,24 @@ class Traced:
     """One method in one scene with one number of samples."""
 
     method: str
-    """The method."""
-    fabric: str
-    """The scene."""
-    samples: str
-    """Samples a pixel, as text: it is part of the setting."""
+    fabric: str  # the scene
+    samples: str  # a pixel; text, as it is part of the setting
     error: Annotated[float, "traced_error"]
-    seconds: Annotated[float, "traced_time"]
-    """Seconds of a processor for a frame."""
-    count: int
-    """Frames."""
+    seconds: Annotated[float, "traced_time"]  # of a processor for a frame
+    count: int  # frames
     gain: Annotated[float, "traced_gain"] = math.nan
     """Error of one point a sample in equal time over this error; NaN for one point a sample itself, and unknown."""
 
 
 RECORDS: Final = RowRecords(Traced, setting=("samples",), method_field="method")
-"""Frames as Records."""
 
 
 def measure(
-    scenes: Sequence[str] = _SCENES,
-    size: int = _SIZE,
+    scenes: Sequence[str] = ("plane", "sphere", "drape"),
+    size: int = 64,
     samples: Mapping[str, Sequence[int]] = SAMPLES,
-    reference: tuple[str, int] = (_REFERENCE, _REFERENCE_SAMPLES),
-    frames: int = _FRAMES,
+    reference: tuple[str, int] = ("truth", 16),
+    frames: int = 4,
 ) -> Iterator[Traced]:
     """Measure every method in every scene; error and time are means over frames with different random numbers.
 
@@ -107,7 +92,7 @@ def _frames(name: str, method: str, size: int) -> Callable[[int, int], tuple[Flo
     film = {"type": "hdrfilm", "width": size, "height": size, "component_format": "float32", "rfilter": {"type": "box"}}
     view = mi.ScalarTransform4f(loaded.camera.to_world)
     sensor = mi.load_dict({"type": "perspective", **loaded.camera.settings, "to_world": view, "film": film})
-    integrator = mi.load_dict({"type": "twillight_path", "max_depth": _DEPTH})
+    integrator = mi.load_dict({"type": "twillight_path", "max_depth": 4})
 
     def frame(samples: int, seed: int) -> tuple[Float64, float]:
         begun = time.process_time()
@@ -123,6 +108,5 @@ def _error_in(seconds: float, found: Sequence[Traced]) -> float:
 
     In less time than the fewest samples take, it is the error of these; in more than the most take, NaN: it is unknown.
     """
-    known = sorted((row.seconds, row.error) for row in found if row.error > 0)
-    times, errors = np.log(np.array(known)).T
+    times, errors = np.log(sorted((row.seconds, row.error) for row in found if row.error > 0)).T
     return float(np.exp(np.interp(math.log(seconds), times, errors, right=math.nan)))

@@ -27,13 +27,11 @@ class RowRecords(Generic[Row]):
     setting: tuple[str, ...]
     """Fields that together are the setting, joined by `joint`; only the last one may hold the separator."""
     method: str = TRUTH
-    """Method of all Records."""
     method_field: str = ""
     """Field that holds the method; empty if it is `method`."""
     once: Mapping[str, str] = field(default_factory=dict)
     """Attributes of the Record of the first metric, such as ``note``, and the field that each holds."""
     joint: str = " | "
-    """Separator of the parts of a setting."""
 
     @cached_property
     def metrics(self) -> dict[str, Metric]:
@@ -83,9 +81,7 @@ class RowRecords(Generic[Row]):
 
     def _named(self, record: Record) -> dict[str, Any]:
         """Return the fields that name a Record's row."""
-        known = {part.name for part in fields(self.row)}  # type: ignore[arg-type]
-        named: dict[str, Any] = dict(
-            zip(self.setting, record.setting.split(self.joint, len(self.setting) - 1), strict=True)
-        )
-        named |= {"count": record.count, "fabric": record.fabric, self.method_field: record.method}
-        return {name: value for name, value in named.items() if name in known}
+        parts = record.setting.split(self.joint, len(self.setting) - 1)
+        named = {"count": record.count, "fabric": record.fabric, self.method_field: record.method}
+        named |= zip(self.setting, parts, strict=True)
+        return {part.name: named[part.name] for part in fields(self.row) if part.name in named}  # type: ignore[arg-type]

@@ -44,16 +44,11 @@ from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric, load_fabric
 
 _FABRICS: Final = ("silk_charmeuse", "polyester_lining", "organza", "denim")
-"""Lustrous cloth first."""
-
-_SCENES: Final = tuple(SHIPPED)
-"""Scenes whose looks are measured."""
 
 SETTINGS: Final = ("cosine", "cosine by sides", "one point", "lobes")
 """Samplers."""
 
-_LOOKS, _DIRECTIONS = 400, 64
-_REPEATS = 2
+_DIRECTIONS, _REPEATS = 64, 2
 _TO_FAR = 0.1  # share of the flakes' light that reaches the far side, roughly
 _POINT = np.float32(1e-3)  # deviation of a point
 
@@ -62,18 +57,13 @@ _POINT = np.float32(1e-3)  # deviation of a point
 class VarianceSaving:
     """One sampler on one fabric."""
 
-    sampler: str
-    """One of `SETTINGS`."""
-    fabric: str
-    """On which cloth; "(specular)" where its diffuse light is left out; or in which scene."""
+    sampler: str  # one of `SETTINGS`
+    fabric: str  # "(specular)" where its diffuse light is left out; or the scene
     variance_saved: Annotated[float, "variance_saved"]
     saved_in_time: Annotated[float, "saved_in_time"]
-    sample_time: Annotated[float, "sample_time"]
-    """Nanoseconds of a direction with its density."""
-    estimate_time: Annotated[float, "estimate_time"]
-    """Nanoseconds of a direction with its density and value."""
-    count: int
-    """Directions."""
+    sample_time: Annotated[float, "sample_time"]  # nanoseconds of a direction with its density
+    estimate_time: Annotated[float, "estimate_time"]  # nanoseconds of a direction with its density and value
+    count: int  # directions
 
 
 class Subject(NamedTuple):
@@ -84,7 +74,7 @@ class Subject(NamedTuple):
 
 
 def measure(
-    looks: int = _LOOKS, fabrics: Sequence[str] = _FABRICS, scenes: Sequence[str] = _SCENES
+    looks: int = 400, fabrics: Sequence[str] = _FABRICS, scenes: Sequence[str] = tuple(SHIPPED)
 ) -> Iterator[VarianceSaving]:
     """Measure every sampler on every fabric, with all its light and with the specular part alone, and in scenes."""
     for name in fabrics:
@@ -97,7 +87,6 @@ def measure(
 
 
 RECORDS: Final = RowRecords(VarianceSaving, setting=("sampler",), method="sampler")
-"""Savings as Records."""
 
 
 def scene_subjects(name: str, looks: int) -> list[Subject]:
@@ -131,13 +120,13 @@ class _Estimate(NamedTuple):
 def _savings(subjects: Sequence[Subject], name: str) -> Iterator[VarianceSaving]:
     """Yield the savings of all samplers over the looks of some cloths together."""
     parts = list(map(_estimates, subjects))
-    estimates = {sampler: [part[sampler] for part in parts] for sampler in SETTINGS}
     base, base_time = math.nan, math.nan
     for sampler in SETTINGS:
-        values = np.concatenate([estimate.values for estimate in estimates[sampler]])
+        estimates = [part[sampler] for part in parts]
+        values = np.concatenate([estimate.values for estimate in estimates])
         variance = float(values.var(axis=1, ddof=1).mean())
-        draw_time = 1e9 * sum(estimate.draw_seconds for estimate in estimates[sampler]) / values.size
-        whole = 1e9 * sum(estimate.seconds for estimate in estimates[sampler]) / values.size
+        draw_time = 1e9 * sum(estimate.draw_seconds for estimate in estimates) / values.size
+        whole = 1e9 * sum(estimate.seconds for estimate in estimates) / values.size
         if sampler == "cosine":
             base, base_time = variance, whole
         saved = base / variance
@@ -195,8 +184,7 @@ def _weights(bsdf: PatchBSDF, looks: Queries, drawn: _Directions) -> Float64:
 
 def _cosine(looks: Queries, random: Float64, far: Float64, straight: Float64) -> _Directions:
     """Draw directions by the cosine, of which `far` are on the far side, or straight through."""
-    through = random[:, 3] < straight
-    behind = random[:, 0] < far
+    through, behind = random[:, 3] < straight, random[:, 0] < far
     z = np.maximum(np.sqrt(1.0 - random[:, 1]), LEAST_COSINE)
     radius, turn = np.sqrt(random[:, 1]), 2.0 * math.pi * random[:, 2]
     side = np.where(behind, -1.0, 1.0) * np.sign(looks.wo[:, 2])
@@ -237,6 +225,6 @@ def _points_of(looks: Queries, normal: Float64) -> Queries:
 
 def _specular(fabric: Fabric) -> Fabric:
     """Return the fabric without its diffuse light."""
-    black: dict[str, Any] = {"diffuse": (0.0, 0.0, 0.0), "diffuse_transmission": (0.0, 0.0, 0.0)}
+    black = dict.fromkeys(("diffuse", "diffuse_transmission"), (0.0, 0.0, 0.0))
     yarns = {name: getattr(fabric, name).model_copy(update=black) for name in ("warp", "weft")}
     return fabric.model_copy(update=yarns)

@@ -2,7 +2,7 @@
 
 `expressions` is the table of what is computed, over which corners and by which forms; `judged` is the loop over it.
 Single precision is what answers queries from tables: the loops of `pipeline.truth.node_table.kernels`, called here on
-one node at a time, or their formula on arrays. Double precision is `microflake`, `slab` and `heightfield`.
+one node at a time, or their formula on arrays. Double precision is `slab` and `heightfield`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,6 @@ _THICKNESSES: Final = (0.001, 0.1, 2.0, 100.0)
 _STEPS: Final = (0.0, 30.0, 60.0, 80.0, 89.0, 89.9)
 _ROUNDING: Final = 2.0**-24
 _DARK: Final = (1e-30, 1e-280)  # below these single and double precision hold no light
-_FACTORS: Final = 3  # roundings in an exponent -T sigma / cos
 _NEAREST: Final = 0.5  # least |wi + wo| where the half vector is well-conditioned
 _TERMS: Final = 1 << 22
 _PIECE: Final = 1024  # nodes a float has, about: summed in single precision, and the pieces in double
@@ -73,6 +72,7 @@ _THROUGH, _TORUS, _SUM = 2.5e-7, 3e-7, 3.5e-8
 
 Form = Callable[..., Any]
 Columns = dict[str, Array]
+Choices = tuple[float, ...]
 _NONE, _ONE = np.zeros(1, np.float32), np.ones(1, np.float32)
 _LEVEL = Normals(_NONE, _NONE, _ONE, _ONE)
 
@@ -140,10 +140,9 @@ def expressions() -> Iterator[Expression]:
     )
     yield Expression("σ", _near_axis, sigma, sigma_of, textbook_sigma, sigma_of, textbook_sigma)
     yield Expression("D", _half_vectors, density, _density_of, matrix_density, _density_of, textbook_density)
-    for name, corners in (("f_r", partial(_slabs, False)), ("f_t", partial(_slabs, True))):
-        yield Expression(
-            name, corners, _slab_of_node, _lit(slab_of), _lit(textbook_slab), slab_of, textbook_slab, _DARK
-        )
+    for name, behind in (("f_r", False), ("f_t", True)):
+        forms = _slab_of_node, _lit(slab_of), _lit(textbook_slab), slab_of, textbook_slab
+        yield Expression(name, partial(_slabs, behind), *forms, _DARK)
     yield Expression("exp(−TΛ)", _crossings, _crossing_of_node, _unscattered_of, dark=_DARK)
     # What rounding the directions does, which no form helps.
     yield Expression("cos", _grazing, dot, dot)
@@ -199,21 +198,14 @@ def _slabs(behind: bool) -> Iterator[Corner]:
     """Yield angles, thicknesses and roughnesses of f_r, or of f_t."""
     steepest = 80.0 if behind else 89.9
     for alpha, listed in (_TRANSMISSION if behind else _REFLECTION).items():
-        for label, light, depths in (
-            (f"{steepest:g}°", (steepest,), (2.0,)),
-            ("any angle and T", _STEPS, _THICKNESSES),
-        ):
+        kinds = (f"{steepest:g}°", (steepest,), (2.0,)), ("any angle and T", _STEPS, _THICKNESSES)
+        for label, light, depths in kinds:
             viewer = tuple(step for step in _STEPS if step <= max(light))
             columns = draw(1500, alpha, light, viewer, depths, behind)
             # In a deep layer an exponential rules, which adds to the rounding of its exponent what the exponent says.
             rule, finer = (_exponent(dark) * _ROUNDING if behind and len(depths) > 1 else 0.0 for dark in _DARK)
-            yield Corner(
-                f"α = {alpha:g}, {label}",
-                _rounded(**columns),
-                listed + rule,
-                _first(150, columns),
-                listed * DOUBLE + finer * DOUBLE,
-            )
+            few, listed_double = _first(150, columns), listed * DOUBLE + finer * DOUBLE
+            yield Corner(f"α = {alpha:g}, {label}", _rounded(**columns), listed + rule, few, listed_double)
 
 
 def _crossings() -> Iterator[Corner]:
@@ -240,13 +232,8 @@ def _forward() -> Iterator[Corner]:
 
 
 def draw(
-    count: int,
-    alpha: float,
-    light: tuple[float, ...],
-    viewer: tuple[float, ...],
-    thickness: tuple[float, ...],
-    behind: bool = False,
-) -> dict[str, Array]:
+    count: int, alpha: float, light: Choices, viewer: Choices, thickness: Choices, behind: bool = False
+) -> Columns:
     """Return lit points in the frame of the yarn, whose normal is z: columns wi, wo, t, alpha and T.
 
     `light` and `viewer` are angles to the normal, degrees. Fibres lie across the normal: a third anywhere, a third near
@@ -274,12 +261,11 @@ def draw(
 
 
 def sigma_of(w: Array, t: Array, alpha: Array) -> Array:
-    """Return sigma as `microflake` computes it."""
+    """Return sigma as `slab` computes it."""
     return _each(slab.sigma, *w, *t, alpha)
 
 
 def _density_of(v: Array, t: Array, alpha: Array) -> Array:
-    """Return D as `microflake` computes it."""
     return _each(slab.density, *v, *t, alpha)
 
 
@@ -307,24 +293,20 @@ def _halved(form: Form) -> Form:
 def _slab_of_node(wi: Array, wo: Array, t: Array, alpha: Array, thickness: Array) -> Array:
     """Return f_r or f_t, times the two cosines, as the loops over nodes compute it in single precision."""
     behind = True if wi[2, 0] < 0 else None
-    function: Form = kernels.scattered
+    scattered: Form = kernels.scattered
     inverse = (1 / np.maximum(np.square((wi + wo).astype(np.float64)).sum(axis=0), 1e-12)).astype(np.float32)
     rows = zip((-wi if behind else wi).T, wo.T, t.T[..., None], alpha, thickness, inverse, strict=True)
     return np.array([
-        function(
-            _LEVEL, Tangents(*fibre), _towards(light), _towards(viewer), size, _layer(a, depth), _ONE, 0 * _ONE, behind
-        )
-        for light, viewer, fibre, a, depth, size in rows
+        scattered(_LEVEL, Tangents(*t), _towards(wi), _towards(wo), size, _layer(a, depth), _ONE, 0 * _ONE, behind)
+        for wi, wo, t, a, depth, size in rows
     ])  # fmt: skip
 
 
 def _crossing_of_node(wo: Array, t: Array, alpha: Array, thickness: Array) -> Array:
     """Return exp(-T Lambda) towards the viewer as the loop over nodes computes it in single precision."""
-    function: Form = kernels.crossing
+    crossing: Form = kernels.crossing
     rows = zip(wo.T, t.T[..., None], alpha, thickness, strict=True)
-    return np.array([
-        function(_LEVEL, Tangents(*fibre), _towards(viewer), _layer(a, depth), _ONE) for viewer, fibre, a, depth in rows
-    ])  # fmt: skip
+    return np.array([crossing(_LEVEL, Tangents(*t), _towards(wo), _layer(a, depth), _ONE) for wo, t, a, depth in rows])
 
 
 def _towards(w: Array) -> Direction:
@@ -400,10 +382,9 @@ def _sum(label: str, terms: Array, listed: float) -> Expression:
 def places() -> list[Finding]:
     """Judge the place within the repeat of points far away: an absolute error, in yarn spacings."""
     findings = []
-    random = np.random.default_rng(9)
+    random, count = np.random.default_rng(9), 2000
     function: Form = place
     for far in (1e4, _FAR):
-        count = 2000
         repeats = random.integers(1, 65, count)
         # Centres come in single precision: sixteenths of a yarn are what it still holds at a million.
         centre = (far + random.integers(0, 64 * 16, count) / 16).astype(np.float32)
@@ -419,8 +400,7 @@ def places() -> list[Finding]:
         # Rounding may put a place at the other end of the repeat.
         value, naive = (v + repeats * np.round((truth.astype(np.float64) - v) / repeats) for v in (value, naive))
         corner = f"{far:.0e} yarns away".replace("e+0", "e")
-        listed = far * 2.0**-53
-        findings.append(judge("place", corner, "float64", inputs, value, truth, listed, naive, absolute=True))
+        findings.append(judge("place", corner, "float64", inputs, value, truth, far * 2.0**-53, naive, absolute=True))
     return findings
 
 
@@ -485,15 +465,15 @@ def _around_axis(random: np.random.Generator, count: int, apart: float = 0.0) ->
 
 def _exponent(darkest: float) -> float:
     """Return by how much the roundings of an exponent count, at most, in an exponential that is not dark yet."""
-    return -math.log(darkest) * _FACTORS
+    return -math.log(darkest) * 3  # -T sigma / cos
 
 
-def _rounded(**columns: Array) -> dict[str, Array]:
+def _rounded(**columns: Array) -> Columns:
     """Return columns that single precision holds, in float64."""
     return {name: column.astype(np.float32).astype(np.float64) for name, column in columns.items()}
 
 
-def _first(count: int, columns: Columns) -> dict[str, Array]:
+def _first(count: int, columns: Columns) -> Columns:
     return {name: column[..., :count] for name, column in columns.items()}
 
 

@@ -58,22 +58,14 @@ _TRAINING: Final = TruthOptions(relative_error=0.05, min_count=64, max_count=102
 class Rate:
     """One measured speed."""
 
-    what: str
-    """Work that was counted."""
+    what: str  # work that was counted
     fabric: str
-    """Name of the cloth."""
-    value: Annotated[float, "rate"]
-    """In `unit`; the median."""
-    low: float
-    """First quartile."""
-    high: float
-    """Third quartile."""
+    value: Annotated[float, "rate"]  # in `unit`; the median
+    low: float  # first quartile
+    high: float  # third quartile
     unit: str
-    """Such as ``points/s``."""
     note: str = ""
-    """Conditions of the measurement."""
-    count: int = _REPEATS
-    """Timed calls."""
+    count: int = _REPEATS  # timed calls
 
 
 def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate]:
@@ -89,7 +81,6 @@ def measure(rows: int = 2000, fabrics: Sequence[str] = FABRICS) -> Iterator[Rate
 
 
 RECORDS: Final = RowRecords(Rate, setting=("what",), once={name: name for name in ("low", "high", "unit", "note")})
-"""Rates as Records."""
 
 
 def _rate(
@@ -121,16 +112,9 @@ def _points() -> Iterator[Rate]:
         call = partial(evaluate, model, table, columns, shares)
         rate = _rate(call, float, f"points, {name}", fabric.name, "points/s")
         yield replace(rate, note=f"{rate.value / plain.value:.0f} x NumPy")
-    exact = fixed("owen", 1024)
-    few = queries.take(slice(200))
-    yield _rate(
-        lambda: estimate(fabric, few, exact, _SEED),
-        lambda answers: answers.count.sum(),
-        "points, by traced view rays",
-        fabric.name,
-        "points/s",
-        "float64",
-    )
+    traced = partial(estimate, fabric, queries.take(slice(200)), fixed("owen", 1024), _SEED)
+    name = "points, by traced view rays"
+    yield _rate(traced, lambda answers: answers.count.sum(), name, fabric.name, "points/s", "float64")
 
 
 @kernel
@@ -243,9 +227,9 @@ def _memory(fabric: Fabric, rows: int) -> Rate:
     return Rate("memory for ten times the queries", fabric.name, float(many - few), 0.0, 0.0, "bytes")
 
 
-def _numpy_points(fabric: Fabric, table: ExactNodes, queries: Queries, points: int = 20_000) -> int:
+def _numpy_points(fabric: Fabric, table: ExactNodes, queries: Queries) -> int:
     """Evaluate random points of the repeat by array expressions; return how many."""
-    random = np.random.default_rng(1)
+    random, points = np.random.default_rng(1), 20_000
     ends, picks = fabric.weave.repeat
     x, y = random.random(points) * ends, random.random(points) * picks
     nodes = random.integers(0, table.slope.shape[1], points)
