@@ -36,30 +36,18 @@ COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])
 """Colours of the colour measure: one channel, (4, 1)."""
 
 
-_MOST: Final = 0.99
-"""Share of the queries that `most_error` keeps."""
-
-
 @dataclass(frozen=True)
 class Error:
     """A mean squared error with its interval and the noise of the truth."""
 
-    value: float
-    """MSE with the noise of the truth subtracted."""
-    standard_error: float
-    """Of `value`, from the spread over queries."""
-    low: float
-    """Lower end of the 95 % interval of `value`."""
+    value: float  # MSE with the noise of the truth subtracted
+    standard_error: float  # of `value`, from the spread over queries
+    low: float  # lower end of the 95 % interval of `value`
     high: float
-    """Upper end."""
-    measured: float
-    """MSE as measured."""
-    noise: float
-    """Mean squared standard error of the truth."""
-    mean: float
-    """Mean of the truth."""
-    count: int
-    """Queries (pixels)."""
+    measured: float  # MSE as measured
+    noise: float  # mean squared standard error of the truth
+    mean: float  # of the truth
+    count: int  # queries (pixels)
 
     @property
     def relative_rmse(self) -> float:
@@ -90,7 +78,7 @@ def squared_error(
     return Error(value, spread, low, high, measured, noise, float(t.mean()), len(rows))
 
 
-def relative_weight(truth: npt.ArrayLike, epsilon: float = 0.01) -> Float64:
+def relative_weight(truth: npt.ArrayLike, epsilon: float) -> Float64:
     """Return 1 / sqrt(t^2 + epsilon <t>^2), in the truth's shape; the truth may not be zero everywhere."""
     t = np.asarray(truth, np.float64)
     return np.asarray(1.0 / np.sqrt(t**2 + epsilon * t.mean() ** 2))
@@ -115,22 +103,19 @@ def colour_error(values: npt.ArrayLike, answers: Answers, colours: Float64, resa
 
 
 def most_error(values: npt.ArrayLike, answers: Answers) -> Error:
-    """Return the error in the colour measure of the share `_MOST` of all queries, those of the largest errors left out.
+    """Return the error in the colour measure of 99 % of all queries, those of the largest errors left out.
 
     Arguments as in `colour_error`; the noise of the truth is subtracted without choosing by it.
     """
     seen, truth = (_coloured(np.asarray(x, np.float64), COLOUR_WEIGHTS) for x in (values, answers.mean))
-    kept = np.argsort(np.abs(seen - truth)[:, 0], kind="stable")[: math.ceil(_MOST * len(seen))]
+    kept = np.argsort(np.abs(seen - truth)[:, 0], kind="stable")[: math.ceil(0.99 * len(seen))]
     return squared_error(seen[kept], truth[kept], colour_noise(answers, COLOUR_WEIGHTS)[kept], resamples=0)
 
 
 def component_errors(values: npt.ArrayLike, answers: Answers) -> list[Error]:
     """Return the mean squared error of each component, in the order of `pipeline.truth.conventions.COMPONENTS`."""
-    components = np.asarray(values)
-    return [
-        squared_error(components[:, j], answers.mean[:, j], answers.standard_error[:, j], resamples=0)
-        for j in range(components.shape[1])
-    ]
+    columns = zip(np.asarray(values).T, answers.mean.T, answers.standard_error.T, strict=True)
+    return [squared_error(value, mean, error, resamples=0) for value, mean, error in columns]
 
 
 def colour_noise(answers: Answers, colours: Float64) -> Float64:

@@ -70,22 +70,16 @@ def measure_answers(
         first = slice(options.rows)
         some = held_out._replace(queries=held_out.queries.take(first), truth=held_out.truth.take(first))
         if answers.shape[1] == len(COMPONENTS):
-            method = HandedIn(subject.method, [(some, values[first])])
-            measured = measure_errors(method, some, options.seed)
+            measured = measure_errors(HandedIn(subject.method, [(some, values[first])]), some, options.seed)
         else:
-            measured = _measure_colours(subject, some, values[first])
+            colours = colours_of(some.fabric, some.queries)
+            truth, noise = coloured(some.truth.mean, colours), colour_noise(some.truth, colours)
+            of_fabric = subject.model_copy(update={"fabric": some.fabric.name, "scene": "queries"})
+            measured = of_fabric.of_error(squared_error(values[first], truth, noise))
         records += [record.model_copy(update={"role": role}) for record in measured]
     if answers.shape[1] == len(COMPONENTS):
         records += measure_errors_by_size([HandedIn(subject.method, parts[:named])], rows[:named], options.seed)
     return [record.model_copy(update={"provenance": subject.provenance}) for record in records]
-
-
-def _measure_colours(subject: Record, rows: HeldOutFabric, rgb: Float32) -> list[Record]:
-    """Measure the MSE of answers in linear RGB."""
-    colours = colours_of(rows.fabric, rows.queries)
-    error = squared_error(rgb, coloured(rows.truth.mean, colours), colour_noise(rows.truth, colours))
-    of_fabric = subject.model_copy(update={"fabric": rows.fabric.name, "scene": "queries"})
-    return of_fabric.of_error(error)
 
 
 def _keys(queries: Queries) -> list[bytes]:

@@ -50,8 +50,6 @@ SHINY: Final = f", alpha = {LUSTROUS:g}"
 """Ending of the names of lustrous fabrics."""
 
 _AZIMUTHS = (0.4, 2.1)  # of light and viewer
-_PLACES = 2
-_SIXTEENTH = 16
 
 
 def lustrous(fabric: Fabric) -> Fabric:
@@ -61,23 +59,19 @@ def lustrous(fabric: Fabric) -> Fabric:
 
 
 class ExtremeInputs(NamedTuple):
-    """Queries about one fabric."""
+    """Queries about one fabric, of all footprints, angles and places."""
 
     queries: Queries
-    """Queries of all footprints, angles and places."""
-    far: Queries
-    """The same footprints a million yarns away."""
-    size: Float64
-    """Footprint of each, in repeats."""
-    grazing: Mask
-    """True if light or viewer graze."""
+    far: Queries  # the same footprints a million yarns away
+    size: Float64  # footprint of each, in repeats
+    grazing: Mask  # True if light or viewer graze
 
 
 def extremes(repeat: tuple[int, int]) -> ExtremeInputs:
     """Return the queries about a fabric of this repeat: 5 footprints x 9 pairs of angles x 2 places."""
     random = np.random.default_rng(0)
     # Sixteenths of a yarn: what single precision holds far away too.
-    places = random.integers(0, np.array(repeat) * _SIXTEENTH, (_PLACES, 2)) / _SIXTEENTH
+    places = random.integers(0, np.array(repeat) * 16, (2, 2)) / 16
     rows = list(itertools.product(FOOTPRINTS, _ANGLES, _ANGLES, places.tolist()))
     size, light, viewer = (np.array([row[k] for row in rows], np.float64) for k in range(3))
     centre, period = np.array([row[3] for row in rows]).T, np.array(repeat)[:, None]
@@ -132,18 +126,13 @@ def _measured(
     """Return a method's answers and the measurements of them alone."""
     near, far = (_evaluated(method, fabric, queries) for queries in (inputs.queries, inputs.far))
     wide, wider = (_evaluated(method, fabric, inputs.queries.take(inputs.size == size)) for size in FOOTPRINTS[-2:])
-    every = np.concatenate([near, far])
-    lost, count = int((~np.isfinite(every)).any(axis=1).sum()), len(every)
-    records = [
-        subject.of("extreme_not_finite", lost, count),
-        subject.of("extreme_negative", int((every < 0).any(axis=1).sum()), count),
-    ]
-    rows = [(size, (inputs.size == size) & ~inputs.grazing) for size in FOOTPRINTS]
-    curve = tuple((size, _relative(near[chosen], truth[chosen])) for size, chosen in rows)
-    curve = tuple(point for point in curve if math.isfinite(point[1]))
-    if curve:
+    every, grazing = np.concatenate([near, far]), inputs.grazing
+    wrong = {"extreme_not_finite": ~np.isfinite(every), "extreme_negative": every < 0}
+    records = [subject.of(metric, int(rows.any(axis=1).sum()), len(every)) for metric, rows in wrong.items()]
+    rows = [(size, (inputs.size == size) & ~grazing) for size in FOOTPRINTS]
+    points = ((size, _relative(near[chosen], truth[chosen])) for size, chosen in rows)
+    if curve := tuple(point for point in points if math.isfinite(point[1])):
         records.append(subject.of("extreme_error", max(error for _, error in curve), len(near), curve=curve))
-    grazing = inputs.grazing
     records += _of(subject, "extreme_grazing", _relative(near[grazing], truth[grazing]), int(grazing.sum()))
     records += _of(subject, "extreme_far", _largest(far, near), len(far))
     records += _of(subject, "extreme_large", _largest(wider, wide), len(wide))

@@ -33,12 +33,16 @@ _LUMINANCE = np.array(LUMINANCE)[:, None]
 class _Frames(NamedTuple):
     """The truth's frames under unit irradiance."""
 
-    truth: Float64
-    """Luminance, (F, H, W); 0 where no cloth is lit."""
-    noise: Float64
-    """Its standard error."""
-    lit: Mask
-    """Pixels that show lit cloth, (H, W); the same in every frame."""
+    truth: Float64  # luminance, (F, H, W); 0 where no cloth is lit
+    noise: Float64  # its standard error
+    lit: Mask  # pixels that show lit cloth, (H, W); the same in every frame
+
+    def spectrum_of(self, subject: Record, frames: Float64, noise: Float64) -> Record:
+        """Return the radially averaged spectrum of the rows that are lit from end to end, over the truth's mean^2."""
+        rows = self.lit.all(axis=1)
+        rings, mean = spectrum(frames[:, rows], noise[:, rows]), float(self.truth[:, rows].mean())
+        curve = tuple((float(k), float(p) / mean**2) for k, p in zip(rings.frequency, rings.power, strict=True))
+        return subject.of("spectrum", rings.high / mean**2, len(frames), curve=curve)
 
 
 def render_frames(fabric: Fabric, options: FrameOptions, path: Path) -> None:
@@ -71,28 +75,25 @@ def measure_aliasing(method: Method, fabric: Fabric, options: FrameOptions, fram
         values = method.predict(fabric, queries, seed)
         planes.append(_spread(gbuffer, shade(fabric, values, queries, bounces=1) @ _LUMINANCE))
     shown = np.array(planes)
-    lit, rows = reference.lit, reference.lit.all(axis=1)  # the spectrum is of rows that are lit from end to end
+    lit, rows = reference.lit, reference.lit.all(axis=1)
     subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, scene="plane")
     motion = flicker(shown[:, lit], reference.truth[:, lit], reference.noise[:, lit])
     energy = excess_energy(shown[:, rows], reference.truth[:, rows], reference.noise[:, rows])
     return [
         subject.of("flicker", motion, options.frames),
         subject.of("excess_energy", energy, options.frames),
-        _spectrum(subject, shown[:, rows], np.zeros(1), float(reference.truth[:, rows].mean())),
+        reference.spectrum_of(subject, shown, np.zeros_like(shown)),
     ]
 
 
 def measure_truth_frames(fabric: Fabric, options: FrameOptions, frames: Path) -> list[Record]:
     """Measure the truth's own frames: the variance that the motion brings, and their spectrum."""
     reference = _read(frames, options)
-    lit, rows = reference.lit, reference.lit.all(axis=1)  # the spectrum is of rows that are lit from end to end
     subject = Record(method=TRUTH, fabric=fabric.name, scene="plane")
-    own = temporal_variance(reference.truth[:, lit], reference.noise[:, lit])
-    mean = float(reference.truth[:, lit].mean())
-    return [
-        subject.of("motion", own / mean**2, options.frames),
-        _spectrum(subject, reference.truth[:, rows], reference.noise[:, rows], float(reference.truth[:, rows].mean())),
-    ]
+    truth, noise = reference.truth[:, reference.lit], reference.noise[:, reference.lit]
+    motion = temporal_variance(truth, noise) / float(truth.mean()) ** 2
+    own = reference.spectrum_of(subject, reference.truth, reference.noise)
+    return [subject.of("motion", motion, options.frames), own]
 
 
 def _view(options: FrameOptions, index: int) -> GBuffer:
@@ -111,10 +112,3 @@ def _spread(gbuffer: GBuffer, values: npt.NDArray[np.floating]) -> Float64:
     plane = np.zeros(gbuffer.lit.shape)
     plane[gbuffer.lit] = values[:, 0]
     return plane
-
-
-def _spectrum(subject: Record, frames: Float64, noise: Float64, mean: float) -> Record:
-    """Return the radially averaged spectrum, relative to the squared mean of the truth."""
-    rings = spectrum(frames, noise)
-    curve = tuple((float(k), float(p) / mean**2) for k, p in zip(rings.frequency, rings.power, strict=True))
-    return subject.of("spectrum", rings.high / mean**2, len(frames), curve=curve)

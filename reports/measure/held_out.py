@@ -48,8 +48,6 @@ EDITS: Final = 5
 """Fabrics never seen before that a method is timed to prepare."""
 _LONGEST_EDITS: Final = 10_000.0  # milliseconds
 
-_COMPONENT_METRICS: Final[tuple[Metric, ...]] = tuple(f"rrmse_{name}" for name in COMPONENTS)
-
 
 class HeldOutFabric(NamedTuple):
     """Held-out queries about a fabric, with the truth's answers."""
@@ -78,7 +76,7 @@ def measure_errors(method: Method, rows: HeldOutFabric, seed: int) -> list[Recor
     records = subject.of_error(colour_error(values, truth, colours_of(rows.fabric, rows.queries)))
     relative: dict[Metric, Error] = {"colour_rrmse": colour_error(values, truth, COLOUR_WEIGHTS, resamples=0)}
     relative["colour_rrmse_99"] = most_error(values, truth)
-    relative |= dict(zip(_COMPONENT_METRICS, component_errors(values, truth), strict=True))
+    relative |= zip((f"rrmse_{name}" for name in COMPONENTS), component_errors(values, truth), strict=True)
     black = np.asarray(~values.any(axis=1) & truth.mean.any(axis=1))
     records.append(subject.of("zero_answers", float(black.mean()), len(black)))
     # A component that is nowhere seen has no relative error.
@@ -155,14 +153,12 @@ def _times(
         for subject, contender in entries
         for threads in thread_counts(options.threads)
     ]
-    timings = time_side_by_side(
-        [contender for _, contender in runs], options.timing_repeats, options.warm_up, progress=progress
-    )
+    contenders, repeats = [contender for _, contender in runs], options.timing_repeats
+    timings = time_side_by_side(contenders, repeats, options.warm_up, progress=progress)
     records = []
     for (subject, contender), timing in zip(runs, timings, strict=True):
         about = subject.model_copy(update={"note": f"{len(contender.queries[0][1].u)} queries a fabric"})
         records.append(timed(about, "time", timing.samples))
-        repeats = len(timing.samples)
         records.append(subject.of("processor_time", 1e-3 * timing.processor, repeats))
         if contender.threads == 1:
             records.append(subject.of("waited", timing.waited, repeats))

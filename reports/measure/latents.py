@@ -35,12 +35,6 @@ from weaves.yarn import Yarn
 SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Positions between the first fabric (0) and the second (1) at which errors are measured."""
 
-_ROWS: Final = 1024
-"""Queries at each of them."""
-
-_EDITS: Final = 25
-"""Edits that are timed, of each kind."""
-
 _SEED = 31
 _BLENDED = ("width", "bend", "twist", "roughness", "relief", "blend")
 
@@ -80,12 +74,12 @@ def pairs() -> list[Pair]:
 
 def between(pair: Pair, share: float) -> Fabric:
     """Return the fabric whose yarns lie at `share` of the way; colours are the first one's."""
-    warp = _between(pair.first.warp, pair.second.warp, share)
-    return pair.first.model_copy(update={"warp": warp, "weft": _between(pair.first.weft, pair.second.weft, share)})
+    yarns = {name: _between(getattr(pair.first, name), getattr(pair.second, name), share) for name in ("warp", "weft")}
+    return pair.first.model_copy(update=yarns)
 
 
 def measure_paths(
-    method: Method, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = _ROWS
+    method: Method, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = 1024
 ) -> list[Record]:
     """Return the errors of blending and of encoding anew along the path between two fabrics.
 
@@ -106,10 +100,10 @@ def measure_paths(
     return records
 
 
-def measure_edits(method: Method, fabric: Fabric, repeats: int = _EDITS) -> list[Record]:
+def measure_edits(method: Method, fabric: Fabric, repeats: int = 25) -> list[Record]:
     """Return the time until answers can follow an edit of a yarn, and one of a colour: medians, in milliseconds.
 
-    Edits change the warp's relief, or its diffuse colour, a little each time: no two fabrics are the same.
+    Edits, `repeats` of each, change the warp's relief or its diffuse colour a little: no two fabrics are the same.
     """
     subject = Record(method=method.name, setting=method.setting, fabric=fabric.name)
     method.prepare(fabric)
@@ -142,11 +136,10 @@ def _truths(pair: Pair, queries: Queries, truth: TruthOptions) -> list[Answers]:
     """Return the truth at every share: of the yarns in between, or the cross-fade of both drafts."""
     if pair.differs == "yarns":
         return [estimate(between(pair, share), queries, truth, _SEED) for share in SHARES]
-    ends = estimate(pair.first, queries, truth, _SEED), estimate(pair.second, queries, truth, _SEED + 1)
-    return [_faded(*ends, share) for share in SHARES]
-
-
-def _faded(first: Answers, second: Answers, share: float) -> Answers:
-    mean = (1.0 - share) * first.mean + share * second.mean
-    error = np.hypot((1.0 - share) * first.standard_error, share * second.standard_error)
-    return Answers.opaque(mean.astype(np.float32), error.astype(np.float32), first.count + second.count)
+    first, second = estimate(pair.first, queries, truth, _SEED), estimate(pair.second, queries, truth, _SEED + 1)
+    faded = []
+    for share in SHARES:
+        mean = (1.0 - share) * first.mean + share * second.mean
+        error = np.hypot((1.0 - share) * first.standard_error, share * second.standard_error)
+        faded.append(Answers.opaque(mean.astype(np.float32), error.astype(np.float32), first.count + second.count))
+    return faded

@@ -17,17 +17,15 @@ from typing import Final
 UNSURE: Final = 16_000_000
 """Bytes by which an answer may be wrong: 10 MB were seen."""
 
-_RESET_LARGEST = "5"  # see proc(5), clear_refs
 
-
-def peak_memory(call: Callable[[], object], repeats: int = 3) -> float | None:
-    """Return the bytes that a call adds to the process at most: the median of some calls, after one to warm up.
+def peak_memory(call: Callable[[], object]) -> float | None:
+    """Return the bytes that a call adds to the process at most: the median of three calls, after one to warm up.
 
     None where the system does not report it: on all systems but Linux with glibc.
     """
     call()
     added = []
-    for _ in range(repeats):
+    for _ in range(3):
         if not _start_anew():
             return None
         before = _kilobytes("VmRSS")
@@ -40,7 +38,7 @@ def _start_anew() -> bool:
     """Hand freed memory back and forget the largest size so far; False where that cannot be done."""
     try:
         ctypes.CDLL(None).malloc_trim(0)
-        Path("/proc/self/clear_refs").write_text(_RESET_LARGEST)
+        Path("/proc/self/clear_refs").write_text("5")  # see proc(5)
     except (OSError, AttributeError, TypeError):
         return False
     return True

@@ -43,10 +43,8 @@ class _KnowsRims(Protocol):
 class Edge(NamedTuple):
     """Pictures of the strip, the outline at the right."""
 
-    coverage: Float64
-    """Share of a pixel that the cloth covers, (H, W)."""
-    light: Float64
-    """Linear RGB, (H, W, 3)."""
+    coverage: Float64  # share of a pixel that the cloth covers, (H, W)
+    light: Float64  # linear RGB, (H, W, 3)
 
 
 def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
@@ -61,17 +59,11 @@ def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
     # World: x towards the edge, y along the axis, z to the camera; local frame: tangent, axis, normal.
     turn, rise = (math.radians(angle) for angle in options.light)
     light = np.array([math.sin(turn) * math.cos(rise), math.sin(rise), math.cos(turn) * math.cos(rise)])
-    frame = np.stack(
-        [np.stack([cosine, zero, -sine], -1), np.stack([zero, one, zero], -1), np.stack([sine, zero, cosine], -1)], 1
-    )
-    wi, wo = frame @ light, frame[:, :, 2]
-    result = Queries.round(
-        np.mod(radius * np.arcsin(sine), repeat[0]).astype(np.float32),
-        np.mod(v, repeat[1]).astype(np.float32),
-        (0.5 * pixel / np.sqrt(cosine)).astype(np.float32),
-        wi.astype(np.float32),
-        wo.astype(np.float32),
-    )
+    axes = [cosine, zero, -sine], [zero, one, zero], [sine, zero, cosine]
+    frame = np.stack([np.stack(axis, -1) for axis in axes], 1)
+    u, v = np.mod(radius * np.arcsin(sine), repeat[0]), np.mod(v, repeat[1])
+    columns = u, v, 0.5 * pixel / np.sqrt(cosine), frame @ light, frame[:, :, 2]
+    result = Queries.round(*(column.astype(np.float32) for column in columns))
     return result._replace(curvature=np.full(len(v), 1.0 / radius, np.float32))
 
 

@@ -4,9 +4,12 @@ All methods answer the same queries; they take turns, so that whatever else the 
 called a few times before the clock counts. A GPU is waited for before both readings of the clock. One call answers the
 queries of several fabrics in turn, because the cost of the point model depends on the weave. On several threads every
 thread makes that call, as a renderer gives each of its threads a tile of the picture; a method itself never uses more
-than one. Numbers of different machines are never compared. Beside the time, the processor time is measured, and the
-energy where the system reports it. On one thread, time in which the processor did other work is waiting: on a quiet
-machine next to nothing.
+than one. Numbers of different machines are never compared. On one thread, time in which the processor did other work is
+waiting: on a quiet machine next to nothing.
+
+The energy is that of all packages of the processor, cores that do nothing included, where Linux lets it be read. Its
+counters are those of RAPL, which begin again at their range. Some systems let only the administrator read them, some
+machines have none, and GPUs are not part of it.
 """
 
 from __future__ import annotations
@@ -17,17 +20,15 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from pipeline.cores import cores
 from pipeline.truth.query import Queries
-from reports.measure import energy
 from reports.record import Metric, Record
 from weaves.fabric import Fabric
-
-Predict = Callable[[Fabric, Queries], object]
 
 LONGEST: Final = 0.25
 """Seconds that one timed call of a method, over all its fabrics, should not exceed by much."""
@@ -35,12 +36,13 @@ LONGEST: Final = 0.25
 FEWEST: Final = 16
 """Least queries a fabric in a call."""
 
+_ZONES = Path("/sys/class/powercap")
+
 
 class Contender(NamedTuple):
     """A method and the queries it is timed on."""
 
-    predict: Predict
-    """Answers queries about a fabric."""
+    predict: Callable[[Fabric, Queries], object]
     queries: Sequence[tuple[Fabric, Queries]]
     """Fabrics it covers, each with its queries; one timed call answers them all."""
     threads: int = 1
@@ -66,7 +68,7 @@ class CallTiming(NamedTuple):
     processor: float = math.nan
     """Mean processor time in nanoseconds, of all threads together."""
     joules: float = math.nan
-    """Mean energy of the processor; NaN where it cannot be read (`reports.measure.energy`)."""
+    """Mean energy of the processor; NaN where it cannot be read."""
 
     @property
     def waited(self) -> float:
@@ -82,7 +84,7 @@ class CallTiming(NamedTuple):
 def time_side_by_side(
     contenders: Sequence[Contender],
     repeats: int,
-    warm_up: int = 3,
+    warm_up: int,
     clock: Callable[[], int] = time.perf_counter_ns,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[CallTiming]:
@@ -101,12 +103,12 @@ def time_side_by_side(
         for turn in range(repeats):
             for index, contender in enumerate(contenders):
                 _synchronise()
-                counters, start, ran_before = energy.counters(), clock(), time.process_time_ns()
+                counters, start, ran_before = _counters(), clock(), time.process_time_ns()
                 _call(contender, pool)
                 _synchronise()
                 elapsed[index].append(clock() - start)
                 ran[index] += time.process_time_ns() - ran_before
-                used[index] += energy.joules(counters)
+                used[index] += _joules(counters)
             progress((warm_up + turn + 1) / (warm_up + repeats))
     return [
         CallTiming(tuple(reading / rows for reading in readings), own / rows / repeats, joules / rows / repeats)
@@ -169,6 +171,28 @@ def set_threads(threads: int) -> None:
     """Set the number of torch's threads, if torch is loaded; kernels have one thread each."""
     if (torch := sys.modules.get("torch")) is not None:
         torch.set_num_threads(threads)
+
+
+def _counters() -> dict[Path, int]:
+    """Read the energy counters of all packages, in microjoules, by their folders; none where they cannot be read."""
+    try:
+        return {zone: _number(zone / "energy_uj") for zone in sorted(_ZONES.glob("intel-rapl:[0-9]"))}
+    except (OSError, ValueError):
+        return {}
+
+
+def _joules(before: dict[Path, int]) -> float:
+    """Return the energy since counters were read, in joules; NaN where they cannot be read."""
+    try:
+        passed = ((_number(zone / "energy_uj") - value, zone) for zone, value in before.items())
+        spent = sum(energy % (_number(zone / "max_energy_range_uj") + 1) for energy, zone in passed)
+        return 1e-6 * spent if before else math.nan
+    except (OSError, ValueError):
+        return math.nan
+
+
+def _number(path: Path) -> int:
+    return int(path.read_text())
 
 
 def _synchronise() -> None:

@@ -55,10 +55,7 @@ RELATIVE_EPSILON: Final = 0.01
 DISPLAY_EXPOSURE: Final = 1.6
 """Factor on linear values before they are shown, as on the page."""
 
-_SSIM_SIGMA: Final = 1.5  # of SSIM's Gaussian window, in pixels; the window is cut at 3.5 of them
-_PIXELS_PER_DEGREE: Final = 67.0  # at which FLIP sees pictures: a 4K display .7 m wide from .7 m
 _DEFAULTS: Final = ImageOptions()
-_TONE_MAPPER: Final = "aces"  # by which HDR-FLIP shows its exposures
 
 
 class Measure(NamedTuple):
@@ -68,8 +65,7 @@ class Measure(NamedTuple):
     low: float
     high: float
     floor: float
-    pixels: int
-    """Number of pixels in the mean."""
+    pixels: int  # in the mean
 
 
 @dataclass(frozen=True)
@@ -78,12 +74,10 @@ class ImageErrors:
 
     mse: Error
     mse_relative: Error
-    perceived: dict[Metric, Measure]
-    """Perceptual measures, by the keys of `PERCEIVED`."""
+    perceived: dict[Metric, Measure]  # by the keys of `PERCEIVED`
     maps: dict[str, Float64]
     """(H, W) by name: `ssim`, `flip_ldr`, `flip_hdr`, `delta_e`, and `square`, that of PSNR."""
-    mask: Mask
-    """Pixels that count, (H, W)."""
+    mask: Mask  # pixels that count, (H, W)
 
     def records(self, subject: Record) -> list[Record]:
         """Return every number as a Record of `subject`; numbers that are infinite (equal pictures) are left out."""
@@ -139,13 +133,11 @@ def _light_errors(m: Float64, t: Float64, s: Float64, lit: Mask, options: ImageO
     """Return MSE and relative MSE; values, truth and standard error of the lit pixels, (N, 3)."""
     w = relative_weight(t, RELATIVE_EPSILON)
     squares = ((m - t) ** 2 - s**2).mean(axis=1), (((m - t) ** 2 - s**2) * w**2).mean(axis=1)
-    errors = squared_error(m, t, s, 0), squared_error(m * w, t * w, s * w, 0)
-    spreads = [block_interval(rows, lit, options) for rows in squares]
-    mse, relative = (
-        replace(error, standard_error=spread, low=low, high=high)
-        for error, (spread, low, high) in zip(errors, spreads, strict=True)
-    )
-    return mse, relative
+    errors = []
+    for error, rows in zip((squared_error(m, t, s, 0), squared_error(m * w, t * w, s * w, 0)), squares, strict=True):
+        spread, low, high = block_interval(rows, lit, options)
+        errors.append(replace(error, standard_error=spread, low=low, high=high))
+    return errors[0], errors[1]
 
 
 def _measure(metric: Metric, maps: dict[str, Float64], floor: float, lit: Mask, options: ImageOptions) -> Measure:
@@ -189,7 +181,8 @@ def _perceived_maps(picture: Float64, truth: Float64, lit: Mask) -> dict[str, Fl
     picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))
     light, light_truth = (np.clip(DISPLAY_EXPOSURE * values, 0.0, 1.0) for values in (picture, truth))
     shown, shown_truth = encoded(light), encoded(light_truth)
-    window = {"gaussian_weights": True, "sigma": _SSIM_SIGMA, "use_sample_covariance": False}
+    # The window is Gaussian, of 1.5 pixels, and cut at 3.5 of these.
+    window = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
     compare: Any = structural_similarity  # has no types
     similarity = compare(shown, shown_truth, data_range=1.0, channel_axis=-1, full=True, **window)[1]
     # FLIP leaves the process where the reference is too dark for its exposures; it is made 1 at its brightest.
@@ -206,10 +199,7 @@ def _perceived_maps(picture: Float64, truth: Float64, lit: Mask) -> dict[str, Fl
 def _flip(picture: Float64, truth: Float64, kind: str) -> Float64:
     """Return FLIP's error map, (H, W); values are finite (FLIP would take NaN for a colour)."""
     values = [np.ascontiguousarray(array, np.float32) for array in (truth, picture)]
-    parameters: dict[str, Any] = {"ppd": _PIXELS_PER_DEGREE}
-    if kind == "HDR":
-        parameters["tonemapper"] = _TONE_MAPPER
-    errors, _, _ = flip_evaluator.evaluate(
-        *values, kind, applyMagma=False, computeMeanError=False, parameters=parameters
-    )
+    # Pixels per degree of a 4K display .7 m wide from .7 m; the tone mapper shows the exposures of HDR.
+    look: dict[str, Any] = {"ppd": 67.0, **({"tonemapper": "aces"} if kind == "HDR" else {})}
+    errors, _, _ = flip_evaluator.evaluate(*values, kind, applyMagma=False, computeMeanError=False, parameters=look)
     return np.asarray(errors[..., 0], np.float64)

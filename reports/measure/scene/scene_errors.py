@@ -46,13 +46,7 @@ _LONGEST: Final = 0.01
 _FEWEST: Final = 128
 """Least queries about a cloth in such a call: the fixed cost of a call must not count as the cost of queries."""
 
-# The display and the place from which FovVideoVDP looks at it.
-_RESOLUTION: Final = (3840, 2160)  # pixels
-_DIAGONAL: Final = 30.0  # inches
-_DISTANCE: Final = 0.7472  # of the eye, in metres
-_PEAK: Final = 200.0  # candela per square metre
-_CONTRAST: Final = 1000.0  # luminance of white over that of black
-_FRAMES_PER_SECOND: Final = 30.0
+_PEAK: Final = 200.0  # of the display that FovVideoVDP looks at, in candela per square metre
 
 
 def write_truth(shot: Shot, path: Path) -> None:
@@ -100,9 +94,9 @@ def _over_time(
 
     `still` are the pixels that show lit cloth all the way, if there are any.
     """
-    records: list[Record] = []
     if len(own) == 1:
-        return records
+        return []
+    records: list[Record] = []
     if still.any():
         value = flicker(own[:, still], truth[:, still], noise[:, still])
         scale = truth[:, still].mean() ** 2
@@ -142,10 +136,8 @@ def time_scene(methods: Sequence[Fallback], shot: Shot, options: RepeatOptions, 
 
 def _colour(subject: Record, shot: Shot, answers: Sequence[Float32], image: ImageOptions) -> Record:
     """Return the relative RMSE of the colour measure over the queries of all frames."""
-    values, truth, noise = (
-        np.concatenate(parts).astype(np.float64)
-        for parts in (answers, [c.mean for c in shot.cloths], [c.standard_error for c in shot.cloths])
-    )
+    of_cloths = answers, [cloth.mean for cloth in shot.cloths], [cloth.standard_error for cloth in shot.cloths]
+    values, truth, noise = (np.concatenate(parts).astype(np.float64) for parts in of_cloths)
     own, reference = values @ COLOUR_WEIGHTS, truth @ COLOUR_WEIGHTS
     spread = np.sqrt(np.square(noise) @ np.square(COLOUR_WEIGHTS))
     error = squared_error(own, reference, spread, resamples=0)
@@ -165,10 +157,7 @@ def _subject(method: Method, shot: Shot) -> Record:
 
 
 def difference_maps(picture: npt.ArrayLike, truth: npt.ArrayLike, errors: ImageErrors) -> dict[str, npt.NDArray[Any]]:
-    """Return the layers of a picture's errors, (H, W) by channel.
-
-    They are `lit` (1 where a pixel counts), those of `relative_differences`, and the maps of `ImageErrors`.
-    """
+    """Return the layers of a picture's errors, (H, W) by channel: `lit` (1 where a pixel counts), and all maps."""
     return {"lit": errors.mask, **relative_differences(picture, truth, errors.mask), **errors.maps}
 
 
@@ -198,13 +187,11 @@ def fovvideovdp(subject: Record, film: Float64, truth: Float64) -> list[Record]:
     except ImportError:
         return []
     metric = library.fvvdp(
-        display_photometry=library.fvvdp_display_photo_eotf(_PEAK, contrast=_CONTRAST, EOTF="linear"),
-        display_geometry=library.fvvdp_display_geometry(
-            _RESOLUTION, distance_m=_DISTANCE, diagonal_size_inches=_DIAGONAL
-        ),
+        display_photometry=library.fvvdp_display_photo_eotf(_PEAK, contrast=1000.0, EOTF="linear"),
+        display_geometry=library.fvvdp_display_geometry((3840, 2160), distance_m=0.7472, diagonal_size_inches=30.0),
         device="cpu",
         quiet=True,
     )
     light = [(_PEAK * np.clip(DISPLAY_EXPOSURE * frames, 0.0, 1.0)).astype(np.float32) for frames in (film, truth)]
-    score = float(metric.predict(*light, dim_order="FHW", frames_per_second=_FRAMES_PER_SECOND)[0])
+    score = float(metric.predict(*light, dim_order="FHW", frames_per_second=30.0)[0])
     return [subject.of("fovvideovdp", score, len(film))]

@@ -27,7 +27,6 @@ from pipeline.models.method import Method
 from pipeline.scenes.bounces import light_between, seen_light
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.frame import render
-from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.loading import load
 from pipeline.scenes.shade import coloured, colours_of, compose
 from pipeline.truth.estimator import estimate
@@ -44,45 +43,32 @@ _COLUMNS = ("frame", "pixel", "weight", "mean", "standard_error", "fallback_valu
 
 @dataclass(frozen=True)
 class ClothQueries:
-    """M queries on one cloth over all F frames.
-
-    Attributes
-    ----------
-    fabric : Fabric
-        The cloth's fabric.
-    queries : Queries
-        The queries.
-    frame, pixel : int64 (M,)
-        Index of the frame, and of the pixel in it, below H W.
-    weight : float32 (M, 3)
-        Linear RGB irradiance times the truth's coverage.
-    mean, standard_error : float32 (M, 4)
-        The truth's answers.
-    fallback_values : float32 (M, 4)
-        Answers of the fallback where light or viewer is behind the cloth, for methods that do not know such queries; 0
-        elsewhere.
-    colours : float32 (M, 4, 3)
-        The truth's colours of the components. Methods have those of the footprint's threads (pipeline.scenes.shade).
-    between : float32 (M, 4, 3) or (1, 4, 1)
-        Light of all bounces after the first (`pipeline.scenes.bounces.light_between`); 0 if there is one bounce.
-    rims : Queries
-        Places at silhouettes, in all frames, of which some view rays leave the cloth again.
-    coverage : float32 (R,)
-        The truth's coverage of each.
-    """
+    """M queries on one cloth over all F frames."""
 
     fabric: Fabric
     queries: Queries
     frame: Index
+    """Frame of each query, (M,)."""
     pixel: Index
+    """Its pixel in the frame, below H W."""
     weight: Float32
+    """Linear RGB irradiance times the truth's coverage, (M, 3)."""
     mean: Float32
+    """The truth's answers, (M, 4)."""
     standard_error: Float32
     fallback_values: Float32
+    """Answers of the fallback where light or viewer is behind the cloth, for methods that do not know such queries,
+    (M, 4); 0 elsewhere."""
     colours: npt.NDArray[np.floating]
+    """The truth's, of the components, (M, 4, 3). Methods have those of the footprint's threads
+    (`pipeline.scenes.shade`)."""
     between: Float32
+    """Light of all bounces after the first (`pipeline.scenes.bounces.light_between`), (M, 4, 3); zeros (1, 4, 1) if
+    there is one bounce."""
     rims: Queries
+    """R places at silhouettes, in all frames, of which some view rays leave the cloth again."""
     coverage: Float32
+    """The truth's coverage of each, (R,)."""
 
     def light(self, components: npt.ArrayLike | None = None) -> Float64:
         """Return the light of each query, (M, 3), from a method's components (M, 4); the truth's if left out."""
@@ -182,10 +168,13 @@ def shoot(name: str, options: ShotOptions, path: Path, progress: Callable[[float
             rims = gbuffer.rims(fabric.repeat)
             of_rims, doubt = coverage(fabric, rims, truth, seed)
             covered = gbuffer.coverage(of_rims)
-            base = compose(gbuffer, dark, base, _transparency(gbuffer, answers.transparency), covered)
+            through = np.zeros(len(gbuffer.pixel))
+            through[gbuffer.place] = answers.transparency  # that of any query of a place
+            base = compose(gbuffer, dark, base, through, covered)
             columns = {"frame": np.full(len(gbuffer.place), frame), "pixel": gbuffer.pixel[gbuffer.place]}
-            columns |= queries._asdict()
-            columns |= {"weight": (gbuffer.irradiance * covered[gbuffer.place, None]).astype(np.float32)}
+            columns |= queries._asdict() | {
+                "weight": (gbuffer.irradiance * covered[gbuffer.place, None]).astype(np.float32)
+            }
             columns |= {"mean": answers.mean, "standard_error": answers.standard_error}
             columns |= {"fallback_values": fallback_values(fabric, queries, seed)}
             if loaded.options.bounces == "all":
@@ -203,8 +192,7 @@ def shoot(name: str, options: ShotOptions, path: Path, progress: Callable[[float
     if not keys:
         raise BadInput(name, "frames", options.frames, "no cloth that is lit is in sight of the camera")
     for key in keys:
-        for column in parts[key][0]:
-            arrays[f"{key}.{column}"] = np.concatenate([part[column] for part in parts[key]])
+        arrays |= {f"{key}.{name}": np.concatenate([part[name] for part in parts[key]]) for name in parts[key][0]}
     about = {"name": loaded.scene.name, "cloths": {key: loaded.cloths[key][1].model_dump(mode="json") for key in keys}}
     buffer = io.BytesIO()
     np.savez_compressed(buffer, about=np.array(json.dumps(about)), **arrays)  # type: ignore[arg-type]
@@ -235,11 +223,4 @@ def fallback_values(fabric: Fabric, queries: Queries, seed: int) -> Float32:
     result, rows = np.zeros((len(queries.u), 4), np.float32), queries.behind
     if rows.any():
         result[rows] = fallback_answers(fabric, queries.take(rows), seed)
-    return result
-
-
-def _transparency(gbuffer: GBuffer, answered: Float32) -> Float64:
-    """Return the transparency of each place, from any of its queries; 0 where there is none."""
-    result = np.zeros(len(gbuffer.pixel))
-    result[gbuffer.place] = answered
     return result

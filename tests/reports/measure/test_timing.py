@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from pipeline.truth.query import Queries
-from reports.measure import energy
+from reports.measure import timing
 from reports.measure.timing import Contender, affordable, thread_counts, time_side_by_side
 
 
@@ -100,6 +100,6 @@ def test_energy_is_that_of_all_packages_whose_counters_begin_again(tmp_path, mon
             (zone / "energy_uj").write_text(f"{microjoules}\n")
 
     for folder, joules in ((tmp_path, 0.3), (tmp_path / "none", math.nan)):
-        monkeypatch.setattr(energy, "_ZONES", folder)
-        (timing,) = time_side_by_side([Contender(predict, many_queries(10))], repeats=7, warm_up=1)
-        assert timing.joules == pytest.approx(joules, nan_ok=True)
+        monkeypatch.setattr(timing, "_ZONES", folder)
+        (measured,) = time_side_by_side([Contender(predict, many_queries(10))], repeats=7, warm_up=1)
+        assert measured.joules == pytest.approx(joules, nan_ok=True)
