@@ -16,20 +16,9 @@ Better = Literal["lower", "higher", "near 0", ""]
 """Direction of a better value; empty where none is better."""
 
 Format = Literal[
-    "scientific",
-    "signed",
-    "percent",
-    "fine percent",
-    "whole percent",
-    "three decimals",
-    "two decimals",
-    "one decimal",
-    "significant",
-    "grouped",
-    "bytes",
-    "seconds",
-    "times",
-]
+    "scientific", "signed", "percent", "fine percent", "whole percent", "three decimals", "two decimals", "one decimal",
+    "significant", "grouped", "bytes", "seconds", "times",
+]  # fmt: skip
 """How tables print a value (`reports.tables.number_format.shown`)."""
 
 ADDED: Final = "added_"
@@ -51,9 +40,7 @@ class MetricRow(NamedTuple):
     unit: str = "1"
     """Unit of its values; a Record with a unit of its own overrides it."""
     better: Better = "lower"
-    """Direction of a better value."""
     format: Format = "significant"
-    """How tables print a value."""
     table: str = OTHER
     """Table that shows it."""
     of_machine: bool = False
@@ -79,9 +66,7 @@ class AddedMetric(AddedFunction):
     """A metric from outside: a function of a method's answers on the held-out queries of a fabric."""
 
     better: Better
-    """Direction of a better value."""
     format: Format
-    """How tables print a value."""
 
     @property
     def row(self) -> MetricRow:

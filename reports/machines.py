@@ -18,22 +18,16 @@ class Joined(NamedTuple):
     """Records of several machines."""
 
     records: list[Record]
-    """All of them."""
-    shared: int
-    """Numbers that several machines have alike, and that are kept once."""
-    unlike: list[tuple[Record, Record]]
-    """Pairs of one number that two machines have differently; both are kept."""
-
-
-def _name_of(machine: Machine) -> str:
-    """Return a machine in a few words."""
-    threads = f"{machine.threads} thread{'' if machine.threads == 1 else 's'}"
-    return f"{machine.cpu}, {machine.cores} cores, {threads}, {machine.system}"
+    shared: int  # numbers that several machines have alike, and that are kept once
+    unlike: list[tuple[Record, Record]]  # pairs of one number that two machines have differently; both are kept
 
 
 def names_of(machines: Sequence[Machine]) -> list[str]:
     """Return a name for each machine; those of equal machines end in their number."""
-    names = [_name_of(machine) for machine in machines]
+    names = []
+    for m in machines:
+        threads = f"{m.threads} thread{'' if m.threads == 1 else 's'}"
+        names.append(f"{m.cpu}, {m.cores} cores, {threads}, {m.system}")
     return [f"{name} ({names[:i].count(name) + 1})" if names.count(name) > 1 else name for i, name in enumerate(names)]
 
 

@@ -187,17 +187,9 @@ class RunOptions(Frozen):
 
 
 StudyName = Literal[
-    "stability",
-    "throughput",
-    "accuracy",
-    "calibration",
-    "bias",
-    "effort",
-    "footprint_colours",
-    "sampling",
-    "path_traced",
-    "measured_cloth",
-]
+    "stability", "throughput", "accuracy", "calibration", "bias", "effort", "footprint_colours", "sampling",
+    "path_traced", "measured_cloth",
+]  # fmt: skip
 """Modules of `reports.truth` that measure the truth, importance sampling, frames in Mitsuba, or fits to real cloth."""
 
 LEAST_TILE: Final = 8

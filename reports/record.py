@@ -12,6 +12,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -31,19 +32,9 @@ from weaves.reading import MIB, read_json
 from weaves.validation import Frozen
 
 PACKAGES: Final = (
-    "numpy",
-    "scipy",
-    "numba",
-    "torch",
-    "onnxruntime",
-    "pyarrow",
-    "pandas",
-    "OpenEXR",
-    "matplotlib",
-    "scikit-image",
-    "flip-evaluator",
-    "colour-science",
-)
+    "numpy", "scipy", "numba", "torch", "onnxruntime", "pyarrow", "pandas", "OpenEXR", "matplotlib", "scikit-image",
+    "flip-evaluator", "colour-science",
+)  # fmt: skip
 """Packages whose versions are noted."""
 
 TRUTH: Final = "truth"
@@ -68,21 +59,14 @@ class Provenance(Frozen):
     """Subject of a measurement: names and fingerprints common to a task's records."""
 
     recipe: str = ""
-    """Name of the recipe."""
     recipe_fingerprint: str = ""
-    """Of the whole recipe."""
-    dataset: str = ""
-    """Fingerprint of the data set."""
-    model: str = ""
-    """Fingerprint of the trained model; empty where nothing is trained."""
-    seed: int = 0
-    """Seed of its training."""
+    dataset: str = ""  # fingerprint of the data set
+    model: str = ""  # fingerprint of the trained model; empty where nothing is trained
+    seed: int = 0  # of its training
     origin: str = ""
     """Of a method or metric from outside: distribution or file, its version, and the SHA-256 of its code."""
-    machine: str = ""
-    """Machine, where Records of several are in one file (`reports.machines`)."""
-    version: int = BENCH
-    """Version of the measurements (`reports.catalogue.BENCH`)."""
+    machine: str = ""  # where Records of several are in one file (`reports.machines`)
+    version: int = BENCH  # of the measurements
 
 
 class Record(Frozen):
@@ -93,17 +77,14 @@ class Record(Frozen):
     setting: str = ""
     """Variant of the method, such as ``k = 2``."""
     fabric: str = ""
-    """Name of the fabric; empty where several are meant together."""
+    """Empty where several are meant together."""
     role: Role | Literal[""] = ""
-    """True if general models saw the fabric in training."""
     scene: str = ""
     """`queries`: held-out queries; otherwise the view of a fabric, or, where no fabric is named, the scene."""
     metric: Metric = "mse"
-    """Subject of the measurement."""
     value: float = 0.0
-    """The number; the median for times."""
+    """The number, in `unit`; the median for times."""
     standard_error: float | None = None
-    """Of `value`."""
     low: float | None = None
     """Lower end of the 95 % interval; the first quartile for times."""
     high: float | None = None
@@ -111,7 +92,6 @@ class Record(Frozen):
     count: int = 1
     """Queries, pixels, frames or repeats behind it."""
     unit: str = "1"
-    """Unit of `value`."""
     curve: Annotated[tuple[tuple[float, float], ...], FailFast()] = ()
     """Points of a curve, where one number does not say it all."""
     threads: int = 0
@@ -121,7 +101,6 @@ class Record(Frozen):
     note: str = ""
     """Further information on `value`, such as the input that gave it."""
     provenance: Provenance = Provenance()
-    """Subject of the measurement."""
 
     def of(
         self,
@@ -152,38 +131,28 @@ class Record(Frozen):
 
     def of_error(self, error: Error) -> list[Record]:
         """Return the three numbers of a mean squared error."""
+        e = error
         return [
-            self.of(
-                "mse", error.value, error.count, standard_error=error.standard_error, low=error.low, high=error.high
-            ),
-            self.of("mse_measured", error.measured, error.count),
-            self.of("truth_noise", error.noise, error.count),
+            self.of("mse", e.value, e.count, standard_error=e.standard_error, low=e.low, high=e.high),
+            self.of("mse_measured", e.measured, e.count),
+            self.of("truth_noise", e.noise, e.count),
         ]
 
 
 _MOST_BYTES: Final = 32 * MIB  # of a file of records: those of the largest number have about 320 bytes each
-_MOST_RECORDS: Final = 100_000
-
-_RECORDS: Final = TypeAdapter(Annotated[list[Record], Field(max_length=_MOST_RECORDS), FailFast()])
+_RECORDS: Final = TypeAdapter(Annotated[list[Record], Field(max_length=100_000), FailFast()])
 
 
 class Machine(Frozen):
     """Where and when it was measured."""
 
-    cpu: str
-    """Model of the processor."""
-    cores: int
-    """Cores this process may use."""
-    threads: int
-    """Threads a method could use."""
-    system: str
-    """Operating system and architecture."""
-    python: str
-    """Version of Python."""
-    packages: dict[str, str]
-    """Versions of the packages."""
-    date: str
-    """UTC, ISO 8601."""
+    cpu: str  # model of the processor
+    cores: int  # that this process may use
+    threads: int  # that a method could use
+    system: str  # operating system and architecture
+    python: str  # version
+    packages: dict[str, str]  # versions
+    date: str  # UTC, ISO 8601
     sha256: str = ""
     """Hash over the Records beside it and over the other fields; in files of earlier versions there is none."""
 
@@ -199,20 +168,28 @@ class Machine(Frozen):
 
 def this_machine(threads: int) -> Machine:
     """Describe the machine this runs on; `threads` is what methods were allowed."""
+    packages = {}
+    for name in PACKAGES:
+        with suppress(PackageNotFoundError):
+            packages[name] = version(name)
     return Machine(
         cpu=_cpu(),
         cores=cores(),
         threads=threads,
         system=f"{platform.system()} {platform.machine()}",
         python=platform.python_version(),
-        packages={name: number for name in PACKAGES if (number := _version(name))},
+        packages=packages,
         date=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
 
 def write_records(path: Path, records: Sequence[Record], machine: Machine) -> None:
-    """Write a task's records to `path` (``NAME.json``) and the machine beside it."""
-    lines = ",\n".join(json.dumps(_compact(record)) for record in records)
+    """Write a task's records to `path` (``NAME.json``) and the machine beside it.
+
+    Of each record what differs from the defaults, and always the metric and the value.
+    """
+    rows = ({"metric": r.metric, "value": r.value, **r.model_dump(mode="json", exclude_defaults=True)} for r in records)
+    lines = ",\n".join(map(json.dumps, rows))
     content = f"[\n{lines}\n]\n".encode()
     atomic_write(machine_path(path), machine.beside(hashlib.sha256(content).hexdigest()).encoded())
     atomic_write(path, content)
@@ -265,21 +242,9 @@ def to_table(records: Iterable[Record]) -> pd.DataFrame:
     return table.astype({"standard_error": "float64", "low": "float64", "high": "float64"})
 
 
-def _compact(record: Record) -> dict[str, object]:
-    """Return what differs from the defaults, and always the metric and the value."""
-    return {"metric": record.metric, "value": record.value, **record.model_dump(mode="json", exclude_defaults=True)}
-
-
 def _cpu() -> str:
     """Return the processor's model name, as Linux reports it."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.is_file() else []
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return models[0] if models else platform.processor() or platform.machine()
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""
