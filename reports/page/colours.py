@@ -43,8 +43,6 @@ MARKS: Final[tuple[Marker, ...]] = ((4, 1, 0), (5, 0, 180), (3, 1, 0), (6, 1, 0)
 
 OF_TEXT: Final = 4.5
 OF_MARKS: Final = 3.0
-STEPS: Final = 20
-"""Steps from a colour to the ink in `readable`."""
 
 
 def contrast(first: str, second: str) -> float:
@@ -59,8 +57,8 @@ def readable(colour: str, ground: str, ink: str) -> str:
     All are ``#rrggbb``; the contrast of `ink` on `ground` is at least `OF_TEXT`.
     """
     start, end = (np.array([int(code[i : i + 2], 16) for i in (1, 3, 5)], np.float64) for code in (colour, ink))
-    for step in range(STEPS + 1):
-        mixed = np.rint(start + (end - start) * step / STEPS).astype(int)
+    for step in range(21):
+        mixed = np.rint(start + (end - start) * step / 20).astype(int)
         code = "#" + "".join(f"{value:02x}" for value in mixed)
         if contrast(code, ground) >= OF_TEXT:
             break
@@ -76,12 +74,9 @@ class Scheme:
     muted: str
     line: str
     ground: str
-    card: str
-    """Ground of tables and cards."""
-    tint: str
-    """Ground of the baseline's row."""
-    focus: str
-    """Outline of what the keyboard has reached."""
+    card: str  # ground of tables and cards
+    tint: str  # ground of the baseline's row
+    focus: str  # outline of what the keyboard has reached
     methods: Mapping[str, str]
     others: tuple[str, ...]
     marks: Mapping[str, Marker] = field(default_factory=dict)

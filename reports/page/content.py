@@ -22,14 +22,10 @@ if TYPE_CHECKING:
 class ModelNote:
     """A method in words."""
 
-    name: str
-    """Name in the recipe; it distinguishes several models of one kind."""
-    about: str
-    """In a few words: kind and training."""
-    fingerprint: str = ""
-    """Of the trained model."""
-    per_material: bool = False
-    """True if one model is trained for each fabric."""
+    name: str  # in the recipe; it distinguishes several models of one kind
+    about: str  # kind and training in a few words
+    fingerprint: str = ""  # of the trained model
+    per_material: bool = False  # True if one model is trained for each fabric
     kind: str = ""
     """Kind of model, a key of `pipeline.models.catalogue.CLASSES` or `ADDED_MODEL`; empty: its name."""
 
@@ -50,12 +46,9 @@ class ModelNote:
 class PictureFile:
     """A picture that was rendered."""
 
-    fabric: str
-    """Empty for a scene, which has cloths of its own."""
-    scene: str
-    """View of the fabric, or name of the scene."""
-    method: str
-    """``truth`` for the reference."""
+    fabric: str  # empty for a scene, which has cloths of its own
+    scene: str  # view of the fabric, or name of the scene
+    method: str  # ``truth`` for the reference
     setting: str
     path: Path
     larger: bool = False
@@ -69,8 +62,7 @@ class PictureFile:
     @property
     def stem(self) -> str:
         """Of the names of its tiles."""
-        words = [self.fabric or "scene", self.scene, self.method, *self.setting.replace("=", "").split()]
-        return "-".join(words)
+        return "-".join([self.fabric or "scene", self.scene, self.method, *self.setting.replace("=", "").split()])
 
 
 @dataclass(frozen=True)
@@ -79,19 +71,15 @@ class PageInput:
 
     recipe: str
     about: str
-    fingerprint: str
-    """Of the recipe."""
-    dataset: str
-    """Name and fingerprint of the data set."""
+    fingerprint: str  # of the recipe
+    dataset: str  # name and fingerprint
     fabrics: Sequence[tuple[Fabric, Role]]
     models: Sequence[ModelNote]
     options: BenchOptions
     records: Sequence[Record]
-    machine: Machine
-    """Where the times were taken."""
+    machine: Machine  # where the times were taken
     pictures: Sequence[PictureFile]
-    live: Mapping[str, Path] = field(default_factory=dict)
-    """Live page of each fabric that has one, by the fabric's name."""
+    live: Mapping[str, Path] = field(default_factory=dict)  # live pages of fabrics by name
 
     @property
     def shown(self) -> list[PictureFile]:

@@ -25,11 +25,8 @@ from reports.tables.number_format import display
 from reports.tables.summary import BASELINE, rows
 
 DPI: Final = 200
-NARROWEST_PLOT: Final = 7.6
-"""Least width of plots in inches: the legend needs it."""
-ROW: Final = 0.22
-"""Height of a method's row, in inches."""
-
+NARROWEST_PLOT: Final = 7.6  # inches: the legend needs it
+ROW: Final = 0.22  # height of a method's row, in inches
 _ROLES: Final = ("seen", "unseen")
 _MOST_DECADES: Final = 5  # whose labels fit under half a figure
 _MARK_EVERY: Final = 9  # points of a spectrum; one curve's marks are shifted against the next one's
@@ -53,30 +50,14 @@ def new_figure(
 
 
 def _parameters(scheme: Scheme) -> dict[Any, Any]:
+    ticks = {"color": scheme.line, "labelcolor": scheme.ink, "minor.size": 0}
     return {
-        "font.size": 10,
-        "text.color": scheme.ink,
-        "axes.labelcolor": scheme.muted,
-        "axes.titlecolor": scheme.ink,
-        "axes.titlesize": 11,
-        "axes.titleweight": "bold",
-        "axes.titlelocation": "left",
-        "axes.titlepad": 10,
-        "axes.edgecolor": scheme.line,
-        "axes.grid": True,
-        "axes.axisbelow": True,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "grid.color": scheme.line,
-        "grid.linewidth": 0.6,
-        "xtick.color": scheme.line,
-        "ytick.color": scheme.line,
-        "xtick.labelcolor": scheme.ink,
-        "ytick.labelcolor": scheme.ink,
-        "xtick.minor.size": 0,
-        "ytick.minor.size": 0,
-        "legend.frameon": False,
-    }
+        "font.size": 10, "text.color": scheme.ink, "legend.frameon": False,
+        "axes.labelcolor": scheme.muted, "axes.edgecolor": scheme.line, "axes.grid": True, "axes.axisbelow": True,
+        "axes.spines.top": False, "axes.spines.right": False, "grid.color": scheme.line, "grid.linewidth": 0.6,
+        "axes.titlecolor": scheme.ink, "axes.titlesize": 11, "axes.titleweight": "bold", "axes.titlelocation": "left",
+        "axes.titlepad": 10, **{f"{axis}tick.{name}": look for axis in "xy" for name, look in ticks.items()},
+    }  # fmt: skip
 
 
 def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure:
@@ -86,10 +67,8 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
     `summary.fabric_table`.
     """
     roles = [role for role in _ROLES if role in set(table["role"])]
-    places = _places(table)
-    figure, panels = new_figure(
-        max(4.6 * len(roles), NARROWEST_PLOT), 1.1 + ROW * _height(places), len(roles), sharey=True
-    )
+    places, width = _places(table), max(4.6 * len(roles), NARROWEST_PLOT)
+    figure, panels = new_figure(width, 1.1 + ROW * _height(places), len(roles), sharey=True)
     colours = scheme.colours(table["method"])
     for axes, role in zip(panels, roles, strict=True):
         for (method, setting), row in places.items():
@@ -168,12 +147,10 @@ def spectra(scheme: Scheme, curves: Mapping[tuple[str, str], Sequence[tuple[floa
     low, high = (math.log(limit) for limit in axes.get_ylim())
     places = _apart([end for end, _, _ in labels], (high - low) / ((height - 0.9) / 0.17), high)
     for place, (_, label, method) in zip(places, labels, strict=True):
+        level, colour = math.exp(place), colours[method]
+        axes.plot(0.508, level, color=colour, marker=scheme.marker(method), markersize=5)
         weight = "bold" if method == TRUTH else "normal"
-        level = math.exp(place)
-        axes.plot(0.508, level, color=colours[method], marker=scheme.marker(method), markersize=5)
-        axes.annotate(
-            label, (0.516, level), va="center", fontsize=8.5, color=scheme.text(colours[method]), fontweight=weight
-        )
+        axes.annotate(label, (0.516, level), va="center", fontsize=8.5, color=scheme.text(colour), fontweight=weight)
     axes.yaxis.set_minor_formatter(NullFormatter())
     return figure
 
@@ -228,7 +205,7 @@ def timing(scheme: Scheme, table: pd.DataFrame) -> Figure:
 def _places(table: pd.DataFrame) -> dict[tuple[str, str], float]:
     """Return the height of every method's row, downwards; settings of one method lie closer together."""
     keys = list(dict.fromkeys(zip(table["method"], table["setting"], strict=True)))
-    order = list(dict.fromkeys(method for method, _ in keys))
+    order = [method for method, _ in keys]
     keys.sort(key=lambda key: order.index(key[0]))
     places: dict[tuple[str, str], float] = {}
     place, before = 0.0, keys[0] if keys else ("", "")

@@ -17,8 +17,6 @@ from weaves.reading import MIB, read_bytes
 FILES: Final = "files.json"
 """It lists neither itself nor ``index.html``, which is written last."""
 
-_LIST: Final = TypeAdapter(dict[str, str])
-
 
 def write_files(folder: Path, names: Iterable[str]) -> None:
     """List files of a page, given by their paths in its folder, and remove those that only the list before had.
@@ -40,7 +38,8 @@ def read_files(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each file of a page by its path in the folder; BadInput if there is no valid list."""
     path = folder / FILES
     try:
-        hashes = _LIST.validate_json(read_bytes(path, 16 * MIB, "a list of files"), strict=True)
+        content = read_bytes(path, 16 * MIB, "a list of files")
+        hashes = TypeAdapter(dict[str, str]).validate_json(content, strict=True)
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "write the page again with `twillight report`") from error
     except (OSError, ValidationError) as error:

@@ -26,7 +26,7 @@ from reports.page.colours import Scheme
 from reports.page.figures import NARROWEST_PLOT, new_figure
 from reports.page.labels import Label, place_labels
 from reports.tables.number_format import display, size
-from reports.tables.summary import OF_PAPER, PAPER, front, of_baseline, rows
+from reports.tables.summary import OF_PAPER, PAPER, front, of_baseline, parts_of, rows
 
 _ROLES: Final = ("seen", "unseen")
 _LEGEND_COLUMNS: Final = 5
@@ -90,8 +90,8 @@ def _by_role(
     for axes, role in zip(panels, roles, strict=True):
         own = table[table["role"] == role]
         _band(axes, scheme, own[own["front"]].sort_values("x"))
-        for method, settings in own.groupby("method", sort=False):
-            labels += _curve(axes, scheme, str(method), settings, colours[str(method)], role)
+        for method, settings in parts_of(own, "method"):
+            labels += _curve(axes, scheme, method, settings, colours[method], role)
         for row in rows(own[of_baseline(own)]) if paper else ():
             _paper_arrow(axes, scheme, (row.x, row.y), math.sqrt(PAPER[0]))
         axes.set(title=f"{role.capitalize()} fabrics", xlabel=cost, xscale="log", yscale="log")
@@ -130,11 +130,11 @@ def _against_time(
             own = table[(table["panel"] == panel) & (table[measure] > 0)]
             own = own.assign(x=own["time"], y=own[measure])
             _band(axes, scheme, own[front(own, "x", "y")].sort_values("x"), 5.0)
-            for method, settings in own.groupby("method", sort=False):
+            for method, settings in parts_of(own, "method"):
                 settings = settings.sort_values("x")
                 axes.plot(
-                    settings["x"], settings["y"], color=colours[str(method)], marker=scheme.marker(str(method)),
-                    markersize=4.5, linewidth=1.1,
+                    settings["x"], settings["y"], color=colours[method], marker=scheme.marker(method), markersize=4.5,
+                    linewidth=1.1,
                 )  # fmt: skip
             for row in rows(own[of_baseline(own)]) if measure == paper and _with_paper(table) else ():
                 _paper_arrow(axes, scheme, (row.x, row.y), PAPER[0])
@@ -202,10 +202,9 @@ def _curve(axes: Axes, scheme: Scheme, method: str, settings: pd.DataFrame, colo
 
 def _paper_arrow(axes: Axes, scheme: Scheme, start: tuple[float, float], lower: float) -> None:
     """Draw the paper's ratios of time and error from a start."""
-    time, error = start
-    target = (time * PAPER[1], error / lower)
+    target = (start[0] * PAPER[1], start[1] / lower)
     axes.scatter(*target, alpha=0.0)  # an arrow alone does not widen the axes
     axes.annotate(
-        "", target, xytext=(time, error), zorder=5,
+        "", target, xytext=start, zorder=5,
         arrowprops={"arrowstyle": "-|>", "color": scheme.muted, "linestyle": (0, (3, 2)), "shrinkA": 6, "shrinkB": 0},
     )  # fmt: skip

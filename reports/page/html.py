@@ -27,20 +27,11 @@ from reports.tables.summary import OF_PAPER, parts_of, rows, scene_table
 from reports.tables.table import WORDS
 from weaves.fabric import Fabric
 
-ALWAYS: Final = frozenset({"fabrics", "made", "columns", "limits"})
-"""Sections that every page has; the others are left out where nothing was measured."""
-
 FIRST_SIGHT: Final = frozenset({"trade", "error", "pictures", "live", "scenes", "traced", "measured"})
 """Sections that are open from the start."""
 
 OPEN_ROWS: Final = 15
 """Rows of the longest table that is open from the start."""
-
-PLOT_SCALE: Final = 108 / DPI
-"""Pixels of the page, at most, for one of a plot: letters are as large as those of the text."""
-
-FIRST_CELLS: Final = 7
-"""Pictures of a view that are shown from the start: a line of the page."""
 
 _MOST_CHIPS: Final = 8  # different colours shown of a yarn's threads
 
@@ -69,7 +60,7 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], sizes: Mappin
         "limits": [*every["limits"].intro, *lacking(page.records)],
         "live": {fabric: plain(fabric) for fabric in page.live},
         "sizes": sizes,
-        "plot_scale": PLOT_SCALE,
+        "plot_scale": 108 / DPI,  # most pixels of the page for one of a plot: letters are as large as those of the text
         "plot_words": WORDS["plots"],
         "alt_texts": alt_texts(ranged),
         "definitions": {row.title: row.definition for row in METRICS.values() if row.definition} | WORDS["definitions"],
@@ -78,26 +69,17 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], sizes: Mappin
         "frame_names": sorted(frames),
         "open_rows": OPEN_ROWS,
         "first_sight": FIRST_SIGHT,
-        "first_cells": FIRST_CELLS,
+        "first_cells": 7,  # pictures of a view that are shown from the start: a line of the page
         **_pictures(page, frames),
     }
-    shown = [
-        section
-        for name, section in every.items()
-        if section.tables or name in ALWAYS or (name in _SHOWN_IN and content[_SHOWN_IN[name]])
-    ]
-    environment = Environment(
-        loader=PackageLoader("reports.page"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    # These are on every page; the others are left out where nothing was measured.
+    always = {"fabrics", "made", "columns", "limits"}
+    always |= {name for name, key in (("live", "live"), ("pictures", "strips")) if content[key]}
+    shown = [section for name, section in every.items() if section.tables or name in always]
+    environment = Environment(loader=PackageLoader("reports.page"), autoescape=True, undefined=StrictUndefined)
+    environment.trim_blocks = environment.lstrip_blocks = True
     environment.filters["prose"] = prose
     return environment.get_template("page.html.j2").render(content, sections=shown)
-
-
-_SHOWN_IN: Final = {"live": "live", "pictures": "strips"}
 
 
 def prose(text: str) -> Markup:
@@ -143,8 +125,8 @@ def _headlines(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> list[str]
     untrained = {note.name for note in page.models if not note.learns} - set(page.own)
     keys = learnt(frames["errors"], untrained)
     keys.sort(key=lambda key: (key[0] not in page.own, key[0] not in published))
-    sentences = [headline(*key, frames["errors"], frames["timing"], paper=key[0] == OF_PAPER) for key in keys]
-    return [text for text in sentences if text]
+    sentences = (headline(*key, frames["errors"], frames["timing"], paper=key[0] == OF_PAPER) for key in keys)
+    return list(filter(None, sentences))
 
 
 def _pictures(page: PageInput, frames: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
@@ -208,9 +190,7 @@ def alt_texts(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
         "error-against-bytes": _fronts(tradeoff, "front_bytes"),
         "errors": _by_role(tables["errors"], "mse", scientific),
         "error-by-size": _ends(tables["by_size"], "colour", percent),
-        "scenes": "".join(
-            _ends(part, "mse", scientific, f" in {plain(name)}") for name, part in parts_of(scenes, "scene")
-        ),
+        "scenes": "".join(_ends(part, "mse", scientific, f" in {plain(x)}") for x, part in parts_of(scenes, "scene")),
         "aliasing-against-time": _fronts(tradeoff, "front_flicker"),
         "aliasing": _by_role(flicker, "distance", scientific, " distance of the flicker"),
         "timing": _ends(timing[timing["method"] != TRUTH], "median_ns", lambda value: f"{significant(value)} ns"),
@@ -235,9 +215,8 @@ def _by_role(table: pd.DataFrame, column: str, worded: Callable[[float], str], o
 
 def _ends(table: pd.DataFrame, column: str, worded: Callable[[float], str], where: str = "") -> str:
     """Return the lowest and the highest value of a column with their methods in a sentence; empty without values."""
-    measured = table[table[column].notna()] if len(table) else table
-    if measured.empty:
+    ordered = list(rows(table.dropna(subset=column).sort_values(column, kind="stable"))) if len(table) else []
+    if not ordered:
         return ""
-    ordered = list(rows(measured.sort_values(column, kind="stable")))
     ends = [f"{display(row.method, row.setting)} ({worded(getattr(row, column))})" for row in (ordered[0], ordered[-1])]
     return f" Lowest{where}: {ends[0]}; highest: {ends[1]}."

@@ -22,17 +22,13 @@ from matplotlib.text import Annotation, Text
 from pipeline.compiled.arrays import Float64
 from reports.page.colours import Scheme
 
-DISTANCES: Final = (7.0, 13.0, 20.0, 28.0, 38.0, 50.0, 64.0, 80.0, 100.0)
-"""From the middle of a mark to the nearest edge of its label, in points."""
-UNJOINED: Final = 13.0
-"""Largest distance without a line."""
+# All in points but the angle.
+DISTANCES: Final = (7.0, 13.0, 20.0, 28.0, 38.0, 50.0, 64.0, 80.0, 100.0)  # of a mark's middle from its label's edge
+UNJOINED: Final = 13.0  # largest distance without a line
+CLEARANCE: Final = 1.5  # least distance of a label from others
+MARK: Final = 5.0  # half a mark, edge included
 _DIRECTIONS: Final = 48
-_FIRST: Final = 225.0
-"""Direction of the first place, in degrees: below, on the left."""
-CLEARANCE: Final = 1.5
-"""Least distance of a label from others, in points."""
-MARK: Final = 5.0
-"""Half a mark, edge included, in points."""
+_FIRST: Final = 225.0  # direction of the first place, in degrees: below, on the left
 
 
 @dataclass(frozen=True)
@@ -41,17 +37,16 @@ class Label:
 
     axes: Axes
     text: str
-    x: float
-    """Of the mark, in data coordinates."""
+    x: float  # of the mark, in data coordinates
     y: float
     colour: str
 
 
-def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: float = 8.0) -> list[Annotation]:
+def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme) -> list[Annotation]:
     """Write labels into a figure whose curves and legend are complete, and return them.
 
     The figure's lines are curves with a mark at every point. Labels that come first choose first; one that finds no
-    free place at all takes the place that covers the least. `size` is that of the text, in points.
+    free place at all takes the place that covers the least.
     """
     figure.draw_without_rendering()  # the layout moves the axes
     make: Any = RendererAgg  # has no types
@@ -63,7 +58,7 @@ def place_labels(figure: Figure, labels: Sequence[Label], scheme: Scheme, size: 
         halo = [withStroke(linewidth=2.5, foreground=scheme.ground)]
         text = axes.annotate(
             label.text, (label.x, label.y), xytext=(0, 0), textcoords="offset points", ha="center", va="center",
-            fontsize=size, color=label.colour, zorder=6, path_effects=halo,
+            fontsize=8, color=label.colour, zorder=6, path_effects=halo,
             arrowprops={"arrowstyle": "-", "color": label.colour, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 4},
         )  # fmt: skip
         text.set_in_layout(False)
@@ -88,16 +83,8 @@ def _free_place(
 ) -> tuple[Float64, float]:
     """Return the place of least cost at the nearest distance that has a free one: its offset, and the distance.
 
-    Parameters
-    ----------
-    mark, half : float64 (2,)
-        Place of the mark, and half the size of the label.
-    taken : float64 (N, 4)
-        Boxes in use: left, bottom, right, top.
-    panel : float64 (4,)
-        Box that the label may not leave.
-    curves : float64 (M, 2)
-        Points along curves.
+    Of the `mark` (2,) and `half` the size of the label (2,). Boxes have left, bottom, right and top: those `taken`
+    (N, 4), and the `panel` (4,) that the label may not leave. `curves` (M, 2) are points along curves.
     """
     # Turns alternate left and right of the first direction.
     turns = np.array([(-1) ** turn * -(-turn // 2) for turn in range(_DIRECTIONS)])

@@ -18,25 +18,16 @@ import numpy.typing as npt
 import pandas as pd
 
 from pipeline.models.added.added_code import ADDED_MODEL
-from reports.images.tiles import EXPOSURE, encoded, png
+from reports.images.tiles import EXPOSURE, Bytes8, encoded, png
 from reports.page.content import ModelNote, PictureFile
 from reports.record import TRUTH
 from reports.tables.number_format import beyond_noise, display, scientific
 from reports.tables.summary import BASELINE, rows
 from weaves.colour import LUMINANCE
 
-FRAME_GAP: Final = 2
-"""Clear pixels between frames."""
-SHOWN: Final = 6
-"""Frames of a strip, if there are as many."""
-
-LARGEST_CROP: Final = (40, 96)
-"""Height and width of the largest crop that `liveliest` chooses, in pixels."""
-
-Bytes8 = npt.NDArray[np.uint8]
-
-MOST_FILMS: Final = 12
-"""Rows of a strip of frames."""
+FRAME_GAP: Final = 2  # clear pixels between frames
+SHOWN: Final = 6  # frames of a strip, if there are as many
+MOST_FILMS: Final = 12  # rows of a strip of frames
 
 
 @dataclass(frozen=True)
@@ -104,8 +95,7 @@ def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
     pictures = [file for file in pictures if not file.fabric and not file.larger]
     for scene in dict.fromkeys(file.scene for file in pictures):
         own = sorted((f for f in pictures if f.scene == scene), key=lambda f: f.method != TRUTH)
-        once = list({file.method: file for file in reversed(own)}.values())[::-1]
-        once.sort(key=own.index)
+        once = [file for i, file in enumerate(own) if file.method not in {before.method for before in own[:i]}]
         wanted = sorted(once, key=lambda file: file.method != TRUTH and (file.method, file.setting) != BASELINE)
         result[scene] = [file for file in once if file in wanted[:MOST_FILMS]]
     return result
@@ -134,7 +124,7 @@ def filmstrip(films: Mapping[str, npt.NDArray[np.floating]]) -> bytes:
     return png(np.concatenate(lines)[:-FRAME_GAP])
 
 
-def liveliest(films: Mapping[str, npt.NDArray[np.floating]], largest: tuple[int, int] = LARGEST_CROP) -> Crop:
+def liveliest(films: Mapping[str, npt.NDArray[np.floating]], largest: tuple[int, int] = (40, 96)) -> Crop:
     """Return the rectangle of at most `largest` (height, width) pixels in which most changes from frame to frame.
 
     The rectangle, of all that lie an eighth of it apart, with the largest sum of the luminance's variance over frames,
@@ -154,7 +144,7 @@ def _strip(frames: npt.NDArray[np.floating], crop: Crop) -> Bytes8:
     """Return the crops of frames side by side and the slice over time, RGBA."""
     top, left, height, width = crop
     codes = encoded(EXPOSURE * frames[:, top : top + height, left : left + width])
-    opaque = np.concatenate([codes, np.full((*codes.shape[:3], 1), 255, np.uint8)], axis=-1)
+    opaque = np.pad(codes, ((0, 0), (0, 0), (0, 0), (0, 1)), constant_values=255)
     over_time = opaque[np.arange(height) * len(opaque) // height, height // 2]
     clear = np.zeros((height, FRAME_GAP, 4), np.uint8)
     parts = [part for frame in opaque for part in (frame, clear)]
