@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Literal
 
 from scipy import stats
@@ -51,12 +51,10 @@ class Difference:
 
     a: Record
     b: Record
-    sign: float
-    """Above 0 if B is the larger: by ranks for times."""
+    sign: float  # above 0 if B is the larger: by ranks for times
     p: float
     """Probability of a difference at least as large by chance, corrected for all rows; NaN if it cannot be tested."""
-    extent: float = math.nan
-    """Range over trainings, the larger of A's and B's; NaN where neither has several."""
+    extent: float = math.nan  # range over trainings, the larger of A's and B's; NaN where neither has several
 
     @property
     def ratio(self) -> float:
@@ -82,11 +80,9 @@ class Comparison:
 
     times: list[Difference]
     errors: list[Difference]
-    only_a: int
-    """Measurements that A alone has, of those that can be compared."""
+    only_a: int  # measurements that A alone has, of those that can be compared
     only_b: int
-    unlike: list[str]
-    """Other differences that can affect the numbers: data sets, versions."""
+    unlike: list[str]  # other differences that can affect the numbers: data sets, versions
 
 
 def refuse_other_machine(a: Machine, b: Machine, allow: bool = False) -> list[str]:
@@ -115,18 +111,13 @@ def compare(a: Sequence[Record], b: Sequence[Record]) -> Comparison:
     shared = [key for key in first if key in second]
     if not shared:
         raise BadInput("compare", "", "A and B share no measurement", "times or errors of the same methods are needed")
+    tests = [_test(first[key], second[key]) for key in shared]
     rows = [
-        Difference(first[key], second[key], *_test(first[key], second[key]), extents.get(key, math.nan))
-        for key in shared
+        Difference(first[key], second[key], sign, p, extents.get(key, math.nan))
+        for key, (sign, _), p in zip(shared, tests, holm([p for _, p in tests]), strict=True)
     ]
-    rows = [replace(row, p=p) for row, p in zip(rows, holm([row.p for row in rows]), strict=True)]
-    return Comparison(
-        [row for row in rows if row.a.metric in TIMES],
-        [row for row in rows if row.a.metric not in TIMES],
-        len(first) - len(shared),
-        len(second) - len(shared),
-        _unlike(rows),
-    )
+    times, errors = ([row for row in rows if (row.a.metric in TIMES) == of_times] for of_times in (True, False))
+    return Comparison(times, errors, len(first) - len(shared), len(second) - len(shared), _unlike(rows))
 
 
 def difference_tables(comparison: Comparison) -> list[ResultTable]:
@@ -147,7 +138,7 @@ def _row(row: Difference) -> TableRow:
 
 
 def _subject(record: Record) -> str:
-    """Return the subject of a measurement, without the method."""
+    """Return what is measured, without the method."""
     if record.metric == "time":
         return f"a query, {record.threads} thread{'' if record.threads == 1 else 's'}" if record.threads else "a query"
     words = {"prepare_time": "to add a fabric", "encode_time": f"to edit {record.note}"}
@@ -215,11 +206,8 @@ def _unlike(rows: Sequence[Difference]) -> list[str]:
         sentences.append("A and B were measured on different data sets")
     if any(row.a.provenance.version != row.b.provenance.version for row in rows):
         sentences.append("A and B were measured by different versions of the benchmark")
-    once = [
-        row.a.method for row in rows if math.isnan(row.extent) and row.a.provenance.model and row.a.metric not in TIMES
-    ]
-    if once:
-        names = ", ".join(dict.fromkeys(once))
+    once = [row.a for row in rows if math.isnan(row.extent) and row.a.metric not in TIMES]
+    if names := ", ".join(dict.fromkeys(record.method for record in once if record.provenance.model)):
         sentences.append(f"one training in A and B: another training of {names} may differ by more than is marked here")
     if methods := [row.a.method for row in rows if row.a.metric == "time" and row.a.note != row.b.note]:
         sentences.append(f"calls of different sizes were timed: {', '.join(dict.fromkeys(methods))}")

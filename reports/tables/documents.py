@@ -1,12 +1,11 @@
 """Documents from the Records of one page: the table of README.md, and all tables as reports/RESULTS.md.
 
 Errors and flicker are the same in every run on one machine. Times are not: in README.md a time that is printed already
-is kept while the new one lies within `TIME_TOLERANCE` of it, so that a fresh run of the same recipe changes no byte.
+is kept while the new one lies within a quarter of it, so that a fresh run of the same recipe changes no byte.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, Final
@@ -33,9 +32,6 @@ from weaves.errors import BadInput
 README_BLOCK: Final = "quick"
 """Name of the block in README.md."""
 
-TIME_TOLERANCE: Final = 1.25
-"""Factor by which a time may differ from the one that is printed."""
-
 README_METHODS: Final[Mapping[tuple[str, str], str]] = {
     BASELINE: "two random points, exact shadows",
     ("point_sampled", "k = 16"): "sixteen random points",
@@ -45,8 +41,6 @@ README_METHODS: Final[Mapping[tuple[str, str], str]] = {
     ("soft_nodes", "k = 2"): "`soft_nodes`: a sum over few nodes, nothing is trained",
 }
 """Methods and settings that README.md shows, each in words."""
-
-_README_COLUMNS: Final = ("method", "MSE", "× lower", "× lower, unseen", "flicker", "× time")
 
 
 def readme_block(records: Sequence[Record], machine: Machine, old: str, where: str) -> str:
@@ -58,9 +52,8 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
     condensed, errors = summary_table(records), error_table(records)
     needed = {"MSE seen", "× lower, seen", "MSE unseen", "× lower, unseen", "flicker", "× time"}
     if BASELINE not in condensed.index or not needed <= set(condensed.columns):
-        raise BadInput(
-            where, "", "lacks errors, flicker or times of two random points", "Records of a whole page are needed"
-        )
+        fault = "lacks errors, flicker or times of two random points"
+        raise BadInput(where, "", fault, "Records of a whole page are needed")
     left_out = unranged(errors)
     ratios = {(row.role, row.method, row.setting): _ratio(row) for row in rows(errors)} | dict.fromkeys(left_out, NONE)
     printed = _printed_times(old)
@@ -77,7 +70,7 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
     several = any(over_unseen(row) for row in rows(errors))
     return "\n\n".join(
         [
-            markdown_table(_README_COLUMNS, lines.values()),
+            markdown_table(("method", "MSE", "× lower", "× lower, unseen", "flicker", "× time"), lines.values()),
             *_woven(lines),
             f"Recipe `{provenance.recipe}`, benchmark version {provenance.version}, {machine.cores} cores of "
             f"{machine.cpu}; {held_out['queries'].sum():,} held-out queries of {fabrics} fabrics. "
@@ -126,12 +119,12 @@ def two_decimals(value: float) -> str:
 
 
 def kept_time(printed: str, fresh: float) -> str:
-    """Return a ratio of times with two digits; the printed one if the new one is within `TIME_TOLERANCE` of it."""
+    """Return a ratio of times with two digits; the printed one if they differ by a factor of 1.25 at most."""
     try:
         old = float(printed.removesuffix("×").replace(",", ""))
     except ValueError:
         return times(fresh)
-    near = math.isfinite(fresh) and fresh > 0 and old > 0 and 1 / TIME_TOLERANCE <= fresh / old <= TIME_TOLERANCE
+    near = fresh > 0 and old > 0 and max(fresh / old, old / fresh) <= 1.25
     return printed if near else times(fresh)
 
 

@@ -24,8 +24,6 @@ from reports.tables.summary import rows
 OWN_CURVE: Final = "soft_nodes"
 """The method with a parameter whose own settings are compared."""
 
-_COLUMNS: Final = ("measure", "method", "setting", "size", "ns", "error", "rival", "rival_error", "ratio")
-
 
 def size_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return times and errors by size, one row a method, setting and size: ns, colour, specular, diffuse.
@@ -61,11 +59,11 @@ def equal_time_table(sizes: pd.DataFrame) -> pd.DataFrame:
         own = getattr(row, measure)
         for (rival, size), part in curves.items():
             if size == row.size and rival != row.method:
-                points = part[["ns", measure]].to_numpy(dtype=np.float64)
-                other = error_at([(float(t), float(e)) for t, e in points], row.ns)
+                other = error_at(list(part[["ns", measure]].itertuples(index=False, name=None)), row.ns)
                 ratio = other / own if own > 0 else math.nan
                 lines.append((measure, row.method, row.setting, size, row.ns, own, rival, other, ratio))
-    return pd.DataFrame(lines, columns=list(_COLUMNS))
+    columns = ["measure", "method", "setting", "size", "ns", "error", "rival", "rival_error", "ratio"]
+    return pd.DataFrame(lines, columns=columns)
 
 
 def error_at(curve: Sequence[tuple[float, float]], ns: float) -> float:
@@ -75,15 +73,13 @@ def error_at(curve: Sequence[tuple[float, float]], ns: float) -> float:
     setting on whose error is lost in the truth's noise (not above 0) it is 0.
     """
     best: list[tuple[float, float]] = []
-    lost = math.inf
     for time, error in sorted(curve):
         if error <= 0:
-            lost = time
+            if ns >= time:
+                return 0.0
             break
         if not best or error < best[-1][1]:
             best.append((time, error))
-    if ns >= lost:
-        return 0.0
     if not best or ns < best[0][0]:
         return math.nan
     times, errors = np.log(np.array(best)).T

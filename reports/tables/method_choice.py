@@ -24,8 +24,7 @@ from reports.tables.summary import front, rows
 
 _COLUMNS = ("method", "setting", "error", "ms", "fallback", "known")
 
-MEASURED, PREDICTED = "measured here", "from its footprints"
-"""How the numbers of a row are known."""
+MEASURED, PREDICTED = "measured here", "from its footprints"  # how the numbers of a row are known
 
 
 def predictions(

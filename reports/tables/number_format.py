@@ -11,11 +11,8 @@ from reports.catalogue import metric_row
 from reports.measure.memory import UNSURE
 
 NONE = "–"
-
 NO_BREAK: Final = "\N{NO-BREAK SPACE}"
-
 IN_THE_NOISE: Final = "in the noise"
-"""Words for an error of which nothing is left after the noise of the truth was subtracted."""
 
 NAMES: Final = {
     "neumip": "NeuMIP",

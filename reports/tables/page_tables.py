@@ -82,8 +82,7 @@ class Section:
     title: str
     intro: list[str]
     plots: list[str]
-    sentences: list[str]
-    """The sum of its tables in words."""
+    sentences: list[str]  # the sum of its tables in words
     tables: list[ResultTable]
     note: list[str]
 
@@ -128,18 +127,12 @@ def sections(
     values = {**facts(records, frames["errors"], per_material), **_truth_facts(records), **(options or {})}
     ranged = ranged_frames(frames)
     tables, sentences = result_tables(records, ranged, values, per_material), section_sentences(ranged)
-    return {
-        name: Section(
-            name,
-            words["title"],
-            paragraphs(words.get("intro", []), values),
-            words.get("plots", []),
-            sentences.get(name, []),
-            tables.get(name, []),
-            paragraphs(words.get("note", []), values),
-        )
-        for name, words in WORDS["sections"].items()
-    }
+    made = {}
+    for name, words in WORDS["sections"].items():
+        intro, note = (paragraphs(words.get(part, []), values) for part in ("intro", "note"))
+        shown = sentences.get(name, []), tables.get(name, [])
+        made[name] = Section(name, words["title"], intro, words.get("plots", []), *shown, note)
+    return made
 
 
 def result_tables(
@@ -362,8 +355,7 @@ def _extremes(frames: Frames, values: Values) -> list[ResultTable]:
     def wrong(name: str, title: str) -> Column:
         return text(title, lambda row: f"{count} of {row.answers} ✗" if (count := getattr(row, name)) else "0")
 
-    names = {error_name(footprint): f"σ {footprint:g}" for footprint in FOOTPRINTS}
-    columns = {name: number(name, title, "percent") for name, title in names.items()}
+    columns = {error_name(size): number(error_name(size), f"σ {size:g}", "percent") for size in FOOTPRINTS}
     columns |= columns_for("extremes", values)
     columns |= {name: wrong(name, columns[name].title) for name in ("not_finite", "negative")}
     return [of_methods("extremes", frames.get("extremes", pd.DataFrame()), values, columns)]
@@ -395,29 +387,23 @@ def _columns_of(kept: RowRecords[Any]) -> list[Column]:
     def named(name: str) -> Column:
         return text(name, lambda row: getattr(row, name) if name == "expression" else plain(getattr(row, name)))
 
-    fabric = ["fabric"] if any(part.name == "fabric" for part in fields(kept.row)) else []
-    method = [kept.method_field] if kept.method_field else []
-    first = next(iter(kept.metrics))
-    return [
-        *map(named, (*fabric, *method, *kept.setting)),
-        *(
-            number(field, metric=metric, ends=("low", "high") if field == first else ("", ""))
-            for field, metric in kept.metrics.items()
-        ),
-    ]
+    known = {part.name for part in fields(kept.row)}
+    columns = [named(name) for name in ("fabric", kept.method_field, *kept.setting) if name in known]
+    for index, (field, metric) in enumerate(kept.metrics.items()):
+        columns.append(number(field, metric=metric, ends=("", "") if index else ("low", "high")))
+    return columns
 
 
 def _truth_facts(records: Sequence[Record]) -> dict[str, object]:
     """Return the values of words (`tables.toml`) about the truth: limits, and how much was measured."""
     accuracies, calibrations = (part.RECORDS.from_records(records) for part in (accuracy, calibration))
-    values: dict[str, object] = {"exceeded": percent(calibration.EXCEEDED), "limit": percent(bias.LIMIT)}
-    values["target"] = percent(effort.RELATIVE_ERROR)
+    limits = {"exceeded": calibration.EXCEEDED, "limit": bias.LIMIT, "target": effort.RELATIVE_ERROR}
+    values: dict[str, object] = {name: percent(limit) for name, limit in limits.items()}
     if accuracies:
         values["reference"] = percent(max(row.reference for row in accuracies), 2)
         values["accuracy_count"] = max(row.count for row in accuracies)
-    if calibrations:
-        values["calibration_rows"] = max(row.count for row in calibrations)
-        values["calibration_count"] = sum(row.count for row in calibrations)
+    if counts := [row.count for row in calibrations]:
+        values |= {"calibration_rows": max(counts), "calibration_count": sum(counts)}
     return values
 
 

@@ -231,16 +231,17 @@ def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Collect
     counts: dict[str, int] = {}
     for row in rows(errors) if len(errors) else ():
         counts[display(row.method)] = max(row.seeds, counts.get(display(row.method), 0))
-    once, several = ([name for name, n in counts.items() if (n == 1, n > 1)[part]] for part in (0, 1))
+    once = [name for name, n in counts.items() if n == 1]
+    several = [name for name, n in counts.items() if n > 1]
     unseen = errors[errors["role"] == "unseen"]["fabrics"].max() if len(errors) else 0
     black = errors[of_baseline(errors) & (errors["zero_answers"] > 0)] if len(errors) else errors
     motion = [record.value for record in records if record.metric == "motion"]
     truth = [record.value for record in records if record.metric == "truth_relative_error"]
-    share = waited(records)
+    share, most = waited(records), max(trainings(records).values(), default=0)
     methods = set(errors["method"]) if len(errors) else set()
     known = {
         "paper_of": {OF_PAPER, BASELINE[0]} <= methods and display(OF_PAPER),
-        "trainings": max(trainings(records).values(), default=0) > 1 and max(trainings(records).values()),
+        "trainings": most > 1 and most,
         "once": once and listed(once),
         "several": several and listed(several),
         "training_counts": several and listed(sorted({str(counts[name]) for name in several})),
@@ -289,6 +290,5 @@ def busy(a: Iterable[Record], b: Iterable[Record]) -> list[str]:
     """Return a sentence for a comparison if methods of A or B had to wait."""
     shares = {name: waited(records) for name, records in (("A", a), ("B", b))}
     parts = [f"{name} waited {100 * share:.0f} % of the time" for name, share in shares.items() if share >= QUIET]
-    if not parts:
-        return []
-    return [f"Other work ran on the machine while methods were timed, {' and '.join(parts)}: times may differ by that"]
+    words = "Other work ran on the machine while methods were timed"
+    return [f"{words}, {' and '.join(parts)}: times may differ by that"] if parts else []

@@ -23,7 +23,7 @@ import pandas as pd
 from scipy import stats
 from scipy.special import stdtrit
 
-from pipeline.compiled.arrays import Mask
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.error import ratio
@@ -34,17 +34,14 @@ from reports.record import TRUTH, Metric, Record, to_table
 BASELINE: Final = ("point_sampled", "k = 2")
 """Method and setting of the baseline: point sampling at 2 points [Chen2024Woven]."""
 
-PAPER: Final = (4.1, 0.83)
-"""How much lower the MSE of the published `woven` is, and its time relative to the baseline's [Chen2024Woven]."""
-
 OF_PAPER: Final = "woven"
-"""The method that the paper of `PAPER` is of."""
+PAPER: Final = (4.1, 0.83)
+"""How much lower the MSE of the published `OF_PAPER` is, and its time relative to the baseline's [Chen2024Woven]."""
 
 PAPER_SAYS: Final = f"the paper reports {PAPER[0]}× at {PAPER[1]}× without our changes, on its own scene and GPU."
 """The same as the end of a sentence on `woven`."""
 
-FRAME: Final = 1920 * 1080
-"""Queries of a frame, one a pixel."""
+_FRAME: Final = 1920 * 1080  # queries of a frame, one a pixel
 
 ERRORS: Final[tuple[Metric, ...]] = ("mse", "colour_rrmse", *(f"rrmse_{name}" for name in COMPONENTS))
 """Metrics on held-out queries that have a mean over fabrics with an interval."""
@@ -201,8 +198,8 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
     result = times[times["threads"] == fewest].rename(columns=names).set_index(_KEYS)[[*names.values(), "threads"]]
     more = times[(times["threads"] == most) & (most > fewest)].set_index(_KEYS)[["threads", "value"]]
     result = result.join(more.set_axis(["most_threads", "most_threads_ns"], axis=1))
-    result["frame_ms"] = result["median_ns"] * FRAME / 1e6
-    result["most_threads_frame_ms"] = result["most_threads_ns"] * FRAME / 1e6
+    result["frame_ms"] = result["median_ns"] * _FRAME / 1e6
+    result["most_threads_frame_ms"] = result["most_threads_ns"] * _FRAME / 1e6
     names = {"bytes_stored": "bytes_stored", "peak_memory": "memory", "prepare_time": "prepare_ms"}
     names |= {metric: metric for metric in ("processor_time", "energy") if metric in {*table["metric"]}}
     for metric, name in names.items():
@@ -219,10 +216,8 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
 def other_table(records: Sequence[Record]) -> pd.DataFrame:
     """Return the metrics without a table of their own: one row a method, one column a metric, means over Records."""
     table = to_table(records)
-    measured = table["metric"].unique()
-    names = [
-        name for name in dict.fromkeys((*METRICS, *measured)) if name in measured and metric_row(name).table == OTHER
-    ]
+    others = {name for name in table["metric"] if metric_row(name).table == OTHER}
+    names = [name for name in dict.fromkeys((*METRICS, *table["metric"])) if name in others]
     if not names:
         return pd.DataFrame(columns=_KEYS)
     chosen = table[table["metric"].isin(names)]
@@ -263,7 +258,7 @@ def _extremes(method: str, setting: str, records: Sequence[Record]) -> dict[str,
 
 def spectra(records: Sequence[Record]) -> dict[tuple[str, str], list[tuple[float, float]]]:
     """Return the power spectrum of each method and of the truth, averaged over fabrics."""
-    curves: dict[tuple[str, str], list[np.ndarray[tuple[int, int], np.dtype[np.float64]]]] = {}
+    curves: dict[tuple[str, str], list[Float64]] = {}
     for record in records:
         if record.metric == "spectrum":
             curves.setdefault((record.method, record.setting), []).append(np.array(record.curve))

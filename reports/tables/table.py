@@ -9,6 +9,7 @@ import itertools
 import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -24,8 +25,7 @@ from reports.tables.summary import BASELINE, rows
 WORDS: Final = tomllib.loads(Path(__file__).with_name("tables.toml").read_text(encoding="utf-8"))
 """Words of sections and tables, columns of tables, and definitions of what is no metric."""
 
-Values = Mapping[str, object]
-"""Values of words."""
+Values = Mapping[str, object]  # of words
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,8 @@ class TableCell:
     """One number in words."""
 
     text: str
-    interval: str = ""
-    """95 % interval or quartiles."""
-    range: str = ""
-    """Range over trainings."""
+    interval: str = ""  # 95 % interval or quartiles
+    range: str = ""  # over trainings
     strong: bool = False
 
     def __str__(self) -> str:
@@ -58,8 +56,7 @@ class TableRow:
     cells: tuple[TableCell, ...]
     method: str = ""
     setting: str = ""
-    kind: str = ""
-    """``baseline``, ``noise`` or ``marked`` where a row is shown apart."""
+    kind: str = ""  # ``baseline``, ``noise`` or ``marked`` where a row is shown apart
 
 
 @dataclass(frozen=True)
@@ -67,13 +64,11 @@ class ResultTable:
     """A table of results."""
 
     title: str
-    columns: tuple[str, ...]
-    """Headings; the first is that of the rows' labels."""
+    columns: tuple[str, ...]  # headings; the first is that of the rows' labels
     rows: tuple[TableRow, ...]
     intro: tuple[str, ...] = ()
     note: tuple[str, ...] = ()
-    key: str = ""
-    """Role, scene or fabric that it is of, where there are several of a kind."""
+    key: str = ""  # role, scene or fabric that it is of, where there are several of a kind
 
     @property
     def groups(self) -> list[tuple[str, list[TableRow]]]:
@@ -177,10 +172,8 @@ def paragraphs(texts: Iterable[str], values: Values) -> list[str]:
     """Return texts with their values; those with a value that is not known are left out."""
     made = []
     for text in texts:
-        try:
+        with suppress(KeyError):
             made.append(text.format_map(values))
-        except KeyError:
-            continue
     return made
 
 
