@@ -21,32 +21,22 @@ Format = Literal[
 ]  # fmt: skip
 """How tables print a value (`reports.tables.number_format.shown`)."""
 
-ADDED: Final = "added_"
-"""Begins the names of metrics from outside the package."""
-
-OTHER: Final = "other_metrics"
-"""Table of the metrics that have no table of their own."""
+ADDED: Final = "added_"  # begins the names of metrics from outside the package
+OTHER: Final = "other_metrics"  # table of the metrics that have no table of their own
 
 
 class MetricRow(NamedTuple):
     """One metric."""
 
-    name: str
-    """Name in Records and tables."""
-    title: str
-    """Heading of its column on the page."""
-    definition: str = ""
-    """Explanation on the page; empty where a table's text explains it."""
-    unit: str = "1"
-    """Unit of its values; a Record with a unit of its own overrides it."""
+    name: str  # name in Records and tables
+    title: str  # heading of its column on the page
+    definition: str = ""  # explanation on the page; empty where a table's text explains it
+    unit: str = "1"  # unit of its values; a Record with a unit of its own overrides it
     better: Better = "lower"
     format: Format = "significant"
-    table: str = OTHER
-    """Table that shows it."""
-    of_machine: bool = False
-    """True if its values are those of one machine: times, rates, memory."""
-    shown: bool = True
-    """True if it is a column of its table as it is."""
+    table: str = OTHER  # table that shows it
+    of_machine: bool = False  # True if its values are those of one machine: times, rates, memory
+    shown: bool = True  # True if it is a column of its table as it is
 
 
 _CONTENT: Final = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

@@ -32,8 +32,7 @@ from scipy import stats
 from pipeline.compiled.arrays import Float64
 from pipeline.truth.query import Answers
 
-COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])
-"""Colours of the colour measure: one channel, (4, 1)."""
+COLOUR_WEIGHTS: Final = np.array([[0.3], [0.3], [0.5], [0.5]])  # colours of the colour measure: one channel, (4, 1)
 
 
 @dataclass(frozen=True)
@@ -60,12 +59,8 @@ def squared_error(
 ) -> Error:
     """Return the mean squared error of values, noise of the truth subtracted.
 
-    Parameters
-    ----------
-    values, truth, standard_error : array_like (N, ...)
-        One row a query or pixel; further axes are channels.
-    resamples : int
-        Bootstrap resamples; below 2 the interval is value +- 1.96 standard errors.
+    All are (N, ...): one row a query or pixel, further axes are channels. With less than 2 bootstrap `resamples` the
+    interval is value +- 1.96 standard errors.
     """
     t = np.asarray(truth, dtype=np.float64)
     t = t.reshape(len(t), -1)
@@ -85,18 +80,10 @@ def relative_weight(truth: npt.ArrayLike, epsilon: float) -> Float64:
 
 
 def colour_error(values: npt.ArrayLike, answers: Answers, colours: Float64, resamples: int = 500) -> Error:
-    """Return the mean squared error in colour.
+    """Return the mean squared error in colour of a method's components (N, 4), with the truth's `answers`.
 
-    Parameters
-    ----------
-    values : array_like (N, 4)
-        A method's components.
-    answers : Answers
-        The truth's.
-    colours : float64 (4, channels) or (N, 4, channels)
-        Colour of each component: `pipeline.scenes.shade.colours`, or `COLOUR_WEIGHTS`; of each query, if they differ.
-    resamples : int
-        As in `squared_error`.
+    The `colours` of the components, (4, channels), or (N, 4, channels) if they differ, are those of
+    `pipeline.scenes.shade`, or `COLOUR_WEIGHTS`; `resamples` as in `squared_error`.
     """
     seen, truth = (_coloured(np.asarray(parts, np.float64), colours) for parts in (values, answers.mean))
     return squared_error(seen, truth, colour_noise(answers, colours), resamples)
@@ -129,15 +116,8 @@ def _coloured(components: Float64, colours: Float64) -> Float64:
 
 
 def ratio(numerator: tuple[float, float], denominator: tuple[float, float]) -> tuple[float, float, float]:
-    """Return the ratio of two measured means and its 95 % interval.
+    """Return the ratio of two measured means (value, standard error), both positive, and its 95 % interval.
 
-    Parameters
-    ----------
-    numerator, denominator : (value, standard error)
-        Both values positive.
-
-    Notes
-    -----
     The interval is the delta method's in the logarithm: log r +- 1.96 sqrt((s_a/a)^2 + (s_b/b)^2). Methods that answer
     errors of the same queries are correlated, so it is wider than necessary.
     """

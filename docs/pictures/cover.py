@@ -26,10 +26,8 @@ from pipeline.scenes.shipped import camera, developed, sheet, sun
 
 HERE: Final = Path(__file__).parent
 SIZE: Final = (1600, 800)
-TURN: Final = math.radians(26.0)
-"""Angle of the folds to the picture."""
-TOWARDS_SUN: Final = (-65.0, 21.0)
-"""Azimuth from the view to the right, and height above the horizon, in degrees."""
+TURN: Final = math.radians(26.0)  # angle of the folds to the picture
+TOWARDS_SUN: Final = (-65.0, 21.0)  # azimuth from the view to the right, and height above the horizon, in degrees
 EXPOSURE: Final = 1.9
 
 

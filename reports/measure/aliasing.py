@@ -24,19 +24,15 @@ import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float64
 
-HALF_NYQUIST: Final = 0.25
-"""Half the Nyquist frequency, in cycles a pixel."""
+HALF_NYQUIST: Final = 0.25  # half the Nyquist frequency, in cycles a pixel
 
 
 class TemporalSpectrum(NamedTuple):
     """Radially averaged power of pictures."""
 
-    frequency: Float64
-    """Middle of each ring, in cycles a pixel, rising to .5."""
-    power: Float64
-    """Mean P(k) in each ring."""
-    high: float
-    """Sum of P(k) beyond half the Nyquist frequency, corners of the square included."""
+    frequency: Float64  # middle of each ring, in cycles a pixel, rising to .5
+    power: Float64  # mean P(k) in each ring
+    high: float  # sum of P(k) beyond half the Nyquist frequency, corners of the square included
 
 
 def flicker(frames: npt.ArrayLike, truth: npt.ArrayLike, truth_noise: npt.ArrayLike = 0.0) -> float:

@@ -22,18 +22,9 @@ from reports.options import ImageOptions
 def block_interval(rows: Float64, mask: Mask, options: ImageOptions) -> tuple[float, float, float]:
     """Return the standard error of a mean over pixels and the ends of its 95 % interval.
 
-    Parameters
-    ----------
-    rows : float64 (N,)
-        Values of the pixels of the mask, row by row.
-    mask : bool (H, W)
-        With N pixels, in two blocks at least.
-    options : ImageOptions
-        Side of a block as in `blocks`; draws of the percentile bootstrap [Efron1993Bootstrap], and their seed.
-
-    Notes
-    -----
-    The mean of a draw is the sum of its values over the number of its pixels: blocks may be lit in part.
+    `rows` (N,) are the values of the N pixels of the mask (H, W), row by row, in two blocks at least. The options tell
+    the side of a block as in `blocks`, and draws of the percentile bootstrap [Efron1993Bootstrap] with their seed. The
+    mean of a draw is the sum of its values over the number of its pixels: blocks may be lit in part.
     """
     block = blocks(mask, options.block)
     sums, counts = np.bincount(block, rows), np.bincount(block).astype(np.float64)

@@ -29,11 +29,8 @@ from reports.record import Metric, Record
 EDGES: Final = (0.0, 0.1, 0.3, 1.0, 3.0, math.inf)
 """Standard deviations between which footprints are of one class, in yarn spacings."""
 
-WHOLE: Final = "all"
-"""Name of all classes together, as the data set mixes them."""
-
-SIZES: Final = ("below .1", ".1 to .3", ".3 to 1", "1 to 3", "above 3")
-"""Names of the classes."""
+WHOLE: Final = "all"  # name of all classes together, as the data set mixes them
+SIZES: Final = ("below .1", ".1 to .3", ".3 to 1", "1 to 3", "above 3")  # names of the classes
 
 MEASURES: Final[dict[str, tuple[Metric, Float64]]] = {
     "colour": ("size_colour", COLOUR_WEIGHTS),
@@ -42,8 +39,7 @@ MEASURES: Final[dict[str, tuple[Metric, Float64]]] = {
 }
 """Measured quantities: the Record's metric and the colour of each component."""
 
-_LONGEST: Final = 0.02
-"""Seconds that a timed call of one class, over its fabrics, should not exceed by much."""
+_LONGEST: Final = 0.02  # seconds that a timed call of one class, over its fabrics, should not exceed by much
 
 _FEWEST: Final = 512
 """Least queries a fabric in such a call: the fixed cost of a call must not count as the cost of queries."""

@@ -31,24 +31,15 @@ from reports.options import EXTREME_TRUTH, Role
 from reports.record import Metric, Record
 from weaves.fabric import Fabric
 
-FOOTPRINTS: Final = (1e-4, 1e-2, 1.0, 1e2, 1e4)
-"""Standard deviations, in repeats: the square root of their area."""
-
-_ANGLES: Final = (0.0, 60.0, 89.9)
-"""Angles of light and viewer to the normal, in degrees."""
-
-GRAZING: Final = 89.9
-"""Name of the grazing queries among the errors, and their angle."""
-
-LUSTROUS: Final = 0.01
-"""Least roughness that a yarn may have."""
+FOOTPRINTS: Final = (1e-4, 1e-2, 1.0, 1e2, 1e4)  # standard deviations, in repeats: the square root of their area
+_ANGLES: Final = (0.0, 60.0, 89.9)  # angles of light and viewer to the normal, in degrees
+GRAZING: Final = 89.9  # name of the grazing queries among the errors, and their angle
+LUSTROUS: Final = 0.01  # least roughness that a yarn may have
 
 FAR: Final = 1e6
 """Distance of the far queries, in yarn spacings; single precision still holds sixteenths of a yarn there."""
 
-SHINY: Final = f", alpha = {LUSTROUS:g}"
-"""Ending of the names of lustrous fabrics."""
-
+SHINY: Final = f", alpha = {LUSTROUS:g}"  # ending of the names of lustrous fabrics
 _AZIMUTHS = (0.4, 2.1)  # of light and viewer
 
 

@@ -25,11 +25,8 @@ from reports.record import Metric, Record
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-_ANGLES: Final = (0.0, 30.0, 60.0, 80.0, 88.0)
-"""Angles of the viewer to the normal, degrees."""
-
-_FOOTPRINTS: Final = (0.06, 0.3, 1.5, 8.0)
-"""Standard deviations, yarn spacings."""
+_ANGLES: Final = (0.0, 30.0, 60.0, 80.0, 88.0)  # angles of the viewer to the normal, degrees
+_FOOTPRINTS: Final = (0.06, 0.3, 1.5, 8.0)  # standard deviations, yarn spacings
 
 DIRECTIONS: Final = 256
 """Directions of light for each patch: an integral of a highlight of alpha = .1 is good to about 1 %."""

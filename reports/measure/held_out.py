@@ -44,8 +44,7 @@ from reports.options import TimingOptions
 from reports.record import TRUTH, Metric, Record
 from weaves.fabric import Fabric
 
-EDITS: Final = 5
-"""Fabrics never seen before that a method is timed to prepare."""
+EDITS: Final = 5  # fabrics never seen before that a method is timed to prepare
 _LONGEST_EDITS: Final = 10_000.0  # milliseconds
 
 

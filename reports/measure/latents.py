@@ -44,8 +44,7 @@ class Pair:
     """Two fabrics that differ in one thing."""
 
     first: Fabric
-    second: Fabric
-    """The second fabric, of the same repeat."""
+    second: Fabric  # of the same repeat
     differs: Literal["yarns", "draft"]
 
     @property

@@ -14,8 +14,7 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
-UNSURE: Final = 16_000_000
-"""Bytes by which an answer may be wrong: 10 MB were seen."""
+UNSURE: Final = 16_000_000  # bytes by which an answer may be wrong: 10 MB were seen
 
 
 def peak_memory(call: Callable[[], object]) -> float | None:

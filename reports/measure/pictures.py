@@ -29,8 +29,7 @@ from reports.options import PictureOptions
 from reports.record import TRUTH, Record
 from weaves.fabric import Fabric
 
-ERROR: Final = ("error.R", "error.G", "error.B")
-"""Channels of its standard error."""
+ERROR: Final = ("error.R", "error.G", "error.B")  # channels of its standard error
 
 
 def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Path) -> None:

@@ -30,12 +30,8 @@ from pipeline.truth.query import Queries
 from reports.record import Metric, Record
 from weaves.fabric import Fabric
 
-LONGEST: Final = 0.25
-"""Seconds that one timed call of a method, over all its fabrics, should not exceed by much."""
-
-FEWEST: Final = 16
-"""Least queries a fabric in a call."""
-
+LONGEST: Final = 0.25  # seconds that one timed call of a method, over all its fabrics, should not exceed by much
+FEWEST: Final = 16  # least queries a fabric in a call
 _ZONES = Path("/sys/class/powercap")
 
 
@@ -45,8 +41,7 @@ class Contender(NamedTuple):
     predict: Callable[[Fabric, Queries], object]
     queries: Sequence[tuple[Fabric, Queries]]
     """Fabrics it covers, each with its queries; one timed call answers them all."""
-    threads: int = 1
-    """Threads that make the call, each for itself, at the same time."""
+    threads: int = 1  # threads that make the call, each for itself, at the same time
 
     @property
     def rows(self) -> int:
@@ -63,12 +58,9 @@ class Contender(NamedTuple):
 class CallTiming(NamedTuple):
     """Cost of a query."""
 
-    samples: tuple[float, ...]
-    """Times of all repeats in nanoseconds, in their order."""
-    processor: float = math.nan
-    """Mean processor time in nanoseconds, of all threads together."""
-    joules: float = math.nan
-    """Mean energy of the processor; NaN where it cannot be read."""
+    samples: tuple[float, ...]  # times of all repeats in nanoseconds, in their order
+    processor: float = math.nan  # mean processor time in nanoseconds, of all threads together
+    joules: float = math.nan  # mean energy of the processor; NaN where it cannot be read
 
     @property
     def waited(self) -> float:

@@ -26,8 +26,7 @@ class ModelNote:
     about: str  # kind and training in a few words
     fingerprint: str = ""  # of the trained model
     per_material: bool = False  # True if one model is trained for each fabric
-    kind: str = ""
-    """Kind of model, a key of `pipeline.models.catalogue.CLASSES` or `ADDED_MODEL`; empty: its name."""
+    kind: str = ""  # kind of model, a key of `pipeline.models.catalogue.CLASSES` or `ADDED_MODEL`; empty: its name
 
     @property
     def learns(self) -> bool:
@@ -51,8 +50,7 @@ class PictureFile:
     method: str  # ``truth`` for the reference
     setting: str
     path: Path
-    larger: bool = False
-    """True for a picture of a scene that is larger than the frames in which methods are measured."""
+    larger: bool = False  # True for a picture of a scene that is larger than the frames in which methods are measured
 
     @property
     def label(self) -> str:

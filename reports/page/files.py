@@ -14,8 +14,7 @@ from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
 from weaves.reading import MIB, read_bytes
 
-FILES: Final = "files.json"
-"""It lists neither itself nor ``index.html``, which is written last."""
+FILES: Final = "files.json"  # it lists neither itself nor ``index.html``, which is written last
 
 
 def write_files(folder: Path, names: Iterable[str]) -> None:

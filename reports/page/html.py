@@ -30,9 +30,7 @@ from weaves.fabric import Fabric
 FIRST_SIGHT: Final = frozenset({"trade", "error", "pictures", "live", "scenes", "traced", "measured"})
 """Sections that are open from the start."""
 
-OPEN_ROWS: Final = 15
-"""Rows of the longest table that is open from the start."""
-
+OPEN_ROWS: Final = 15  # rows of the longest table that is open from the start
 _MOST_CHIPS: Final = 8  # different colours shown of a yarn's threads
 
 

@@ -36,8 +36,7 @@ class Strip:
 
     fabric: str
     scene: str
-    cells: list[dict[str, str]] = field(default_factory=list)
-    """Each with `stem`, `method`, `label` and `mse`."""
+    cells: list[dict[str, str]] = field(default_factory=list)  # each with `stem`, `method`, `label` and `mse`
 
 
 def strips(

@@ -31,11 +31,8 @@ from reports.tables.number_format import NONE, display
 from reports.tables.table import ResultTable, TableCell, TableRow
 from weaves.errors import BadInput
 
-LEVEL: Final = 0.05
-"""Chance that a comparison marks any difference where there is none."""
-
-TIMES: Final[tuple[Metric, ...]] = ("time", "prepare_time", "encode_time")
-"""Metrics that are compared by their samples."""
+LEVEL: Final = 0.05  # chance that a comparison marks any difference where there is none
+TIMES: Final[tuple[Metric, ...]] = ("time", "prepare_time", "encode_time")  # metrics that are compared by their samples
 
 Outcome = Literal["faster", "slower", "lower", "higher", "no difference shown", "within trainings", "not tested"]
 

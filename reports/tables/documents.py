@@ -13,24 +13,15 @@ from typing import Any, Final
 import pandas as pd
 
 from reports.record import Machine, Record
+from reports.tables import summary
 from reports.tables.number_format import NONE, fixed_to, listed, scientific, times
 from reports.tables.page_tables import page_frames, sections
 from reports.tables.sentences import BOUNDED
-from reports.tables.summary import (
-    BASELINE,
-    PAPER_SAYS,
-    error_table,
-    of_baseline,
-    over_unseen,
-    rows,
-    summary_table,
-    unranged,
-)
+from reports.tables.summary import BASELINE, PAPER_SAYS, over_unseen, rows
 from reports.tables.table import markdown_table, number
 from weaves.errors import BadInput
 
-README_BLOCK: Final = "quick"
-"""Name of the block in README.md."""
+README_BLOCK: Final = "quick"  # name of the block in README.md
 
 README_METHODS: Final[Mapping[tuple[str, str], str]] = {
     BASELINE: "two random points, exact shadows",
@@ -49,12 +40,12 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
     Records and machine are those of one page, from the file `where`. Of the `old` block the times are kept where they
     still hold. BadInput if the Records hold no errors and times of two random points.
     """
-    condensed, errors = summary_table(records), error_table(records)
+    condensed, errors = summary.summary_table(records), summary.error_table(records)
     needed = {"MSE seen", "× lower, seen", "MSE unseen", "× lower, unseen", "flicker", "× time"}
     if BASELINE not in condensed.index or not needed <= set(condensed.columns):
         fault = "lacks errors, flicker or times of two random points"
         raise BadInput(where, "", fault, "Records of a whole page are needed")
-    left_out = unranged(errors)
+    left_out = summary.unranged(errors)
     ratios = {(row.role, row.method, row.setting): _ratio(row) for row in rows(errors)} | dict.fromkeys(left_out, NONE)
     printed = _printed_times(old)
     lines: dict[str, tuple[str, ...]] = {}
@@ -64,7 +55,7 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
             own = [ratios.get((role, method, setting), NONE) for role in ("seen", "unseen")]
             time = kept_time(printed.get(words, NONE), row["× time"])
             lines[words] = (words, scientific(row["MSE seen"], 1), *own, two_decimals(row["flicker"]), time)
-    held_out = errors[of_baseline(errors)]
+    held_out = errors[summary.of_baseline(errors)]
     fabrics = " and ".join(f"{row.fabrics} {row.role}" for row in rows(held_out))
     provenance = next(record.provenance for record in records if record.provenance.recipe)
     several = any(over_unseen(row) for row in rows(errors))

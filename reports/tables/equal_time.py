@@ -21,8 +21,7 @@ from reports.over_seeds import mean_over_seeds
 from reports.record import Record
 from reports.tables.summary import rows
 
-OWN_CURVE: Final = "soft_nodes"
-"""The method with a parameter whose own settings are compared."""
+OWN_CURVE: Final = "soft_nodes"  # the method with a parameter whose own settings are compared
 
 
 def size_table(records: Sequence[Record]) -> pd.DataFrame:

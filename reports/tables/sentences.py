@@ -16,11 +16,8 @@ from reports.tables.number_format import NO_BREAK, NONE, display, listed, percen
 from reports.tables.summary import BASELINE, OF_PAPER, PAPER_SAYS, of_baseline, over_unseen, parts_of, rows, unranged
 from reports.tables.tradeoff import FAULTS, LIMITS, Fault, cheapest
 
-BOUNDED: Final = "bounded"
-"""Setting of a network under the energy bound (`pipeline.models.bounded`)."""
-
-QUIET: Final = 0.02
-"""Share of the time that methods wait for others on a machine that counts as quiet."""
+BOUNDED: Final = "bounded"  # setting of a network under the energy bound (`pipeline.models.bounded`)
+QUIET: Final = 0.02  # share of the time that methods wait for others on a machine that counts as quiet
 
 
 def trade(tradeoff: pd.DataFrame) -> tuple[str, list[dict[str, str]]]:

@@ -26,8 +26,7 @@ from weaves.fabric import Fabric, load_fabric
 FABRICS: Final = ("polyester_lining", "denim", "silk_charmeuse", "satin_8", "twill_4_4", "basket")
 """One of each family, and the largest repeats."""
 
-COUNTS: Final = (64, 256, 1024)
-"""Points of the estimators that sample."""
+COUNTS: Final = (64, 256, 1024)  # points of the estimators that sample
 
 _SEED = 21
 _DARK = 1e-3  # 1/sr: patches below return too little for a relative error

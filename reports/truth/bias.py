@@ -24,11 +24,8 @@ from pipeline.truth.options import TruthOptions
 from reports.truth.accuracy import FABRICS, default_queries, fixed
 from reports.truth.row_records import RowRecords
 
-LIMIT: Final = 0.003
-"""Bias that is small enough."""
-
-SIDES: Final = ("light in front", "light behind")
-"""Where the light is; the viewer is in front."""
+LIMIT: Final = 0.003  # bias that is small enough
+SIDES: Final = ("light in front", "light behind")  # where the light is; the viewer is in front
 
 _SEED = 22
 _TABLE: Final = TruthOptions(estimator="node_table")

@@ -32,14 +32,9 @@ from pipeline.truth.options import EstimatorName, TruthOptions
 from reports.truth.row_records import RowRecords
 from weaves.population import Population, Ranges, population_fabrics
 
-RATIOS: Final = (0.8, 1.25)
-"""Ratios of calibrated errors."""
-
-_LEVEL: Final = 0.99
-"""Level of the intervals of ratios."""
-
-EXCEEDED: Final = 0.003
-"""Largest share of errors beyond their bound."""
+RATIOS: Final = (0.8, 1.25)  # ratios of calibrated errors
+_LEVEL: Final = 0.99  # level of the intervals of ratios
+EXCEEDED: Final = 0.003  # largest share of errors beyond their bound
 
 _SIGMA: Final = (0.05, 32.0)
 _OPTICS: Final = {

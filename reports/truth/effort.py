@@ -14,11 +14,8 @@ from pipeline.truth.options import TruthOptions
 from reports.truth.accuracy import FABRICS, default_queries, seconds_a_query
 from reports.truth.row_records import RowRecords
 
-CLASSES: Final = ("table alone", "borders refined", "sampled")
-"""How a query is answered, the cheapest first."""
-
-RELATIVE_ERROR: Final = 0.01
-"""Requested error."""
+CLASSES: Final = ("table alone", "borders refined", "sampled")  # how a query is answered, the cheapest first
+RELATIVE_ERROR: Final = 0.01  # requested error
 
 _SEED = 23
 _CLASS_OF: Final = {COARSE_TABLE: 0, FINE_TABLE: 0, REFINED: 1, SAMPLED: 2}

@@ -19,14 +19,9 @@ import numpy.typing as npt
 from pipeline.compiled.arrays import Float64, Mask
 from reports.truth.row_records import RowRecords
 
-SLACK: Final = 2.0
-"""How far beyond the listed figure a worst error may lie: it is an extreme of random corners."""
-
-DOUBLE: Final = 2.0**-29
-"""Rounding of float64 over that of float32."""
-
-ILL: Final = "ill-conditioned"
-"""Ending of the corners in which the rounding of the input alone makes the error."""
+SLACK: Final = 2.0  # how far beyond the listed figure a worst error may lie: it is an extreme of random corners
+DOUBLE: Final = 2.0**-29  # rounding of float64 over that of float32
+ILL: Final = "ill-conditioned"  # ending of the corners in which the rounding of the input alone makes the error
 
 Array = npt.NDArray[Any]
 
@@ -78,17 +73,10 @@ def judge(
 ) -> Finding:
     """Compare values with their reference; other parameters are fields of `Finding`.
 
-    Parameters
-    ----------
-    inputs : mapping
-        Name and values (N,) or (3, N) of what the N corners differ in.
-    value, reference, naive : float (N,) or (N, k)
-        What was computed, what it should be, and the textbook's form; objects of 50 digits are welcome. Of k numbers
-        the length of the error vector over that of the reference counts.
-    floor : float
-        Size below which the reference counts as this large.
-    signed, absolute : bool
-        Values may be negative; errors are not divided by the reference.
+    `inputs` has name and values (N,) or (3, N) of what the N corners differ in. `value`, `reference` and `naive`, (N,)
+    or (N, k), are what was computed, what it should be, and the textbook's form; objects of 50 digits are welcome. Of k
+    numbers the length of the error vector over that of the reference counts. `floor` is the size below which the
+    reference counts as this large. Values may be negative if `signed`; `absolute` errors are not divided.
     """
     error, finite = _errors(value, reference, floor, absolute)
     negative = finite & ~np.bool_(signed) & (np.asarray(value, np.float64) < 0).reshape(len(finite), -1).any(axis=1)

@@ -19,8 +19,7 @@ from pipeline.fitting.optics import FACE_NOISE, SCATTERED_NOISE
 from pipeline.fitting.predicted import Errors
 from reports.truth.row_records import RowRecords
 
-LABORATORY: Final = "a second measurement"
-"""The laboratories' own errors."""
+LABORATORY: Final = "a second measurement"  # the laboratories' own errors
 
 _DRAFTS: Final = ("plain", "twill 2/2")  # one takes two to three minutes for all rings
 _SHADE = "shade_6216"

@@ -26,11 +26,8 @@ from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from reports.truth.row_records import RowRecords
 
-OURS: Final = "soft_nodes:2"
-"""The method whose gain is stated."""
-
-OTHER: Final = "point_sampled:1"
-"""One random point a sample."""
+OURS: Final = "soft_nodes:2"  # the method whose gain is stated
+OTHER: Final = "point_sampled:1"  # one random point a sample
 
 SAMPLES: Final[dict[str, tuple[int, ...]]] = {OURS: (1, 4, 16), OTHER: (1, 2, 4, 8, 16, 32, 64)}
 """Samples a pixel of each method."""

@@ -22,13 +22,11 @@ Row = TypeVar("Row")
 class RowRecords(Generic[Row]):
     """How the rows of one measurement are written as Records."""
 
-    row: type[Row]
-    """A dataclass; ``Annotated[float, "traced_error"]`` is the type of a measured field."""
+    row: type[Row]  # a dataclass; ``Annotated[float, "traced_error"]`` is the type of a measured field
     setting: tuple[str, ...]
     """Fields that together are the setting, joined by `joint`; only the last one may hold the separator."""
     method: str = TRUTH
-    method_field: str = ""
-    """Field that holds the method; empty if it is `method`."""
+    method_field: str = ""  # field that holds the method; empty if it is `method`
     once: Mapping[str, str] = field(default_factory=dict)
     """Attributes of the Record of the first metric, such as ``note``, and the field that each holds."""
     joint: str = " | "

@@ -24,22 +24,9 @@ from pipeline.truth.node_table.kernels import Direction, FlakeLayer, Normals, Ta
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering import slab
+from reports.truth import formulas
 from reports.truth.finding import DOUBLE, ILL, RECORDS, Finding, failures, judge
-from reports.truth.formulas import (
-    Array,
-    density,
-    dot,
-    exact,
-    matrix_density,
-    sigma,
-    textbook_density,
-    textbook_sigma,
-    textbook_slab,
-    textbook_through,
-    textbook_torus_height,
-    torus_height,
-    torus_normal,
-)
+from reports.truth.formulas import Array, dot, exact
 from weaves.draft import Matrix
 from weaves.errors import WorkFailed
 from weaves.fabric import Fabric
@@ -48,8 +35,7 @@ from weaves.yarn import Yarn
 __all__ = ["RECORDS", "measure"]
 
 DIGITS: Final = 50
-BENDS: Final = (0.01, 0.1, 1.0, 10.0, 40.0, 80.0)
-"""u_max in degrees."""
+BENDS: Final = (0.01, 0.1, 1.0, 10.0, 40.0, 80.0)  # u_max in degrees
 _THICKNESSES: Final = (0.001, 0.1, 2.0, 100.0)
 _STEPS: Final = (0.0, 30.0, 60.0, 80.0, 89.0, 89.9)
 _ROUNDING: Final = 2.0**-24
@@ -135,18 +121,18 @@ def expressions() -> Iterator[Expression]:
         "1 − exp(−x)", partial(_depths, _ABSORBED), absorbed, lambda x: -np.expm1(-x), lambda x: _ONE - np.exp(-x)
     )
     yield Expression("exp(−x)", partial(_depths, _REMAINING), remaining, lambda x: np.exp(-x))
-    yield Expression(
-        "G_t", _nearly_equal, _through, lambda i, o: textbook_through(exact(i), exact(o)), textbook_through
-    )
-    yield Expression("σ", _near_axis, sigma, sigma_of, textbook_sigma, sigma_of, textbook_sigma)
-    yield Expression("D", _half_vectors, density, _density_of, matrix_density, _density_of, textbook_density)
+    through, sigma = formulas.textbook_through, formulas.textbook_sigma
+    yield Expression("G_t", _nearly_equal, _through, lambda i, o: through(exact(i), exact(o)), through)
+    yield Expression("σ", _near_axis, formulas.sigma, sigma_of, sigma, sigma_of, sigma)
+    density, matrix = formulas.density, formulas.matrix_density
+    yield Expression("D", _half_vectors, density, _density_of, matrix, _density_of, formulas.textbook_density)
     for name, behind in (("f_r", False), ("f_t", True)):
-        forms = _slab_of_node, _lit(slab_of), _lit(textbook_slab), slab_of, textbook_slab
+        forms = _slab_of_node, _lit(slab_of), _lit(formulas.textbook_slab), slab_of, formulas.textbook_slab
         yield Expression(name, partial(_slabs, behind), *forms, _DARK)
     yield Expression("exp(−TΛ)", _crossings, _crossing_of_node, _unscattered_of, dark=_DARK)
     # What rounding the directions does, which no form helps.
     yield Expression("cos", _grazing, dot, dot)
-    yield Expression("D", _forward, _halved(density), _halved(_density_of), _halved(matrix_density))
+    yield Expression("D", _forward, _halved(density), _halved(_density_of), _halved(matrix))
     for bend in BENDS:
         yield from _torus(bend)
     random = np.random.default_rng(8)
@@ -351,12 +337,12 @@ def _torus(bend: float) -> Iterator[Expression]:
         return lambda x, y: form(*numbers, 2 * x, y)
 
     height, normal = partial(surface, 2), partial(surface, slice(3, 6))
-    heights = [of(form, narrow) for form in (torus_height, textbook_torus_height)]
+    heights = [of(form, narrow) for form in (formulas.torus_height, formulas.textbook_torus_height)]
     yield Expression(
         "torus height", partial(corners, _TORUS + steep), heights[0], height, heights[1], height,
-        of(textbook_torus_height, high),
+        of(formulas.textbook_torus_height, high),
     )  # fmt: skip
-    normals = [of(torus_normal, (numbers[0], numbers[3])) for numbers in (narrow, high)]
+    normals = [of(formulas.torus_normal, (numbers[0], numbers[3])) for numbers in (narrow, high)]
     yield Expression(
         "torus normal", partial(corners, _TORUS), normals[0], normal, None, normal, normals[1], signed=True
     )

@@ -52,9 +52,7 @@ PERCEIVED: Final[tuple[Metric, ...]] = ("psnr", "ssim", "flip_ldr", "flip_hdr", 
 RELATIVE_EPSILON: Final = 0.01
 """Constant that keeps the relative MSE of dark pixels finite, as a share of the truth's squared mean."""
 
-DISPLAY_EXPOSURE: Final = 1.6
-"""Factor on linear values before they are shown, as on the page."""
-
+DISPLAY_EXPOSURE: Final = 1.6  # factor on linear values before they are shown, as on the page
 _DEFAULTS: Final = ImageOptions()
 
 
@@ -75,8 +73,7 @@ class ImageErrors:
     mse: Error
     mse_relative: Error
     perceived: dict[Metric, Measure]  # by the keys of `PERCEIVED`
-    maps: dict[str, Float64]
-    """(H, W) by name: `ssim`, `flip_ldr`, `flip_hdr`, `delta_e`, and `square`, that of PSNR."""
+    maps: dict[str, Float64]  # (H, W) by name: `ssim`, `flip_ldr`, `flip_hdr`, `delta_e`, and `square`, that of PSNR
     mask: Mask  # pixels that count, (H, W)
 
     def records(self, subject: Record) -> list[Record]:

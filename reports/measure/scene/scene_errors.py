@@ -40,8 +40,7 @@ from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
 from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
 
-_LONGEST: Final = 0.01
-"""Seconds of a timed call."""
+_LONGEST: Final = 0.01  # seconds of a timed call
 
 _FEWEST: Final = 128
 """Least queries about a cloth in such a call: the fixed cost of a call must not count as the cost of queries."""

@@ -47,14 +47,10 @@ class ClothQueries:
 
     fabric: Fabric
     queries: Queries
-    frame: Index
-    """Frame of each query, (M,)."""
-    pixel: Index
-    """Its pixel in the frame, below H W."""
-    weight: Float32
-    """Linear RGB irradiance times the truth's coverage, (M, 3)."""
-    mean: Float32
-    """The truth's answers, (M, 4)."""
+    frame: Index  # frame of each query, (M,)
+    pixel: Index  # its pixel in the frame, below H W
+    weight: Float32  # linear RGB irradiance times the truth's coverage, (M, 3)
+    mean: Float32  # the truth's answers, (M, 4)
     standard_error: Float32
     fallback_values: Float32
     """Answers of the fallback where light or viewer is behind the cloth, for methods that do not know such queries,
@@ -65,10 +61,8 @@ class ClothQueries:
     between: Float32
     """Light of all bounces after the first (`pipeline.scenes.bounces.light_between`), (M, 4, 3); zeros (1, 4, 1) if
     there is one bounce."""
-    rims: Queries
-    """R places at silhouettes, in all frames, of which some view rays leave the cloth again."""
-    coverage: Float32
-    """The truth's coverage of each, (R,)."""
+    rims: Queries  # R places at silhouettes, in all frames, of which some view rays leave the cloth again
+    coverage: Float32  # the truth's coverage of each, (R,)
 
     def light(self, components: npt.ArrayLike | None = None) -> Float64:
         """Return the light of each query, (M, 3), from a method's components (M, 4); the truth's if left out."""
@@ -89,10 +83,8 @@ class Shot:
     """A scene's frames."""
 
     name: str
-    base: Float32
-    """Linear RGB without the light that the cloth scatters, (F, H, W, 3)."""
-    cloths: list[ClothQueries]
-    """In the order of the scene."""
+    base: Float32  # linear RGB without the light that the cloth scatters, (F, H, W, 3)
+    cloths: list[ClothQueries]  # in the order of the scene
 
     @property
     def lit(self) -> Mask:
