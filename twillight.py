@@ -26,13 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 
 def _refuse_hidden_packages() -> None:
-    """Refuse to start if Python finds another package in place of one of ours, such as a folder beside a notebook.
-
-    Raises
-    ------
-    ImportError
-        With the paths of both.
-    """
+    """Raise ImportError if Python finds another package in place of ours, such as a folder beside a notebook."""
     for name in ("weaves", "pipeline", "reports", "jobs"):
         ours = Path(__file__).resolve().parent / name
         try:

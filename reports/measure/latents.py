@@ -12,7 +12,6 @@ is the delay until the next answer: the fabric's maps are made and encoded again
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Final, Literal, Protocol, runtime_checkable
@@ -30,7 +29,6 @@ from reports.measure.timing import milliseconds, timed
 from reports.options import LATENT_PAIRS
 from reports.record import Metric, Record
 from weaves.fabric import Fabric, load_fabric
-from weaves.yarn import Yarn
 
 SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Positions between the first fabric (0) and the second (1) at which errors are measured."""
@@ -73,7 +71,11 @@ def pairs() -> list[Pair]:
 
 def between(pair: Pair, share: float) -> Fabric:
     """Return the fabric whose yarns lie at `share` of the way; colours are the first one's."""
-    yarns = {name: _between(getattr(pair.first, name), getattr(pair.second, name), share) for name in ("warp", "weft")}
+    yarns = {}
+    for name in ("warp", "weft"):
+        first, second = getattr(pair.first, name), getattr(pair.second, name)
+        numbers = {key: (1.0 - share) * getattr(first, key) + share * getattr(second, key) for key in _BLENDED}
+        yarns[name] = first.model_copy(update=numbers)
     return pair.first.model_copy(update=yarns)
 
 
@@ -89,12 +91,16 @@ def measure_paths(
     queries, records = draw_queries(distribution, pair.first.weave.repeat, _SEED, 0, rows), []
     answers = _truths(pair, queries, truth)
     subject = Record(method=method.name, setting=method.setting, fabric=pair.first.name, note=pair.about)
-    for metric, values in _along(method, pair, queries):
-        errors = [
-            colour_error(blended, answer, COLOUR_WEIGHTS, resamples=0).relative_rmse
-            for blended, answer in zip(values, answers, strict=True)
-        ]
-        curve = tuple(zip(SHARES, errors, strict=True))
+    assert isinstance(method, Blends)
+    ways: dict[Metric, list[Float32]] = {}
+    ways["path_error"] = [method.predict_between(pair.first, pair.second, share, queries) for share in SHARES]
+    if pair.differs == "yarns":
+        ways["reencode_error"] = [method.predict(between(pair, share), queries) for share in SHARES]
+    for metric, values in ways.items():
+        errors = (
+            colour_error(*of_share, COLOUR_WEIGHTS, resamples=0) for of_share in zip(values, answers, strict=True)
+        )
+        curve = tuple((share, error.relative_rmse) for share, error in zip(SHARES, errors, strict=True))
         records.append(subject.of(metric, dict(curve)[0.5], rows, curve=curve))
     return records
 
@@ -116,19 +122,6 @@ def measure_edits(method: Method, fabric: Fabric, repeats: int = 25) -> list[Rec
         times = [milliseconds(partial(method.prepare, cloth)) for cloth in edited][1:]
         records.append(timed(subject.model_copy(update={"note": about}), "encode_time", times))
     return records
-
-
-def _along(method: Method, pair: Pair, queries: Queries) -> Iterator[tuple[Metric, list[Float32]]]:
-    """Yield both ways from the first fabric to the second, each with the method's answers at every share."""
-    assert isinstance(method, Blends)
-    yield "path_error", [method.predict_between(pair.first, pair.second, share, queries) for share in SHARES]
-    if pair.differs == "yarns":
-        yield "reencode_error", [method.predict(between(pair, share), queries) for share in SHARES]
-
-
-def _between(first: Yarn, second: Yarn, share: float) -> Yarn:
-    numbers = {name: (1.0 - share) * getattr(first, name) + share * getattr(second, name) for name in _BLENDED}
-    return first.model_copy(update=numbers)
 
 
 def _truths(pair: Pair, queries: Queries, truth: TruthOptions) -> list[Answers]:

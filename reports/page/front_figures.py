@@ -180,7 +180,6 @@ def _legend(figure: Figure, scheme: Scheme, colours: Mapping[str, str], lower: f
 
 
 def _band(axes: Axes, scheme: Scheme, best: pd.DataFrame, width: float = 7.0) -> None:
-    """Draw the front."""
     axes.plot(best["x"], best["y"], color=scheme.line, linewidth=width, zorder=1, solid_capstyle="round")
 
 

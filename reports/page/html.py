@@ -10,7 +10,6 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from pipeline.compiled.arrays import Float64
 from reports.catalogue import METRICS
 from reports.images import tiles
 from reports.images.tiles import EXPOSURE, hex_colour
@@ -92,7 +91,6 @@ def schemes(page: PageInput) -> dict[str, Scheme]:
 
 
 def _options(page: PageInput) -> dict[str, object]:
-    """Return the values of words that the options of a page tell."""
     options, view, scenes = page.options, page.options.view, page.options.scenes
     footprints = {
         "major": "its longer axis: it blurs towards the horizon, and the truth itself does not alias",
@@ -156,9 +154,11 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
     for family, yarn, threads in families:
         numbers = [f"{yarn.bend:.3g}°", f"{yarn.twist:.3g}°".replace("-", "−")]
         numbers += [f"{value:.3g}" for value in (yarn.roughness, yarn.relief, yarn.width)]
-        chips = {kind: _chips(getattr(threads, kind)) for kind in ("diffuse", "specular")}
-        colours = [(kind, shown) for kind, every in chips.items() for shown in every[:_MOST_CHIPS]]
-        more = sum(map(len, chips.values())) - len(colours)
+        colours, more = [], 0
+        for kind in ("diffuse", "specular"):
+            different = list(dict.fromkeys(hex_colour((EXPOSURE * rgb).tolist()) for rgb in getattr(threads, kind)))
+            colours += [(kind, shown) for shown in different[:_MOST_CHIPS]]
+            more += len(different[_MOST_CHIPS:])
         yarns.append({"family": family, "cells": numbers, "colours": colours, "more": more})
     return {
         "name": fabric.name,
@@ -169,11 +169,6 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
         "source": fabric.source,
         "yarns": yarns,
     }
-
-
-def _chips(threads: Float64) -> list[str]:
-    """Return the different colours of some threads (n, 3) as they are shown, in their order."""
-    return list(dict.fromkeys(hex_colour((EXPOSURE * rgb).tolist()) for rgb in threads))
 
 
 def alt_texts(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:

@@ -135,7 +135,6 @@ def _row(row: Difference) -> TableRow:
 
 
 def _subject(record: Record) -> str:
-    """Return what is measured, without the method."""
     if record.metric == "time":
         return f"a query, {record.threads} thread{'' if record.threads == 1 else 's'}" if record.threads else "a query"
     words = {"prepare_time": "to add a fabric", "encode_time": f"to edit {record.note}"}
@@ -197,7 +196,6 @@ def _test(a: Record, b: Record) -> tuple[float, float]:
 
 
 def _unlike(rows: Sequence[Difference]) -> list[str]:
-    """Return sentences on differences in what the two benchmarks measured."""
     sentences = []
     if any(row.a.provenance.dataset != row.b.provenance.dataset for row in rows):
         sentences.append("A and B were measured on different data sets")

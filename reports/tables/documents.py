@@ -47,7 +47,8 @@ def readme_block(records: Sequence[Record], machine: Machine, old: str, where: s
         raise BadInput(where, "", fault, "Records of a whole page are needed")
     left_out = summary.unranged(errors)
     ratios = {(row.role, row.method, row.setting): _ratio(row) for row in rows(errors)} | dict.fromkeys(left_out, NONE)
-    printed = _printed_times(old)
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in old.splitlines() if line.startswith("|")]
+    printed = {first: last for first, *_, last in cells}
     lines: dict[str, tuple[str, ...]] = {}
     for (method, setting), words in README_METHODS.items():
         if (method, setting) in condensed.index:
@@ -117,12 +118,6 @@ def kept_time(printed: str, fresh: float) -> str:
         return times(fresh)
     near = fresh > 0 and old > 0 and max(fresh / old, old / fresh) <= 1.25
     return printed if near else times(fresh)
-
-
-def _printed_times(old: str) -> dict[str, str]:
-    """Return the last cell of every row of a table, by the first."""
-    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in old.splitlines() if line.startswith("|")]
-    return {first: last for first, *_, last in lines}
 
 
 def results_page(records: Sequence[Record], machine: Machine, where: str) -> str:

@@ -87,13 +87,8 @@ def memory(value: float) -> str:
     return f"below {size(UNSURE)}" if value < UNSURE else size(value)
 
 
-def grouped(value: float) -> str:
-    """Return ``1,696``."""
-    return NONE if missing(value) else f"{value:,.0f}"
-
-
 def fixed_to(value: float, digits: int) -> str:
-    """Return ``31.4``."""
+    """Return ``1,696``, or ``31.4``."""
     return NONE if missing(value) else f"{value:,.{digits}f}"
 
 
@@ -150,7 +145,7 @@ FORMATS: Final[dict[str, Callable[[float], str]]] = {
     "two decimals": lambda value: fixed_to(value, 2),
     "one decimal": lambda value: fixed_to(value, 1),
     "significant": significant,
-    "grouped": grouped,
+    "grouped": lambda value: fixed_to(value, 0),
     "bytes": size,
     "seconds": seconds,
     "times": times,

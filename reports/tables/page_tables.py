@@ -194,7 +194,6 @@ def _fronts(tradeoff: pd.DataFrame, values: Values) -> list[ResultTable]:
 def _errors(
     records: Sequence[Record], frames: Frames, values: Values, per_material: Collection[str]
 ) -> list[ResultTable]:
-    """Return errors on held-out queries by role, over unseen fabrics, and by fabric."""
     errors, tables = frames["errors"], []
     columns = columns_for("errors", values, errors.columns)
     columns["ratio"] = _ratio(columns["ratio"])
@@ -289,7 +288,6 @@ def _energy(frames: Frames, values: Values) -> list[ResultTable]:
 
 
 def _latents(records: Sequence[Record], frames: Frames, values: Values) -> list[ResultTable]:
-    """Return errors along paths between fabrics, and times of edits."""
     tables = []
     if "between" in frames:
         frame, lines = frames["between"], []
@@ -309,7 +307,6 @@ def _latents(records: Sequence[Record], frames: Frames, values: Values) -> list[
 
 
 def _timing(frame: pd.DataFrame, values: Values) -> ResultTable:
-    """Return times on the fewest and the most threads, and what is stored."""
     few, many = (frame[name].max() if len(frame) else math.nan for name in ("threads", "most_threads"))
     fewer = f", {few:.0f} threads" if few > 1 else ""
     more = f", {many:.0f} threads" if many > 1 else ", more threads"
@@ -322,7 +319,6 @@ def entry_class(largest: float) -> str:
 
 
 def _entries(records: Sequence[Record], values: Values) -> ResultTable:
-    """Return what entries state, and the classes that follow."""
     stated: dict[str, dict[str, Record]] = {}
     for record in records:
         if metric_row(record.metric).table == "entries":

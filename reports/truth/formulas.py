@@ -115,7 +115,6 @@ def torus_normal(radius: Any, yarn: Any, sine: Array, y: Array) -> Array:
 
 
 def _exp(x: Array) -> Array:
-    """Return the exponential in the arithmetic of x."""
     return np.asarray(np.frompyfunc(mpmath.exp, 1, 1)(x), dtype=object) if x.dtype == object else np.exp(x)
 
 

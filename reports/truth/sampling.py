@@ -29,7 +29,7 @@ from typing import Annotated, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.importance.lobes import FAR, HEIGHT, SHARE, STRAIGHT, Lobes
+from pipeline.analytic.importance.lobes import FAR, HEIGHT, SHARE, STRAIGHT
 from pipeline.analytic.importance.mixture import LEAST_COSINE
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.patch_bsdf import PatchBSDF
@@ -139,7 +139,10 @@ def _estimates(subject: Subject) -> dict[str, _Estimate]:
     random = np.random.default_rng(1).random((len(looks.u), 5))
     bsdf = PatchBSDF(subject.fabric)
     point, lobes = PatchBSDF(subject.fabric, bsdf.method, points=1), bsdf.lobes(looks)
-    straight, far = lobes.rest[:, STRAIGHT].astype(np.float64), _far_share(lobes)
+    straight, flakes = lobes.rest[:, STRAIGHT].astype(np.float64), lobes.flakes[:, SHARE].sum(axis=1)
+    # The share of the scattered light that the lobes expect on the far side, roughly.
+    scattered = np.maximum(1.0 - lobes.rest[:, STRAIGHT], 1e-6)
+    far = np.asarray((lobes.rest[:, FAR] + _TO_FAR * flakes) / scattered, np.float64)
     places = _points_of(looks, np.random.default_rng(2).standard_normal((len(looks.u), 2)))
     half = np.full(len(far), 0.5)
     draws: dict[str, Callable[[], _Directions]] = {
@@ -205,12 +208,6 @@ def _one_point(bsdf: PatchBSDF, places: Queries, random: Float64, straight: Floa
     wi, pdf, _ = bsdf.draw(places, random[:, :3], lobes)
     wi[through] = -places.wo[through]
     return _Directions(wi, np.where(through, straight, (1.0 - straight) * pdf), through)
-
-
-def _far_share(lobes: Lobes) -> Float64:
-    """Return the share of the scattered light that the lobes expect on the far side, roughly."""
-    flakes, scattered = lobes.flakes[:, SHARE].sum(axis=1), 1.0 - lobes.rest[:, STRAIGHT]
-    return np.asarray((lobes.rest[:, FAR] + _TO_FAR * flakes) / np.maximum(scattered, 1e-6), np.float64)
 
 
 def _points_of(looks: Queries, normal: Float64) -> Queries:
