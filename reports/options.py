@@ -39,7 +39,6 @@ EXTREME_TRUTH: Final = TruthOptions(estimator="owen", relative_error=0.01, min_c
 """Truth of the extremes: about a second a fabric; .1 to .5 % from a million points a query at every footprint, and .1
 to 3 % with light at 89.9 degrees, where fewer points miss the few that shine."""
 
-
 _Kind = TypeVar("_Kind", bound=Frozen)
 
 

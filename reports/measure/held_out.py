@@ -182,8 +182,7 @@ def _prepare(methods: Sequence[Method], fabrics: Sequence[Fabric]) -> None:
 def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits: Iterator[int]) -> list[Record]:
     """Return the time to prepare fabrics that no cache holds: the named ones in turn, each with an edit of its own.
 
-    A method that takes long is measured less often: until `_LONGEST_EDITS` have passed.
-    An edit lowers the warp's relief by a few parts in ten thousand, so that no cache of any method helps.
+    An edit lowers the warp's relief by a few parts in ten thousand. A method that takes long is measured less often.
     """
     times = []
     for fabric, edit in zip(islice(cycle(fabrics), EDITS), edits, strict=False):

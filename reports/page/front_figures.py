@@ -113,10 +113,7 @@ def _against_time(
     worded: Callable[[float], str],
     paper: str = "",
 ) -> Figure:
-    """Draw measures (a line each) against `time` in panels (a column each); in that named `paper` the paper's step.
-
-    What has no point that can be drawn is left out.
-    """
+    """Draw measures (a line each) against `time` in panels (a column each); in that named `paper` the paper's step."""
     table = table[(table["time"] > 0) & (table[[*measures]] > 0).any(axis=1)]
     panels = {panel: title for panel, title in panels.items() if panel in set(table["panel"])}
     measures = {name: label for name, label in measures.items() if (table[name] > 0).any()}

@@ -96,10 +96,7 @@ def learnt(errors: pd.DataFrame, untrained: Collection[str] = (BASELINE[0],)) ->
 
 
 def _part(row: Any) -> tuple[str, str]:
-    """Return the comparison of a ratio, and the fabrics it is of.
-
-    A range over trainings follows, where there are several; of a ratio below 1 all numbers are of its inverse.
-    """
+    """Return the comparison of a ratio (below 1: of its inverse), with its range over trainings; and its fabrics."""
     where, name = _fabrics(row.fabrics, row.role), "ratio"
     if over_unseen(row):
         name = "ratio_fabrics"
@@ -181,10 +178,7 @@ def _cost(value: float, cost: str) -> str:
 
 
 def _equal_time_sentences(table: pd.DataFrame) -> list[str]:
-    """Return for each method the rivals with a lower error of the colour in the same time, and where.
-
-    The table is from `equal_time_table`.
-    """
+    """Return for each method the rivals with a lower error of the colour in the same time, and where."""
     result = []
     compared = table[(table["measure"] == "colour") & table["ratio"].notna()]
     for (method, setting), group in compared.groupby(["method", "setting"], sort=False):

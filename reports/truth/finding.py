@@ -102,10 +102,7 @@ def judge(
 
 
 def _errors(value: npt.ArrayLike, reference: npt.ArrayLike, floor: float, absolute: bool) -> tuple[Float64, Mask]:
-    """Return relative errors (N,), 0 of values that are not finite, and which are finite.
-
-    Differences are taken in the better of the two arithmetics.
-    """
+    """Return relative errors (N,) in the better of both arithmetics, 0 of what is not finite; and what is finite."""
     truth, good = np.asarray(reference), np.isfinite(np.asarray(value, np.float64))
     values = np.where(good, value, 0.0)
     if truth.dtype == object:

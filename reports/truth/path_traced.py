@@ -80,10 +80,7 @@ def measure(
 
 
 def _frames(name: str, method: str, size: int) -> Callable[[int, int], tuple[Float64, float]]:
-    """Return what renders a shipped scene whose cloth one method evaluates.
-
-    A function of samples a pixel and a seed; it returns a frame, (size, size, 3), and the processor's seconds.
-    """
+    """Return a function of samples a pixel and a seed: the frame (size, size, 3), and the processor's seconds."""
     loaded = load(load_scene(name), SceneOptions())
     world, mi = dress(loaded, method), register()
     film = {"type": "hdrfilm", "width": size, "height": size, "component_format": "float32", "rfilter": {"type": "box"}}

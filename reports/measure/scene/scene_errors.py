@@ -89,10 +89,7 @@ def measure_scene(
 def _over_time(
     subject: Record, own: Float64, truth: Float64, noise: Float64, still: Mask, image: ImageOptions
 ) -> list[Record]:
-    """Return the aliasing of a method's luminance, and FovVideoVDP's score where that is installed.
-
-    `still` are the pixels that show lit cloth all the way, if there are any.
-    """
+    """Return the aliasing of a method's luminance, and FovVideoVDP's score; `still` shows lit cloth all the way."""
     if len(own) == 1:
         return []
     records: list[Record] = []
