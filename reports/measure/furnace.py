@@ -21,7 +21,7 @@ from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
 from pipeline.scenes.shade import colours
 from pipeline.truth.query import Queries
-from reports.record import Metric, Record
+from reports.record import Record
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -33,7 +33,6 @@ DIRECTIONS: Final = 256
 
 _AZIMUTHS = (0.4, 2.1)
 _PLACES = 4
-_METRICS: Final[tuple[Metric, ...]] = ("furnace_diffuse", "furnace_specular", "furnace_colour", "furnace_all")
 
 
 def furnace_queries(repeat: tuple[int, int]) -> Queries:
@@ -69,7 +68,8 @@ def measure_furnace(method: Method, fabric: Fabric) -> list[Record]:
         straight = Fallback(method, ("behind",)).transparency(fabric, looks).astype(np.float64)
         figures.append((coloured + behind @ colours(fabric, transmitted=True)).max(axis=1) + straight)
     subject = Record(method=method.name, setting=method.setting, fabric=fabric.name, scene="queries")
-    return [subject.of(m, float(x.max()), len(x)) for m, x in zip(_METRICS, figures, strict=False)]
+    names = ("diffuse", "specular", "colour", "all")
+    return [subject.of(f"furnace_{n}", float(x.max()), len(x)) for n, x in zip(names, figures, strict=False)]
 
 
 def _energy(method: Method, fabric: Fabric, queries: Queries) -> Float64:

@@ -161,8 +161,10 @@ def _cheapest(table: pd.DataFrame, fault: Fault, cost: str, most: int | None = N
     """Return the cheapest method within each limit of a fault; limits with the same method are named together."""
     reached: dict[str, list[str]] = {}
     for limit in FAULTS[fault][:most]:
-        best = cheapest(table, cost, **{fault: limit})
-        text = f"{display(best.method, best.setting)} ({_cost(getattr(best, cost), cost)})" if best else ""
+        text = ""
+        if best := cheapest(table, cost, **{fault: limit}):
+            time = f"{best.ns:,.0f}{NO_BREAK}ns" if cost == "ns" else f"{significant(best.frame_time)}{NO_BREAK}ms"
+            text = f"{display(best.method, best.setting)} ({time})"
         name = f"{100 * limit:g} %" if fault == "error" else f"{limit:g}".removeprefix("0")
         reached.setdefault(text, []).append(name)
     of = " of the truth" if fault == "flicker" else ""
@@ -170,11 +172,6 @@ def _cheapest(table: pd.DataFrame, fault: Fault, cost: str, most: int | None = N
     if missed := reached.get(""):
         sentences.append(f"no method reaches {' or '.join(missed)}{of}")
     return "; ".join(sentences)
-
-
-def _cost(value: float, cost: str) -> str:
-    """Return the time of a query or of a frame."""
-    return f"{value:,.0f}{NO_BREAK}ns" if cost == "ns" else f"{significant(value)}{NO_BREAK}ms"
 
 
 def _equal_time_sentences(table: pd.DataFrame) -> list[str]:

@@ -17,8 +17,6 @@ LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
 FAULTS: Final[dict[Fault, tuple[float, ...]]] = {"error": LIMITS, "flicker": (0.1, 0.01, 0.001)}
 """Limits that the page names the cheapest method for."""
 
-_KEYS: Final = ["role", "method", "setting", "fabrics"]
-_COSTS: Final = ["ns", "error", "error_least", "error_most", "bytes_stored", "flicker"]
 _FRONTS: Final = {
     "front": ("ns", "error"),
     "front_flicker": ("ns", "flicker"),
@@ -36,7 +34,8 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
     bytes_stored, flicker (distance from the truth's); front (of error and time), front_flicker (of flicker and time),
     front_bytes (of error and bytes).
     """
-    columns = [*_KEYS, *_COSTS, *_FRONTS]
+    columns = ["role", "method", "setting", "fabrics", "ns", "error", "error_least", "error_most", "bytes_stored"]
+    columns += ["flicker", *_FRONTS]
     if errors.empty or timing.empty:
         return pd.DataFrame(columns=columns)
     keys = ["method", "setting", "role"]
