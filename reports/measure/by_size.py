@@ -41,8 +41,7 @@ MEASURES: Final[dict[str, tuple[Metric, Float64]]] = {
 
 _LONGEST: Final = 0.02  # seconds that a timed call of one class, over its fabrics, should not exceed by much
 
-_FEWEST: Final = 512
-"""Least queries a fabric in such a call: the fixed cost of a call must not count as the cost of queries."""
+_FEWEST: Final = 512  # queries a fabric in such a call: its fixed cost must not count as the cost of queries
 
 
 def measure_by_size(

@@ -256,11 +256,11 @@ def lacking(records: Sequence[Record]) -> list[str]:
             scene = f" in the scene {record.scene}" if record.scene else ""
             how = f" by {record.setting} {{}} not measured" if record.setting else f" {{}} not timed{scene}"
             reasons.setdefault((how, record.note), []).append(display(record.method))
-    return [
-        f"{listed(list(dict.fromkeys(methods)))}{how.format('was' if len(set(methods)) == 1 else 'were')} "
-        f"({reason.rstrip('.')})."
-        for (how, reason), methods in reasons.items()
-    ]
+    sentences = []
+    for (how, reason), methods in reasons.items():
+        names = list(dict.fromkeys(methods))
+        sentences.append(f"{listed(names)}{how.format('was' if len(names) == 1 else 'were')} ({reason.rstrip('.')}).")
+    return sentences
 
 
 def waited(records: Iterable[Record]) -> float:
