@@ -40,7 +40,6 @@ MEASURES: Final[dict[str, tuple[Metric, Float64]]] = {
 """Measured quantities: the Record's metric and the colour of each component."""
 
 _LONGEST: Final = 0.02  # seconds that a timed call of one class, over its fabrics, should not exceed by much
-
 _FEWEST: Final = 512  # queries a fabric in such a call: its fixed cost must not count as the cost of queries
 
 

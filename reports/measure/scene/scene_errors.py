@@ -41,7 +41,6 @@ from reports.record import TRUTH, Record
 from weaves.colour import LUMINANCE
 
 _LONGEST: Final = 0.01  # seconds of a timed call
-
 _FEWEST: Final = 128  # queries about a cloth in such a call: its fixed cost must not count as the cost of queries
 _PEAK: Final = 200.0  # of the display that FovVideoVDP looks at, in candela per square metre
 
