@@ -54,12 +54,11 @@ def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
         return np.asarray(values.reshape(2, 2, -1) @ size)
 
     gap, fits = (1.0 - widths[0]) * (1.0 - widths[1]), []
+    keys = ["openness", *(f"{yarn}.{key}" for key in ("diffuse", "diffuse_transmission") for yarn in ("warp", "weft"))]
     for band in filter(None, (sheet, sheet.solar)):
         colours, errors, left = _colours(band, shares, alike)
-        numbers = {"openness": (gap, SHEET_NOISE)}
-        keys = [f"{yarn}.{key}" for key in ("diffuse", "diffuse_transmission") for yarn in ("warp", "weft")]
-        numbers |= {key: (float(v), float(e)) for key, v, e in zip(keys, colours[2:], errors, strict=True)}
-        estimates = {key: Interval(v, max(v - e, 0.0), v + e) for key, (v, e) in numbers.items()}
+        rows = zip(keys, [gap, *colours[2:].tolist()], [SHEET_NOISE, *errors.tolist()], strict=True)
+        estimates = {key: Interval(v, max(v - e, 0.0), v + e) for key, v, e in rows}
         coloured = with_colours(fabric, within_energy(fabric, colours), _OPTICS)
         unknown = ["Normal incidence determines no bend, roughness, twist or optical thickness."]
         fits.append(Fitted(coloured, estimates, {"shares": left}, {draft: left / SHEET_NOISE}, assumed, unknown))

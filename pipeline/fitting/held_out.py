@@ -20,8 +20,8 @@ from pipeline.compiled.arrays import Float64, Mask
 from pipeline.fitting.data_sheet import dyed, other_band, products, read_sheet
 from pipeline.fitting.fit_bsdf import fit_bsdf, known_lights
 from pipeline.fitting.fitted import DRAFTS, Interval
-from pipeline.fitting.geometry import straight_of
 from pipeline.fitting.predicted import Errors, Predicted, predict
+from pipeline.fitting.straight import straight_of
 from weaves.errors import BadInput
 
 

@@ -27,9 +27,8 @@ from pipeline.compiled.arrays import Float64, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.fitting.fit_bsdf import known_lights
 from pipeline.fitting.fitted import DRAFTS, cloth
-from pipeline.fitting.geometry import Straight, straight_of
 from pipeline.fitting.measured import MEASURED
-from pipeline.fitting.straight import middles
+from pipeline.fitting.straight import Straight, middles, straight_of
 
 BAND = "visible"
 STEP = 0.03  # of a ray, in spacings of ends
