@@ -28,58 +28,46 @@ _BLOCKS = [f"{kind.capitalize()} {side.capitalize()}" for kind in SCATTERED for 
 
 
 class LayerFacts(NamedTuple):
-    """Facts of a layer beside its BSDF."""
+    """Name of the product, share of normal light that goes straight, emissivity of both faces, thickness in metres."""
 
     name: str
-    """Of the product."""
     openness: float
-    """Share of light at normal incidence that goes straight through."""
     emissivity: float
-    """Of both faces, for heat."""
     thickness: float
-    """In metres."""
 
 
 def write_klems(path: Path, scattering: Scattering, facts: LayerFacts) -> None:
     """Write a file, whole or not at all. A file without a solar band has the visible one there too."""
     ElementTree.register_namespace("", NAMESPACE)
     root = ElementTree.Element(f"{{{NAMESPACE}}}WindowElement")
-    for name, text in (("WindowElementType", "System"), ("FileType", "BSDF")):
-        _add(root, name, text)
+    _add_texts(root, WindowElementType="System", FileType="BSDF")
     layer = _add(_add(root, "Optical"), "Layer")
-    material = _add(layer, "Material")
-    for name, text in (
-        ("Name", facts.name),
-        ("Manufacturer", "Twillight"),
-        ("Thickness", f"{facts.thickness:.4g}"),
-        ("DeviceType", "Other"),
-        ("EmissivityFront", f"{facts.emissivity:g}"),
-        ("EmissivityBack", f"{facts.emissivity:g}"),
-        ("TIR", f"{facts.openness:.4g}"),
-        ("EffectiveOpennessFraction", f"{facts.openness:.4g}"),
-    ):
-        _add(material, name, text, **({"unit": "Meter"} if name == "Thickness" else {}))
-    definition = _add(layer, "DataDefinition")
+    material, emissivity, openness = _add(layer, "Material"), f"{facts.emissivity:g}", f"{facts.openness:.4g}"
+    _add_texts(material, Name=facts.name, Manufacturer="Twillight")
+    _add(material, "Thickness", f"{facts.thickness:.4g}", unit="Meter")
+    _add_texts(material, DeviceType="Other", EmissivityFront=emissivity, EmissivityBack=emissivity)
+    _add_texts(material, TIR=openness, EffectiveOpennessFraction=openness)
+    definition, basis = _add(layer, "DataDefinition"), scattering.basis
     _add(definition, "IncidentDataStructure", "Columns")
-    _add_basis(_add(definition, "AngleBasis"), scattering.basis)
+    angles = _add(definition, "AngleBasis")
+    _add(angles, "AngleBasisName", basis.name)
+    for low, high, count in zip(basis.bounds, basis.bounds[1:], basis.counts, strict=False):
+        ring = _add(angles, "AngleBasisBlock")
+        _add_texts(ring, Theta=f"{0.5 * (low + high) if low else 0:g}", nPhis=str(count))
+        _add_texts(_add(ring, "ThetaBounds"), LowerTheta=f"{low:g}", UpperTheta=f"{high:g}")
     for band, (label, source, detector) in _BANDS.items():
-        blocks = mirrored(scattering.basis, scattering.bands.get(band, scattering.bands["visible"]))
-        for k, kind in enumerate(SCATTERED):
-            for s, side in enumerate(FACES):
-                # One block each: some readers look at the first alone.
-                data = _add(layer, "WavelengthData")
-                _add(data, "LayerNumber", "System")
-                _add(data, "Wavelength", label, unit="Integral")
-                _add(data, "SourceSpectrum", source)
-                _add(data, "DetectorSpectrum", detector)
-                block = _add(data, "WavelengthDataBlock")
-                _add(block, "WavelengthDataDirection", f"{kind.capitalize()} {side.capitalize()}")
-                _add(block, "ColumnAngleBasis", scattering.basis.name)
-                _add(block, "RowAngleBasis", scattering.basis.name)
-                _add(block, "ScatteringDataType", "BRDF" if kind == "reflection" else "BTDF")
-                # Readers expect a comma behind the last number of a row too.
-                rows = ("".join(f"{value:.6g}, " for value in row) for row in blocks[k, s])
-                _add(block, "ScatteringData", "\n".join(rows))
+        blocks = mirrored(basis, scattering.bands.get(band, scattering.bands["visible"]))
+        for direction, values in zip(_BLOCKS, blocks.reshape(4, basis.patches, -1), strict=True):
+            # One block each: some readers look at the first alone.
+            data = _add(layer, "WavelengthData")
+            _add(data, "LayerNumber", "System")
+            _add(data, "Wavelength", label, unit="Integral")
+            _add_texts(data, SourceSpectrum=source, DetectorSpectrum=detector)
+            block, function = _add(data, "WavelengthDataBlock"), "BRDF" if "Reflection" in direction else "BTDF"
+            _add_texts(block, WavelengthDataDirection=direction, ColumnAngleBasis=basis.name, RowAngleBasis=basis.name)
+            # Readers expect a comma behind the last number of a row too.
+            rows = ("".join(f"{value:.6g}, " for value in row) for row in values)
+            _add_texts(block, ScatteringDataType=function, ScatteringData="\n".join(rows))
     ElementTree.indent(root)
     atomic_write(path, b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root))
 
@@ -139,15 +127,9 @@ def mirrored(basis: Basis, blocks: Float64) -> Float64:
     return np.asarray(blocks[..., mirror[:, None], mirror])
 
 
-def _add_basis(parent: ElementTree.Element, basis: Basis) -> None:
-    _add(parent, "AngleBasisName", basis.name)
-    for low, high, count in zip(basis.bounds, basis.bounds[1:], basis.counts, strict=False):
-        block = _add(parent, "AngleBasisBlock")
-        _add(block, "Theta", f"{0.5 * (low + high) if low else 0:g}")
-        _add(block, "nPhis", str(count))
-        bounds = _add(block, "ThetaBounds")
-        _add(bounds, "LowerTheta", f"{low:g}")
-        _add(bounds, "UpperTheta", f"{high:g}")
+def _add_texts(parent: ElementTree.Element, **texts: str) -> None:
+    for name, text in texts.items():
+        _add(parent, name, text)
 
 
 def _add(parent: ElementTree.Element, name: str, text: str = "", **attributes: str) -> ElementTree.Element:
