@@ -10,28 +10,24 @@ import numpy as np
 from pydantic import Field
 
 from pipeline.compiled.arrays import Float32
-from pipeline.models.domain import Domain
 from pipeline.scenes.shade import colours as linear_colours
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.golden import COLOUR, DENSITY_COLUMN, GOLDEN_COLUMNS, TRANSPARENCY_COLUMN, Golden
 from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.tables import ClothTables, Place
 from pipeline.truth.conventions import COMPONENTS
-from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.validation import Frozen
 
 GOLDEN: Final = "golden.json"
 
-_FILES: Final = {
-    "integers": {"int32": "tables/integers.i32"},
-    "numbers": {"float32": "tables/numbers.f32"},
-    "nodes": {"float32": "tables/nodes.f32", "float16": "tables/nodes.f16"},
-    "grid": {"uint8": "tables/grid.png"},
+_BUFFERS: Final = {
+    "integers": (1, {"int32": "tables/integers.i32"}),
+    "numbers": (1, {"float32": "tables/numbers.f32"}),
+    "nodes": (4, {"float32": "tables/nodes.f32", "float16": "tables/nodes.f16"}),
+    "grid": (1, {"uint8": "tables/grid.png"}),
 }
-"""Files of each buffer, by type: little-endian, row after row; the grid as grey levels of a picture."""
-
-_CHANNELS: Final = {"integers": 1, "numbers": 1, "nodes": 4, "grid": 1}
+"""Channels and files of each buffer, by type: little-endian, row after row; the grid as grey levels of a picture."""
 
 
 class Buffer(Frozen, use_attribute_docstrings=True):
@@ -218,11 +214,11 @@ def descriptor(fabric: Fabric, level: int, tables: ClothTables, kinds: Collectio
         buffers={
             name: Buffer(
                 files=files,
-                channels=_CHANNELS[name],
-                elements=getattr(tables, name).size // _CHANNELS[name],
+                channels=channels,
+                elements=getattr(tables, name).size // channels,
                 arrays=tables.places.get(name, {}),
             )
-            for name, files in _FILES.items()
+            for name, (channels, files) in _BUFFERS.items()
         },
     )
 
@@ -255,23 +251,3 @@ def _short(values: Float32) -> list[Any]:
     numbers = [float(np.format_float_scientific(value, unique=True)) for value in values.ravel()]
     short: list[Any] = np.array(numbers).reshape(values.shape).tolist()
     return short
-
-
-def trained_ranges(domain: Domain | None) -> dict[str, tuple[float, float]]:
-    """Return the ranges of footprints, directions and yarns that a model was trained on."""
-    if domain is None:
-        return {}
-    queries = domain.queries
-    of_queries = {"footprint, yarn spacings": queries.sigma, "angle to the normal, degrees": (0.0, queries.max_angle)}
-    return of_queries | domain.yarns
-
-
-def why_outside(domain: Domain | None, fabric: Fabric) -> str:
-    """Return which yarn of a fabric lies outside the training, such as ``optical_thickness = 0.8``; empty if none."""
-    if domain is None:
-        return ""
-    try:
-        domain.refuse_fabric(fabric, "")
-    except BadInput as error:
-        return f"{error.key} = {error.value}"
-    return ""

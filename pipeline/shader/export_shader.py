@@ -39,25 +39,11 @@ def write_shader(
 ) -> str:
     """Write a model of a fabric for renderers, whole or not at all, and return a sentence on the folder.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    folder : Path
-        Folder to write; an earlier export of the same model is replaced (`pipeline.folders`).
-    model, level
-        As for `shader_of`.
-    language : sequence of str
-        Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
-    kind : sequence of str
-        Kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY.
-
-    Raises
-    ------
-    BadInput
-        If a name is not known, a program or package is missing, there is no network for ONNX, or as `shader_of`.
-    WorkFailed
-        If slangc refuses the source.
+    An earlier export of the same model is replaced (`pipeline.folders`). `model` and `level` are as for `shader_of`.
+    `language` names shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or
+    ALL; `kind` kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY. BadInput if a
+    name is not known, a program or package is missing, there is no network for ONNX, or as `shader_of`; WorkFailed if
+    slangc refuses the source.
     """
     refuse_unknown(language)
     known = wanted_kinds(kind)
@@ -98,14 +84,10 @@ def _source(shader: Shader) -> dict[str, bytes]:
     """Return the files of the source."""
     texts = {name: (_HOME / name).read_text(encoding="utf-8") for name in (*shader.sources, *ENTRIES)}
     name = shader.name
-    lines = ["// The model of this folder.", ""]
-    if shader.threads:
-        lines += ["/// Threads differ in colour.", "#define THREADS", ""]
-    lines += [f'#include "{name}.slang"']
-    if shader.sampled:
-        lines += ['#include "importance.slang"', "", "/// Directions can be drawn.", "#define SAMPLED"]
-    lines += ["", f"Answer bsdf(Query query) {{ return {name}(query); }}", ""]
-    texts |= {**shader.generated, "model.slang": "\n".join(lines)}
+    threads = "/// Threads differ in colour.\n#define THREADS\n\n" if shader.threads else ""
+    sampled = '#include "importance.slang"\n\n/// Directions can be drawn.\n#define SAMPLED\n' if shader.sampled else ""
+    main = f'// The model of this folder.\n\n{threads}#include "{name}.slang"\n{sampled}\n'
+    texts |= {**shader.generated, "model.slang": f"{main}Answer bsdf(Query query) {{ return {name}(query); }}\n"}
     return {f"{SOURCE}/{file}": text.encode() for file, text in texts.items()}
 
 
@@ -113,13 +95,8 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
     """Return a model of a fabric, ready to be written.
 
     `model` is `soft_nodes`, which is meant if it is left out, or the folder of a trained `neumip`; `level` the level of
-    detail of the soft nodes; `kinds` are of QUERY_KINDS.
-
-    Raises
-    ------
-    BadInput
-        If there is no such model, its files are damaged or of another version, it was not trained on the fabric, it has
-        no shader, or has no such level or kinds.
+    detail of the soft nodes; `kinds` are of QUERY_KINDS. BadInput if there is no such model, its files are damaged or
+    of another version, it was not trained on the fabric, it has no shader, or has no such level or kinds.
     """
     if model is None or model == SOFT_NODES:
         return soft_nodes_shader(fabric, level, kinds)

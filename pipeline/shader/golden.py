@@ -24,7 +24,7 @@ from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.scenes.shade import coloured
 from pipeline.shader.constants import POINTS, WIDENING
-from pipeline.shader.tables import BEHIND, CURVATURE, Sides
+from pipeline.shader.tables import Sides
 from pipeline.shader.threads import SeenTints
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.query import LOWEST_VIEWER, STEEPEST_CURVATURE, Queries
@@ -116,11 +116,11 @@ Colouring = Callable[[Queries], Float64]
 
 def golden(sides: Sides) -> Golden:
     """Return golden queries of a cloth, of all kinds that it knows."""
-    known = {CURVATURE: len(sides.front.falls) > 0, BEHIND: sides.back is not None}
+    curved, behind = len(sides.front.falls) > 0, sides.back is not None
     groups = {
         name: group
         for name, group in GROUPS.items()
-        if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
+        if (curved or not group.curved) and (behind or min(group.light, group.viewer) > 0.0)
     }
     ends, picks = (math.lcm(int(n), len(rows)) for n, rows in zip(sides.front.repeat, sides.tints, strict=True))
     read, depth = partial(read_sides, sides), sides.front.plane - sides.front.lowest
@@ -157,13 +157,18 @@ def golden_of(
     Steady are those whose answers stay if the last digits of their footprints change by `digits`, and whose rays do not
     turn down to a `depth` below the reference plane.
     """
+
+    def in_colour(queries: Queries) -> Float32:
+        answers = read(queries)
+        return np.column_stack([answers, coloured(answers[:, :4], colours(queries))]).astype(np.float32)
+
     rng = np.random.default_rng(_SEED)
     rows, answers, places, share, stop = [], [], {}, [], 0
     for name, group in groups.items():
         queries = _candidates(repeat, group, rng)
         if not stretched:
             queries = queries._replace(sigma_minor=queries.sigma)
-        steady, answer = _steady(partial(_in_colour, read, colours), queries, rng, digits)
+        steady, answer = _steady(in_colour, queries, rng, digits)
         steady &= ~turning(queries, depth)
         chosen = np.flatnonzero(steady)[: group.rows]
         rows.append(rows_of(queries.take(chosen)))
@@ -245,12 +250,6 @@ def _front(rng: np.random.Generator, count: int, rise: tuple[float, float] = (_L
     z, turn = rng.uniform(*rise, count), rng.uniform(0.0, 2.0 * np.pi, count)
     level = np.sqrt(1.0 - z * z)
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), z]).astype(np.float32)
-
-
-def _in_colour(read: Answering, colours: Colouring, queries: Queries) -> Float32:
-    """Return answers, and the patch BSDF in colour, of N queries."""
-    answers = read(queries)
-    return np.column_stack([answers, coloured(answers[:, :4], colours(queries))]).astype(np.float32)
 
 
 def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits: int) -> tuple[Mask, Float32]:

@@ -61,12 +61,9 @@ LANGUAGES: Final = {
 }
 """Languages that slangc makes, by name."""
 
+_PRECISE = ("float", "int", "sampler2D", "isampler2D", "usampler2D")
 _ES: Final = (
-    (
-        r"#version 450\n",
-        "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
-        "precision highp isampler2D;\nprecision highp usampler2D;\n",
-    ),
+    (r"#version 450\n", "#version 300 es\n" + "".join(f"precision highp {kind};\n" for kind in _PRECISE)),
     (r"layout\(row_major\) (?:uniform|buffer);\n", ""),
     (r"layout\(binding = \d+\)\n", ""),
 )
@@ -89,8 +86,7 @@ def slangc() -> Path | None:
         for name in ("slangc", "slangc.exe"):
             if (own := Path(spec.origin).parent / "bin" / name).is_file():
                 return own
-    program = shutil.which("slangc")
-    return None if program is None else Path(program)
+    return Path(program) if (program := shutil.which("slangc")) else None
 
 
 def compiler_for(languages: Sequence[str]) -> Path:
@@ -112,13 +108,12 @@ def translate(
     written: dict[str, list[str]] = {}
     for name in languages:
         (folder / name).mkdir()
-        language = LANGUAGES[name]
-        for program in language.programs:
+        target, programs = LANGUAGES[name]
+        for program in programs:
             present = program._replace(entries=tuple(entry for entry in program.entries if entry in entries))
-            if not present.entries:
-                continue
-            compile_program(compiler, source, present, language.target, folder / name / program.file)
-            written.setdefault(name, []).append(f"{name}/{program.file}")
+            if present.entries:
+                compile_program(compiler, source, present, target, folder / name / program.file)
+                written.setdefault(name, []).append(f"{name}/{program.file}")
     return written
 
 

@@ -15,7 +15,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -128,25 +128,29 @@ def refuse_large_repeat(fabric: Fabric) -> None:
     picks, ends = fabric.weave.warp_over.shape
     if ends * picks > MOST_REPEAT_CELLS:
         allowed = f"the shader takes repeats of at most {MOST_REPEAT_CELLS:,} cells"
-        raise BadInput("export", "shader", f"{ends} ends × {picks} picks", allowed)
+        raise BadInput("export", "", f"{fabric.name}: {ends} ends × {picks} picks", allowed)
 
 
 def tables(sides: Sides) -> ClothTables:
     """Return the buffers of a cloth; BadInput above MOST_NODES or MOST_HEIGHT."""
     known = [_side(table, sides.tints) for table in (sides.front, sides.back) if table is not None]
-    _refuse_large_tables(known)
-    shared = {
-        "colours": sides.colours, "point_places": point_places(POINTS), "tints": np.concatenate(sides.tints),
-    }  # fmt: skip
+    if (count := max(len(side.rows) for side in known)) > MOST_NODES:
+        allowed = f"the shader takes at most {MOST_NODES:,}; choose a lower level"
+        raise BadInput("export", "shader", f"{count:,} nodes", allowed)
+    if (size := sum(len(side.grid) for side in known)) > TEXTURE_WIDTH * MOST_HEIGHT:
+        allowed = f"the shader takes at most {TEXTURE_WIDTH * MOST_HEIGHT:,}; choose a fabric of fewer different floats"
+        raise BadInput("export", "shader", f"{size:,} horizons", allowed)
+    tints = np.concatenate(sides.tints)
+    shared = {"colours": sides.colours, "point_places": point_places(POINTS), "tints": tints}
     first = known[0]
-    own = len(first.integers) + len(_STARTS) + len(first.of_integers) + len(first.of_numbers) + len(shared)
+    own = len(first.integers) + 2 + len(first.of_integers) + len(first.of_numbers) + len(shared)
     integers, numbers = _Buffer(own * len(known)), _Buffer(len(first.numbers) * len(known))
     of_shared = numbers.add(shared)
     heads: list[dict[str, int | float]] = []
     node = grid = 0
     for prefix, side in zip(("", "back_"), known, strict=False):
         offsets = integers.add(side.of_integers, prefix) | numbers.add(side.of_numbers, prefix) | of_shared
-        heads.append({**side.integers, **dict(zip(_STARTS, (node, grid), strict=True)), **offsets, **side.numbers})
+        heads.append({**side.integers, "first_node": node, "first_grid": grid, **offsets, **side.numbers})
         node, grid = node + side.rows[..., 0].size, grid + side.grid.size
     return ClothTables(
         integers.filled([value for head in heads for value in head.values() if isinstance(value, int)], np.int32),
@@ -157,10 +161,6 @@ def tables(sides: Sides) -> ClothTables:
         heads[1] if len(heads) > 1 else {},
         {"integers": integers.places, "numbers": numbers.places},
     )
-
-
-_STARTS: Final = ("first_node", "first_grid")
-"""Scalars of where the nodes and the grids of a side begin."""
 
 
 class _Buffer:
@@ -255,29 +255,14 @@ def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
     return _Side(integers, numbers, of_integers, of_numbers, rows, np.append(grid, table.end_walls.ravel()))
 
 
-def _refuse_large_tables(known: Sequence[_Side]) -> None:
-    """Refuse tables above MOST_NODES or MOST_HEIGHT."""
-    count = max(len(side.rows) for side in known)
-    if count > MOST_NODES:
-        allowed = f"the shader takes at most {MOST_NODES:,}; choose a lower level"
-        raise BadInput("export", "shader", f"{count:,} nodes", allowed)
-    size = sum(len(side.grid) for side in known)
-    if size > TEXTURE_WIDTH * MOST_HEIGHT:
-        allowed = f"the shader takes at most {TEXTURE_WIDTH * MOST_HEIGHT:,}; choose a fabric of fewer different floats"
-        raise BadInput("export", "shader", f"{size:,} horizons", allowed)
-
-
 def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> str:
     """Return a file of the source with constants, whose types are those of the values."""
     lines = [f"// Generated from {origin}; do not edit.", "", "#pragma once", ""]
     for name, value in values.items():
-        if isinstance(value, bool):
-            kind, text = "bool", str(value).lower()
-        else:
-            kind, text = ("int", str(value)) if isinstance(value, int) else ("float", f"{value:.9g}")
-        if kind == "float" and not any(mark in text for mark in ".e"):
+        text = f"{value:.9g}" if isinstance(value, float) else str(value).lower()
+        if isinstance(value, float) and not any(mark in text for mark in ".e"):
             text += ".0"
-        lines.append(f"static const {kind} {name} = {text};")
+        lines.append(f"static const {type(value).__name__} {name} = {text};")
     return "\n".join([*lines, ""])
 
 
@@ -337,18 +322,14 @@ def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np
 
 def table_files(cloth: ClothTables) -> dict[str, bytes]:
     """Return the files of the four buffers, by their paths."""
+    # The lowest row of the texture comes first.
     rows = np.pad(cloth.grid, (0, -cloth.grid.size % TEXTURE_WIDTH)).reshape(-1, TEXTURE_WIDTH)
+    picture = io.BytesIO()
+    Image.fromarray(rows).save(picture, format="PNG", compress_level=9)
     return {
         "tables/integers.i32": cloth.integers.astype("<i4").tobytes(),
         "tables/numbers.f32": cloth.numbers.astype("<f4").tobytes(),
         "tables/nodes.f32": cloth.nodes.astype("<f4").tobytes(),
         "tables/nodes.f16": cloth.nodes.astype("<f2").tobytes(),
-        "tables/grid.png": _png(rows),
+        "tables/grid.png": picture.getvalue(),
     }
-
-
-def _png(rows: npt.NDArray[np.uint8]) -> bytes:
-    """Return rows of bytes as a picture; the lowest row of the texture comes first."""
-    buffer = io.BytesIO()
-    Image.fromarray(rows).save(buffer, format="PNG", compress_level=9)
-    return buffer.getvalue()

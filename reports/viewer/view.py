@@ -28,8 +28,8 @@ from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
 from pipeline.scenes.shade import coloured, colours, colours_of
 from pipeline.shader.constants import TEXTURE_WIDTH
-from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
-from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
+from pipeline.shader.limits import MOST_NODES
+from pipeline.shader.tables import ClothTables, Sides, refuse_large_repeat, tables, tabulate_sides
 from pipeline.shader.threads import thread_tints
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
@@ -97,10 +97,7 @@ def write_page(
     """
     if truth and not LEAST_TILE <= truth <= MOST_TILE:
         raise BadInput("export", "truth", truth, f"must be from {LEAST_TILE} to {MOST_TILE}, or 0 for none")
-    picks, ends = fabric.weave.warp_over.shape
-    if ends * picks > MOST_REPEAT_CELLS:
-        allowed = f"the shader takes repeats of at most {MOST_REPEAT_CELLS:,} cells"
-        raise BadInput("export", "", f"{fabric.name}: {ends} ends × {picks} picks", allowed)
+    refuse_large_repeat(fabric)
     shown = content(fabric, truth, progress)
     page = whole_page(shown)
     atomic_write(path, page.encode())
