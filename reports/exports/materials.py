@@ -142,9 +142,12 @@ def write_sample(path: Path, fabric: Fabric, shown: Layout, level: Textures, mat
 
     file = _File(gltf)
     vertices, faces = _draped(fabric, shown)
-    attributes = gltf.Attributes(**{name: file.vertices(values) for name, values in vertices.items()})
+    indices = {
+        name: file.array(values.astype(np.float32), f"VEC{values.shape[1]}", gltf.FLOAT, gltf.ARRAY_BUFFER)
+        for name, values in vertices.items()
+    }
     corners = file.array(faces.reshape(-1, 1), gltf.SCALAR, gltf.UNSIGNED_INT, gltf.ELEMENT_ARRAY_BUFFER)
-    primitive = gltf.Primitive(attributes=attributes, indices=corners, material=0)
+    primitive = gltf.Primitive(attributes=gltf.Attributes(**indices), indices=corners, material=0)
     document = file.document
     document.meshes.append(gltf.Mesh(name=fabric.name, primitives=[primitive]))
     document.nodes.append(gltf.Node(name=fabric.name, mesh=0))
@@ -199,11 +202,6 @@ class _File:
         linear, repeat = gltf.LINEAR_MIPMAP_LINEAR, gltf.REPEAT
         self.document.samplers.append(gltf.Sampler(magFilter=gltf.LINEAR, minFilter=linear, wrapS=repeat, wrapT=repeat))
         self._bytes = b""
-
-    def vertices(self, values: Float64) -> int:
-        """Add an attribute of the vertices, and return its index."""
-        kind = f"VEC{values.shape[1]}"
-        return self.array(values.astype(np.float32), kind, self.gltf.FLOAT, self.gltf.ARRAY_BUFFER)
 
     def array(self, values: npt.NDArray[Any], kind: str, component: int, target: int) -> int:
         """Add an array (N, n), and return its index."""

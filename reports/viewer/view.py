@@ -11,6 +11,7 @@ from __future__ import annotations
 import base64
 import gzip
 import html
+import itertools
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -29,7 +30,7 @@ from pipeline.models.named import TRUTH, named_method
 from pipeline.scenes.shade import coloured, colours, colours_of
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.limits import MOST_NODES
-from pipeline.shader.tables import ClothTables, Sides, refuse_large_repeat, tables, tabulate_sides
+from pipeline.shader.tables import Sides, refuse_large_repeat, tables, tabulate_sides
 from pipeline.shader.threads import thread_tints
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
@@ -135,18 +136,17 @@ def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lamb
     through = sheer(fabric)
     views = VIEWS | (AGAINST_LIGHT if through else {})
     steps = len(factors[0]) * len(factors[1]) + len(views)
-    for bend in factors[0]:
-        for width in factors[1]:
-            shape = bent(fabric, bend, width)
-            levels = list(DETAILS) if (bend, width) == (1.0, 1.0) else [USUAL]
-            of_shape = [(level, _nodes(shape, level)) for level in levels]
-            # All levels of a shape have the same grid.
-            about = {"bend": bend, "width": width, "grid": len(grids)}
-            front = of_shape[0][1].front
-            grids.append(packed(np.concatenate([front.grid.ravel(), front.behind_grid.ravel()])))
-            kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
-            of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
-            progress(len(grids) / steps)
+    for bend, width in itertools.product(*factors):
+        shape = bent(fabric, bend, width)
+        levels = list(DETAILS) if (bend, width) == (1.0, 1.0) else [USUAL]
+        of_shape = [(level, _nodes(shape, level)) for level in levels]
+        # All levels of a shape have the same grid.
+        about = {"bend": bend, "width": width, "grid": len(grids)}
+        front = of_shape[0][1].front
+        grids.append(packed(np.concatenate([front.grid.ravel(), front.behind_grid.ravel()])))
+        kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
+        of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
+        progress(len(grids) / steps)
     still, irradiance = _still(fabric)
     methods = _methods(fabric) if truth else {}
     for name, camera in views.items():
@@ -243,11 +243,11 @@ def _table(fabric: Fabric, sides: Sides, about: dict[str, Any]) -> dict[str, Any
         "integers": packed(cloth.integers),
         "numbers": packed(cloth.numbers),
         "nodes": packed(cloth.nodes),
-        "families": packed(_families(table, cloth)),
+        "families": packed(_families(table)),
     }
 
 
-def _families(table: SoftNodeTable, cloth: ClothTables) -> npt.NDArray[np.uint8]:
+def _families(table: SoftNodeTable) -> npt.NDArray[np.uint8]:
     """Return the family of every node; those that fill up blocks count as gaps."""
     families = np.full(table.evenly.size, GAP, np.uint8)
     for group in table.groups.astype(np.int64):
