@@ -190,7 +190,6 @@ def other_band(sheet: DataSheet, white: DataSheet) -> Interval:
 
 
 def _infrared(sheet: DataSheet) -> SheetBand:
-    """Return the infrared part of the solar band."""
     solar = sheet.solar
     assert solar is not None
 

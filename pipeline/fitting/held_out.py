@@ -26,7 +26,6 @@ from weaves.errors import BadInput
 
 
 def _cosine(openness: float, theta: Float64, azimuth: Float64) -> Float64:
-    """Return the openness times the cosine."""
     return np.asarray(openness * np.cos(np.radians(theta)))
 
 

@@ -34,20 +34,15 @@ from pipeline.truth.geometry import heightfield, visibility
 from pipeline.truth.scattering import slab_float32
 from weaves.colour import LUMINANCE
 
-ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
-    "YARN": (heightfield, ("RADIUS", "INVERSE_RADIUS", "SIN_TWIST", "COS_TWIST", "ALPHA", "BETA", "BLEND", "BEND")),
-    "GROUP": (nodes, ("START", "LINES", "GROUP_FAMILY")),
-    "PIECE": (nodes, ("FAMILY", "BLOCK")),
-    "BOUNDS": (nodes, ("X_LOW", "X_HIGH", "Y_LOW", "Y_HIGH", "SHIFT", "CURVE", "BOUND")),
-}
-"""Columns of the arrays of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, by the name of the array."""
-
-ADDED: Final[dict[str, tuple[str, ...]]] = {
+ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...], tuple[str, ...]]]] = {
+    "YARN": (heightfield, ("RADIUS", "INVERSE_RADIUS", "SIN_TWIST", "COS_TWIST", "ALPHA", "BETA", "BLEND", "BEND"), ()),
     # The shader sums over the cells of a node, so that they are listed by group.
-    "GROUP": ("FIRST_CELL", "CELLS"),
-    "FLOAT": ("FLOAT_BEND", "FLOAT_HALF", "FLOAT_DROP", "CROWN"),
+    "GROUP": (nodes, ("START", "LINES", "GROUP_FAMILY"), ("FIRST_CELL", "CELLS")),
+    "PIECE": (nodes, ("FAMILY", "BLOCK"), ()),
+    "BOUNDS": (nodes, ("X_LOW", "X_HIGH", "Y_LOW", "Y_HIGH", "SHIFT", "CURVE", "BOUND"), ()),
+    "FLOAT": (nodes, (), ("FLOAT_BEND", "FLOAT_HALF", "FLOAT_DROP", "CROWN")),
 }
-"""Columns that the shader has beside them."""
+"""Columns of arrays: those of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, then what only the shader has."""
 
 TEXTURE_WIDTH: Final = 1024
 """Texels of a row of every texture."""
@@ -131,10 +126,8 @@ def constants() -> dict[str, float | int]:
         **dict(zip(("HIDDEN_COSINE", "HIDDEN_STRAIGHT"), vars(lobes)["_HIDDEN"], strict=True)),
         **{f"LUMINANCE_{name}": share for name, share in zip(("RED", "GREEN", "BLUE"), LUMINANCE, strict=True)},
     }
-    for name in {**ARRAYS, **ADDED}:
-        module, columns = ARRAYS.get(name, (nodes, ()))
+    for name, (module, columns, added) in ARRAYS.items():
         values |= {column: vars(module)[column] for column in columns}
-        added = ADDED.get(name, ())
         values |= {column: len(columns) + index for index, column in enumerate(added)}
         values[f"{name}_COLUMNS"] = len(columns) + len(added)
     for module, names in _SAME:

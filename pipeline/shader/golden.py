@@ -20,7 +20,6 @@ from pipeline.analytic.importance.mixture import density_rows
 from pipeline.analytic.importance.surface import LobeSurface
 from pipeline.analytic.soft_nodes.answer import SMALLEST
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
-from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.scenes.shade import coloured
 from pipeline.shader.constants import POINTS, WIDENING
@@ -195,20 +194,15 @@ def read_sides(sides: Sides, queries: Queries) -> Float32:
         result[~behind, :4], result[~behind, 4:8] = reflected.components, reflected.bounds
     if behind.any():
         result[behind, :4] = result[behind, 4:8] = read_behind(table, seen.take(behind))[:, :4]
-    result[:, TRANSPARENCY_COLUMN] = transparency(table, seen)
+    if not len(table.behind_grid):
+        # Horizons of the other side hide the light, of which the transparency knows nothing.
+        table = table._replace(behind_mean=table.mean, behind_sharpness=table.sharpness, behind_grid=table.grid)
+    result[:, TRANSPARENCY_COLUMN] = read_behind(table, seen._replace(wi=-seen.wo))[:, 4]
     lobes = lobes_of(sides, queries)
     wi, wo, density = (np.ascontiguousarray(a, np.float32) for a in (queries.wi, queries.wo, result[:, DENSITY_COLUMN]))
     density_rows(lobes, wi, wo, density)
     result[:, DENSITY_COLUMN] = density
     return result
-
-
-def transparency(table: SoftNodeTable, looks: Queries) -> Float32:
-    """Return the transparency of N footprints, (N,), the viewer in front; a table of the front alone suffices."""
-    if not len(table.behind_grid):
-        # Horizons of the other side hide the light, of which the transparency knows nothing.
-        table = table._replace(behind_mean=table.mean, behind_sharpness=table.sharpness, behind_grid=table.grid)
-    return read_behind(table, looks._replace(wi=-looks.wo))[:, 4]
 
 
 def lobes_of(sides: Sides, looks: Queries) -> Lobes:

@@ -71,12 +71,11 @@ _ES: Final = (
 matrices, of which there are none; bindings, which a program sets by name."""
 
 
-def refuse_unknown(languages: Sequence[str]) -> None:
-    """Refuse a name that is no language."""
-    for name in languages:
-        if name not in (ALL, SOURCE, ONNX, *LANGUAGES):
-            allowed = f"must be one of {', '.join((SOURCE, *LANGUAGES, ONNX, ALL))}"
-            raise BadInput("export", "language", one_line(name, 40), allowed)
+def refuse_unknown(key: str, names: Collection[str], known: Collection[str]) -> None:
+    """Refuse a name of an option that is not known."""
+    for name in names:
+        if name not in known:
+            raise BadInput("export", key, one_line(name, 40), f"must be one of {', '.join(known)}")
 
 
 def slangc() -> Path | None:

@@ -101,19 +101,16 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
     channels = [f"feature {n}" for n in range(options.channels)]
     channels += ["0"] * (-len(channels) % 4)
     trained_on, outside = _training(method.domain, fabric)
+    ends, picks = fabric.thread_colours()
     described = descriptor.Descriptor(
         model=NEUMIP,
         fabric=fabric.name,
-        level=None,
         outputs=descriptor.OUTPUTS | {"bounds": "the components: the network knows no bound of energy"},
         conventions=[*descriptor.CONVENTIONS, "An ellipse counts as the circle of its area, curved cloth as flat."],
         colours=descriptor.colours(fabric),
         repeat=fabric.weave.repeat,
-        threads=descriptor.threads_of(fabric),
+        threads=(len(ends.diffuse), len(picks.diffuse)),
         limits={"elements": MOST_ELEMENTS},
-        kinds=[],
-        scalars={},
-        back_scalars={},
         buffers={
             "weights": descriptor.Buffer(
                 files={"float32": "tables/weights.f32", "float16": "tables/weights.f16"},
@@ -139,7 +136,6 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         ),
     )
     return descriptor.Shader(
-        NEUMIP,
         NEUMIP_SOURCES,
         {
             "layout.slang": constants_slang(shared_constants(), "pipeline.analytic.soft_nodes"),

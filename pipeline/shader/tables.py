@@ -32,10 +32,11 @@ from pipeline.analytic.soft_nodes.view_lines import GAUSS_PLACES, GAUSS_WEIGHTS
 from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
 from pipeline.shader.constants import FALL_ROWS, OTHER_ROW, POINTS, TEXTURE_WIDTH, constants
+from pipeline.shader.languages import refuse_unknown
 from pipeline.shader.limits import MOST_HEIGHT, MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.threads import family_heights, thread_tints
 from pipeline.truth.geometry.heightfield import AXIS_DROP, BEND_RADIUS, HALF_LENGTH
-from weaves.errors import BadInput, one_line
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 BEHIND: Final = "behind"
@@ -105,9 +106,7 @@ _MEANINGS: Final = {
 
 def wanted_kinds(names: Collection[str]) -> frozenset[str]:
     """Return the kinds of queries that names choose; BadInput if one is none."""
-    for name in names:
-        if name not in (known := (*QUERY_KINDS, EVERY)):
-            raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join(known)}")
+    refuse_unknown("kind", names, (*QUERY_KINDS, EVERY))
     return frozenset(QUERY_KINDS if EVERY in names else names)
 
 
@@ -197,13 +196,10 @@ class _Side(NamedTuple):
 
 
 def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
-    """Return what the shader reads of one side."""
     rows = _node_rows(table)
     groups, cells = _groups(table)
     grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
     behind, curvatures = int(len(table.behind_grid) > 0), len(table.grid_falls)
-    least, greatest = map(float, table.shown)
-    warp_height, weft_height = family_heights(table)
     integers: dict[str, int | float] = {
         "ends": int(table.repeat[0]),
         "picks": int(table.repeat[1]),
@@ -223,25 +219,13 @@ def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
         "end_tints": len(tints[0]),
         "pick_tints": len(tints[1]),
     }
-    numbers: dict[str, int | float] = {
-        "thickness": float(table.thickness),
-        "uniform": table.uniform,
-        "highest": table.highest,
-        "lowest": table.lowest,
-        "plane": table.plane,
-        "shown_least": least,
-        "shown_greatest": greatest,
-        "view_lines": table.view_lines,
-        "spacing": table.spacing,
-        "warp_height": warp_height,
-        "weft_height": weft_height,
-    }
-    of_integers: dict[str, npt.NDArray[Any]] = {
-        "groups": groups,
-        "group_cells": cells,
-        "piece_starts": table.piece_starts,
-        "pieces": table.pieces,
-    }
+    numbers: dict[str, int | float] = {"thickness": float(table.thickness)}
+    numbers |= {name: getattr(table, name) for name in ("uniform", "highest", "lowest", "plane")}
+    numbers |= zip(("shown_least", "shown_greatest"), map(float, table.shown), strict=True)
+    numbers |= {name: getattr(table, name) for name in ("view_lines", "spacing")}
+    numbers |= zip(("warp_height", "weft_height"), family_heights(table), strict=True)
+    of_integers: dict[str, npt.NDArray[Any]] = {"groups": groups, "group_cells": cells}
+    of_integers |= {"piece_starts": table.piece_starts, "pieces": table.pieces}
     floats = np.column_stack([table.floats[:, [BEND_RADIUS, HALF_LENGTH, AXIS_DROP]], table.crowns])
     of_numbers: dict[str, npt.NDArray[Any]] = {
         "yarn": table.yarn,
@@ -269,20 +253,18 @@ def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> st
 def layout_slang(cloth: ClothTables) -> str:
     """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the functions that read it."""
     lines = [constants_slang(constants(), "pipeline.analytic").rstrip()]
-    kinds = {name: "int" if isinstance(value, int) else "float" for name, value in cloth.scalars.items()}
-    lines += ["", "struct Table {", *(f"    {kind} {name};" for name, kind in kinds.items()), "};", ""]
+    integers = [name for name, value in cloth.scalars.items() if isinstance(value, int)]
+    numbers = [name for name, value in cloth.scalars.items() if isinstance(value, float)]
+    lines += ["", "struct Table {", *(f"    int {name};" for name in integers)]
+    lines += [*(f"    float {name};" for name in numbers), "};", ""]
     lines += ["int integer(int i);", "float number(int i);", ""]
     lines += ["Table load_table_at(int first_integer, int first_number) {", "    Table table;"]
-    seen = {"int": 0, "float": 0}
-    for name, kind in kinds.items():
-        read = "integer(first_integer" if kind == "int" else "number(first_number"
-        lines.append(f"    table.{name} = {read} + {seen[kind]});")
-        seen[kind] += 1
-    behind = list(kinds).index("behind")
+    lines += [f"    table.{name} = integer(first_integer + {n});" for n, name in enumerate(integers)]
+    lines += [f"    table.{name} = number(first_number + {n});" for n, name in enumerate(numbers)]
     lines += ["    return table;", "}", "", "/// The front of the cloth.", "Table load_table() {"]
     lines += ["    return load_table_at(0, 0);", "}", "", "/// The side that a viewer sees, if the table knows both."]
-    lines += ["Table load_side(bool back) {", f"    bool other = back && integer({behind}) > 0;"]
-    lines += [f"    return load_table_at(other ? {seen['int']} : 0, other ? {seen['float']} : 0);", "}", ""]
+    lines += ["Table load_side(bool back) {", f"    bool other = back && integer({integers.index('behind')}) > 0;"]
+    lines += [f"    return load_table_at(other ? {len(integers)} : 0, other ? {len(numbers)} : 0);", "}", ""]
     return "\n".join(lines)
 
 

@@ -17,7 +17,7 @@ from pipeline.folders import own_files
 from pipeline.materials.lobes import SHEEN_ROUGHNESS, reflectance
 from pipeline.materials.occlusion import lit_coverage
 from pipeline.materials.planes import Layout, layout, planes, yarn_ids
-from pipeline.materials.textures import Constants, Textures, across_direction, constants, openpbr_roughness, textures
+from pipeline.materials.textures import Textures, across_direction, constants, openpbr_roughness, textures
 from reports.exports import materials
 from reports.exports.materials import DOCUMENT, SAMPLE, spacing_cm, yarns_per_cm
 from reports.images.texture import Kind, write_texture
@@ -142,27 +142,8 @@ def _write(fabric: Fabric, shown: Layout, folder: Path) -> int:
         (place := folder / "mips" / f"{width}x{height}").mkdir(parents=True)
     maps["yarn_id"] = YARN_ID
     materials.write_openpbr(folder / DOCUMENT, fabric.name, material)
-    about = _about(fabric, shown, material) | {
-        "height": {
-            "zero": "the middle plane of the cloth, where the axes of yarns change side",
-            "exr_unit_m": spacing_cm(fabric) / 100.0,
-            "png_black_m": span[0] * spacing_cm(fabric) / 100.0,
-            "png_white_m": span[1] * spacing_cm(fabric) / 100.0,
-        },
-        "maps": {
-            name: {"meaning": row.meaning, "kind": row.kind, "exr": f"{name}.exr", "png": f"{name}.png"}
-            for name, row in maps.items()
-        },
-        "mip_levels": levels,
-    }
-    (folder / LISTING).write_text(json.dumps(about), encoding="utf-8")
-    return len(maps)
-
-
-def _about(fabric: Fabric, shown: Layout, material: Constants) -> dict[str, Any]:
-    """Return the size of the cloth that a map shows, and the numbers of the material."""
     ends, picks = yarns_per_cm(fabric)
-    return {
+    about = {
         "fabric": fabric.name,
         "generator": f"twillight {version('twillight')}",
         "yarns": (shown.ends, shown.picks),
@@ -178,4 +159,17 @@ def _about(fabric: Fabric, shown: Layout, material: Constants) -> dict[str, Any]
             "sheen_roughness": SHEEN_ROUGHNESS,
             "transmitted": material.transmitted,
         },
+        "height": {
+            "zero": "the middle plane of the cloth, where the axes of yarns change side",
+            "exr_unit_m": spacing_cm(fabric) / 100.0,
+            "png_black_m": span[0] * spacing_cm(fabric) / 100.0,
+            "png_white_m": span[1] * spacing_cm(fabric) / 100.0,
+        },
+        "maps": {
+            name: {"meaning": row.meaning, "kind": row.kind, "exr": f"{name}.exr", "png": f"{name}.png"}
+            for name, row in maps.items()
+        },
+        "mip_levels": levels,
     }
+    (folder / LISTING).write_text(json.dumps(about), encoding="utf-8")
+    return len(maps)

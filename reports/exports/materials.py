@@ -155,7 +155,9 @@ def write_sample(path: Path, fabric: Fabric, shown: Layout, level: Textures, mat
     document.scene = 0
     document.materials.append(_material(gltf, file, fabric.name, level, material))
     document.asset = gltf.Asset(version="2.0", generator="twillight")
-    file.finish(path)
+    document.buffers.append(gltf.Buffer(byteLength=len(file.content)))
+    document.set_binary_blob(file.content)
+    document.save_binary(str(path))
 
 
 def _material(gltf: Any, file: _File, name: str, level: Textures, material: Constants) -> Any:
@@ -201,7 +203,7 @@ class _File:
         self.document = gltf.GLTF2()
         linear, repeat = gltf.LINEAR_MIPMAP_LINEAR, gltf.REPEAT
         self.document.samplers.append(gltf.Sampler(magFilter=gltf.LINEAR, minFilter=linear, wrapS=repeat, wrapT=repeat))
-        self._bytes = b""
+        self.content = b""
 
     def array(self, values: npt.NDArray[Any], kind: str, component: int, target: int) -> int:
         """Add an array (N, n), and return its index."""
@@ -219,17 +221,11 @@ class _File:
         self.document.textures.append(self.gltf.Texture(sampler=0, source=len(self.document.images) - 1))
         return len(self.document.textures) - 1
 
-    def finish(self, path: Path) -> None:
-        """Write the file."""
-        self.document.buffers.append(self.gltf.Buffer(byteLength=len(self._bytes)))
-        self.document.set_binary_blob(self._bytes)
-        self.document.save_binary(str(path))
-
     def _view(self, content: bytes, target: int | None) -> int:
-        start = len(self._bytes)
+        start = len(self.content)
         view = self.gltf.BufferView(buffer=0, byteOffset=start, byteLength=len(content), target=target)
         self.document.bufferViews.append(view)
-        self._bytes += content + bytes(-len(content) % 4)  # parts begin at multiples of four bytes
+        self.content += content + bytes(-len(content) % 4)  # parts begin at multiples of four bytes
         return len(self.document.bufferViews) - 1
 
 

@@ -14,6 +14,7 @@ import html
 import itertools
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -229,7 +230,6 @@ def _twist(yarn: Yarn) -> float:
 
 
 def _table(fabric: Fabric, sides: Sides, about: dict[str, Any]) -> dict[str, Any]:
-    """Return a table for the page."""
     cloth, table = tables(sides), sides.front
     return about | {
         "bends": (fabric.warp.bend, fabric.weft.bend),
@@ -264,11 +264,9 @@ def _methods(fabric: Fabric) -> dict[str, Method]:
     methods: dict[str, Method] = {}
     for name in TILES:
         method = named_method(name, "view", "")
-        try:
+        with suppress(BadInput):
             method.prepare(fabric)
-        except BadInput:
-            continue
-        methods[name] = method
+            methods[name] = method
     return methods
 
 
