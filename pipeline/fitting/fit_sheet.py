@@ -25,9 +25,6 @@ _OPTICS: Final = YarnOptics((0.4, 0.4), 0.5)
 _SPECULAR, _BEND = 0.04, 25.0
 _EQUAL = 0.01  # reflectances that differ by less are one
 _NARROW = 0.02, 0.5  # by which the openness of counts may differ, and as a part of the stated one
-_FIBRES = (
-    f"Fibres: roughness {_OPTICS.roughness[0]:g}, blend {_OPTICS.blend:g}, specular colour {_SPECULAR:g}, no twist."
-)
 
 
 def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
@@ -35,7 +32,8 @@ def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
 
     BadInput if counts, openness and thickness contradict.
     """
-    assumed = [_FIBRES, f"Bends: {_BEND:g} degrees. Yarns are opaque to light straight through."]
+    optics = f"roughness {_OPTICS.roughness[0]:g}, blend {_OPTICS.blend:g}, specular colour {_SPECULAR:g}"
+    assumed = [f"Fibres: {optics}, no twist.", f"Bends: {_BEND:g} degrees. Yarns are opaque to light straight through."]
     widths = _widths(sheet, assumed)
     alike = abs(sheet.reflectance_front - sheet.reflectance_back) <= _EQUAL
     draft = sheet.draft or ("plain" if alike else "twill 3/1")

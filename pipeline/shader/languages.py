@@ -13,13 +13,11 @@ from typing import Final, NamedTuple
 from weaves.errors import BadInput, WorkFailed, one_line
 
 SOURCE: Final = "slang"
-"""The language of the source, which needs no compiler."""
+ONNX: Final = "onnx"
+"""The language of the source, and the network of a model alone: they need no compiler."""
 
 ALL: Final = "all"
 """Every language."""
-
-ONNX: Final = "onnx"
-"""The network of a model alone, which needs no compiler."""
 
 
 class Program(NamedTuple):

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from pipeline.atomic import refuse_unwritable
-from pipeline.bsdf.klems_xml import LayerFacts, write_klems
+from pipeline.bsdf.files import LayerFacts, write_klems
 from pipeline.bsdf.of_fabric import PAIR_POINTS, fabric_bsdf
 from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Final
 
-from pipeline.bsdf.measured import read_bsdf
+from pipeline.bsdf.files import read_bsdf
 from pipeline.fitting.held_out import held_out_rings, predicted_transmittances
 from pipeline.fitting.measured import MEASURED
 from pipeline.fitting.predicted import Errors

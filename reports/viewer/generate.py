@@ -64,8 +64,7 @@ def shader(name: str, files: dict[str, bytes]) -> str:
         program = Program(f"{name}.frag", main.name, ("cloth",), "fragment", True)
         made = Path(folder) / program.file
         compile_program(compiler, Path(folder), program, LANGUAGES["glsles"].target, made)
-        program_text = made.read_text(encoding="utf-8")
-    version, _, rest = program_text.partition("\n")
+        version, _, rest = made.read_text(encoding="utf-8").partition("\n")
     return f"{version}\n{mark(files)}\n{rest}"
 
 

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
-from pipeline.bsdf.measured import read_bsdf
+from pipeline.bsdf.files import read_bsdf
 from pipeline.compiled.arrays import Float64, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.fitting.fit_bsdf import known_lights
