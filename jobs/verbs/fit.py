@@ -51,7 +51,7 @@ def fit(
 
 def _bsdf(path: Path, out: Path | None, band: str, drafts: list[str]) -> None:
     """Fit a BSDF, or print what is predicted of its rings if nothing is to be written."""
-    from pipeline.bsdf.measured import read_bsdf
+    from pipeline.bsdf.files import read_bsdf
     from pipeline.fitting.fit_bsdf import fit_bsdf
     from pipeline.fitting.fitted import DRAFTS
     from pipeline.fitting.held_out import held_out_rings

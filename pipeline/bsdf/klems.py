@@ -9,18 +9,15 @@ angles to the normal and two azimuths around its centre; a ring has patches of e
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index
 from weaves.errors import BadInput
 
-Kind = Literal["reflection", "transmission"]
-Side = Literal["front", "back"]
-
-SCATTERED: Final[tuple[Kind, Kind]] = ("reflection", "transmission")
-FACES: Final[tuple[Side, Side]] = ("front", "back")
+SCATTERED: Final = ("reflection", "transmission")
+FACES: Final = ("front", "back")
 """Faces of a layer; of a block, the face that the light meets."""
 
 LARGEST_SUM: Final = 1.005

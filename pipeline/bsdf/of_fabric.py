@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.bsdf.klems import KLEMS_FULL, Basis, Scattering, exchanged
-from pipeline.compiled.arrays import Float32, Float64, Index
+from pipeline.compiled.arrays import Float64, Index
 from pipeline.scenes.shade import shade
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -31,9 +31,7 @@ PAIR_POINTS: Final = 4
 EVEN_SIGMA: Final = 32.0
 """Standard deviation of the footprint, in yarn spacings, at least: it covers the cloth evenly."""
 
-BSDF_TRUTH: Final = TruthOptions()
-"""Options of the truth: its defaults."""
-
+_TRUTH: Final = TruthOptions()
 _OF_DIRECT: Final = 64  # points of a patch for light that goes straight through
 _STEEPEST: Final = np.sin(np.radians(88.9)) ** 2  # the truth has no view rays from 89 degrees on
 _LABELS = np.array([-1.0, -1.0, 1.0])  # from the label of light to the direction to its source
@@ -51,11 +49,7 @@ class FabricBsdf(NamedTuple):
 
 
 def fabric_bsdf(
-    fabric: Fabric,
-    solar: Fabric | None = None,
-    basis: Basis = KLEMS_FULL,
-    points: int = PAIR_POINTS,
-    truth: TruthOptions = BSDF_TRUTH,
+    fabric: Fabric, solar: Fabric | None = None, basis: Basis = KLEMS_FULL, points: int = PAIR_POINTS
 ) -> FabricBsdf:
     """Compute the BSDF of a fabric; its front is the side z > 0.
 
@@ -68,21 +62,18 @@ def fabric_bsdf(
     if solar is not None:
         cloths["solar"] = solar, np.full(3, 1.0 / 3.0)
     count = basis.patches
-    out, into = (index.ravel() for index in np.indices((count, count)))
+    seen, lit = (np.repeat(index, points) for index in np.indices((count, count)))
+    u, v, s, t = _places(basis, points).reshape(-1, 4).T
     bands = {band: np.empty((2, 2, count, count)) for band in cloths}
-    place = _places(basis, points)
-    for kind in (0, 1):
-        for side in (0, 1):
-            seen, lit = (np.repeat(patch, points) for patch in (out, into))
-            u, v, s, t = place.reshape(-1, 4).T
-            queries = pair_queries(fabric, basis, (lit, s, t), (seen, u, v), side, side ^ kind)
-            answers = estimate(fabric, queries, truth, 4 * kind + side)
-            for band, (cloth, weights) in cloths.items():
-                value = shade(cloth, answers.mean, queries) @ weights / np.abs(queries.wi[:, 2])
-                bands[band][kind, side] = value.reshape(count, count, points).mean(axis=-1)
+    for kind, side in np.ndindex(2, 2):
+        queries = pair_queries(fabric, basis, (lit, s, t), (seen, u, v), side, side ^ kind)
+        answers = estimate(fabric, queries, _TRUTH, 4 * kind + side)
+        for band, (cloth, weights) in cloths.items():
+            value = shade(cloth, answers.mean, queries) @ weights / np.abs(queries.wi[:, 2])
+            bands[band][kind, side] = value.reshape(count, count, points).mean(axis=-1)
     whole = Scattering(basis, bands)
     asymmetry = float(max(whole.reciprocity(band).max() for band in bands))
-    direct = _direct(fabric, basis, truth)
+    direct = _direct(fabric, basis)
     for blocks in bands.values():
         for side in (0, 1):
             blocks[0, side] = 0.5 * (blocks[0, side] + exchanged(basis, blocks[0, side]))
@@ -118,7 +109,7 @@ def pair_queries(
     wi[:, 2] *= 1 - 2 * lit_from
     wo[:, 2] *= 1 - 2 * seen_from
     nothing = np.zeros(len(wi))
-    return Queries.round(nothing, nothing, nothing + max(EVEN_SIGMA, *fabric.weave.repeat), _float32(wi), _float32(wo))
+    return Queries.round(nothing, nothing, nothing + max(EVEN_SIGMA, *fabric.weave.repeat), wi, wo)
 
 
 def _below(basis: Basis, points: PatchPoints) -> PatchPoints:
@@ -129,15 +120,11 @@ def _below(basis: Basis, points: PatchPoints) -> PatchPoints:
     return patch, np.minimum(u, (_STEEPEST - square[ring]) / (square[ring + 1] - square[ring])), v
 
 
-def _direct(fabric: Fabric, basis: Basis, truth: TruthOptions) -> Float64:
+def _direct(fabric: Fabric, basis: Basis) -> Float64:
     """Return the share of light of each patch that goes straight through, (P,): the mean of both ways."""
     place = qmc.Sobol(2, scramble=False).random(_OF_DIRECT)
     patch, (u, v) = np.repeat(np.arange(basis.patches), len(place)), np.tile(place, (basis.patches, 1)).T
     # The light plays no part in the transparency; in front it is cheap.
-    through = estimate(fabric, pair_queries(fabric, basis, (patch, u, v), (patch, u, v), 0, 0), truth, 9).transparency
+    through = estimate(fabric, pair_queries(fabric, basis, (patch, u, v), (patch, u, v), 0, 0), _TRUTH, 9).transparency
     share = through.reshape(basis.patches, -1).mean(axis=1).astype(np.float64)
     return np.asarray(0.5 * (share + share[basis.opposite]))
-
-
-def _float32(directions: Float64) -> Float32:
-    return np.asarray(directions, np.float32)

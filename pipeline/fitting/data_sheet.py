@@ -6,21 +6,27 @@
     transmittance = 0.175                                            draft = "plain"
 
 A face that is left out is as the other one. A transmittance that is left out can be predicted: by the scattering of the
-same yarns in white, or from the visible band.
+same yarns in white, or from the visible band. Yarns are a diffusing layer of two streams [Kubelka1931Layer] there. With
+s the scattering and a = 1 + absorption / scattering, b = sqrt(a^2 - 1):
+
+    R = 1 / (a + b coth(b s))        T = b / (a sinh(b s) + b cosh(b s))
+
+A dye changes the absorption alone, so two cloths of the same yarns share s. In the infrared, s is another.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 from pydantic import Field, Strict, model_validator
+from scipy.optimize import brentq
 
 from pipeline.fitting.fitted import DRAFTS, Interval
-from pipeline.fitting.two_streams import scattering_of, transmittance_of
 from weaves.count import PerCm
 from weaves.errors import BadInput, nearest
 from weaves.reading import MOST_TEXT, read_text
@@ -131,6 +137,31 @@ def _csv_row(path: Path, product: str) -> dict[str, Any]:
     return {"name": product, **bands.pop("visible"), **bands}
 
 
+def layer(a: float, scattering: float) -> tuple[float, float]:
+    """Return reflectance and transmittance of a layer."""
+    b = math.sqrt(max(a * a - 1.0, 1e-12))
+    if b * scattering > 300.0:
+        return a - b, 0.0
+    sinh, cosh = math.sinh(b * scattering), math.cosh(b * scattering)
+    whole = a * sinh + b * cosh
+    return sinh / whole, b / whole
+
+
+def scattering_of(reflectance: float, transmittance: float) -> float:
+    """Return the scattering of a layer; both shares are above 0 and below 1 together."""
+    a = (1.0 + reflectance**2 - transmittance**2) / (2.0 * reflectance)
+    b = math.sqrt(max(a * a - 1.0, 1e-12))
+    return math.atanh(min(b * reflectance / (1.0 - a * reflectance), 1.0 - 1e-12)) / b
+
+
+def transmittance_of(reflectance: float, scattering: float) -> float:
+    """Return the transmittance of a layer of a reflectance; that of white yarns if these reflect less."""
+    if layer(1.0, scattering)[0] <= reflectance:
+        return layer(1.0, scattering)[1]
+    a = brentq(lambda a: layer(a, scattering)[0] - reflectance, 1.0, 1e4)
+    return layer(a, scattering)[1]
+
+
 def dyed(band: SheetBand, white: SheetBand) -> Interval:
     """Return the transmittance of a band whose yarns scatter like white ones of a known transmittance.
 
@@ -159,7 +190,6 @@ def other_band(sheet: DataSheet, white: DataSheet) -> Interval:
 
 
 def _infrared(sheet: DataSheet) -> SheetBand:
-    """Return the infrared part of the solar band."""
     solar = sheet.solar
     assert solar is not None
 
@@ -179,13 +209,12 @@ def completed(sheet: DataSheet, white: DataSheet | None) -> tuple[DataSheet, lis
     for key, (band, like) in bands.items():
         if band is None or band.transmittance is not None:
             continue
-        straight = band.direct_transmittance
-        guess, way = (
-            Interval(straight, straight, 1.0 - band.reflectance),
-            "what goes straight: --like names white yarns",
-        )
         if like is not None and like.transmittance is not None:
             guess, way = dyed(band, like), "by the scattering of the white yarns"
+        else:
+            straight = band.direct_transmittance
+            guess = Interval(straight, straight, 1.0 - band.reflectance)
+            way = "what goes straight: --like names white yarns"
         remarks.append(f"Transmittance, {key}: {guess.value:.3f} ({guess.low:.3f} to {guess.high:.3f}), {way}.")
         update = {"transmittance": guess.value}
         sheet = sheet.model_copy(update=update if key == "visible" else {"solar": band.model_copy(update=update)})

@@ -25,9 +25,6 @@ _OPTICS: Final = YarnOptics((0.4, 0.4), 0.5)
 _SPECULAR, _BEND = 0.04, 25.0
 _EQUAL = 0.01  # reflectances that differ by less are one
 _NARROW = 0.02, 0.5  # by which the openness of counts may differ, and as a part of the stated one
-_FIBRES = (
-    f"Fibres: roughness {_OPTICS.roughness[0]:g}, blend {_OPTICS.blend:g}, specular colour {_SPECULAR:g}, no twist."
-)
 
 
 def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
@@ -35,7 +32,8 @@ def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
 
     BadInput if counts, openness and thickness contradict.
     """
-    assumed = [_FIBRES, f"Bends: {_BEND:g} degrees. Yarns are opaque to light straight through."]
+    optics = f"roughness {_OPTICS.roughness[0]:g}, blend {_OPTICS.blend:g}, specular colour {_SPECULAR:g}"
+    assumed = [f"Fibres: {optics}, no twist.", f"Bends: {_BEND:g} degrees. Yarns are opaque to light straight through."]
     widths = _widths(sheet, assumed)
     alike = abs(sheet.reflectance_front - sheet.reflectance_back) <= _EQUAL
     draft = sheet.draft or ("plain" if alike else "twill 3/1")
@@ -54,12 +52,11 @@ def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
         return np.asarray(values.reshape(2, 2, -1) @ size)
 
     gap, fits = (1.0 - widths[0]) * (1.0 - widths[1]), []
+    keys = ["openness", *(f"{yarn}.{key}" for key in ("diffuse", "diffuse_transmission") for yarn in ("warp", "weft"))]
     for band in filter(None, (sheet, sheet.solar)):
         colours, errors, left = _colours(band, shares, alike)
-        numbers = {"openness": (gap, SHEET_NOISE)}
-        keys = [f"{yarn}.{key}" for key in ("diffuse", "diffuse_transmission") for yarn in ("warp", "weft")]
-        numbers |= {key: (float(v), float(e)) for key, v, e in zip(keys, colours[2:], errors, strict=True)}
-        estimates = {key: Interval(v, max(v - e, 0.0), v + e) for key, (v, e) in numbers.items()}
+        rows = zip(keys, [gap, *colours[2:].tolist()], [SHEET_NOISE, *errors.tolist()], strict=True)
+        estimates = {key: Interval(v, max(v - e, 0.0), v + e) for key, v, e in rows}
         coloured = with_colours(fabric, within_energy(fabric, colours), _OPTICS)
         unknown = ["Normal incidence determines no bend, roughness, twist or optical thickness."]
         fits.append(Fitted(coloured, estimates, {"shares": left}, {draft: left / SHEET_NOISE}, assumed, unknown))

@@ -37,28 +37,19 @@ class Interval(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """A fabric that was fitted.
-
-    Attributes
-    ----------
-    fabric : Fabric
-        With grey colours.
-    numbers : mapping of str to Interval
-        By their keys in a fabric file.
-    errors : mapping of str to float
-        Of what was fitted, relative to its mean.
-    drafts : mapping of str to float
-        Error of each draft that was tried, in units of a laboratory's; the chosen one first.
-    assumed, unknown : sequence of str
-        Sentences on what was assumed, and on what the data do not determine.
-    """
+    """A fabric that was fitted."""
 
     fabric: Fabric
+    """With grey colours."""
     numbers: Mapping[str, Interval]
+    """By their keys in a fabric file."""
     errors: Mapping[str, float]
+    """Of what was fitted, relative to its mean."""
     drafts: Mapping[str, float]
+    """Error of each draft that was tried, in units of a laboratory's; the chosen one first."""
     assumed: Sequence[str]
     unknown: Sequence[str]
+    """Sentences on what was assumed, and on what the data do not determine."""
 
 
 def cloth(draft: str, widths: Sequence[float], bends: Sequence[float], reliefs: Sequence[float]) -> Fabric:
@@ -67,5 +58,4 @@ def cloth(draft: str, widths: Sequence[float], bends: Sequence[float], reliefs: 
         name: {"width": float(width), "bend": float(bend), "relief": float(relief), "roughness": 0.4}
         for name, width, bend, relief in zip(("warp", "weft"), widths, bends, reliefs, strict=True)
     }
-    table = {"name": "fit", "draft": dict(DRAFTS[draft]), "optical_thickness": LEAST_THICKNESS, **yarns}
-    return Fabric.model_validate(table)
+    return Fabric.model_validate({"name": "fit", "draft": DRAFTS[draft], "optical_thickness": LEAST_THICKNESS, **yarns})

@@ -20,13 +20,12 @@ from pipeline.compiled.arrays import Float64, Mask
 from pipeline.fitting.data_sheet import dyed, other_band, products, read_sheet
 from pipeline.fitting.fit_bsdf import fit_bsdf, known_lights
 from pipeline.fitting.fitted import DRAFTS, Interval
-from pipeline.fitting.geometry import straight_of
 from pipeline.fitting.predicted import Errors, Predicted, predict
+from pipeline.fitting.straight import straight_of
 from weaves.errors import BadInput
 
 
 def _cosine(openness: float, theta: Float64, azimuth: Float64) -> Float64:
-    """Return the openness times the cosine."""
     return np.asarray(openness * np.cos(np.radians(theta)))
 
 

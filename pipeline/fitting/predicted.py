@@ -8,10 +8,8 @@ import numpy as np
 
 from pipeline.bsdf.klems import Scattering
 from pipeline.compiled.arrays import Float64, Mask
-from pipeline.fitting.geometry import LEAST_STRAIGHT, images, straight_of
-from pipeline.fitting.optics import pairs_of
-from pipeline.fitting.scattered import COLOURS, Scatterer, YarnOptics
-from pipeline.fitting.straight import gap_rays, straight_share
+from pipeline.fitting.scattered import COLOURS, Scatterer, YarnOptics, pairs_of
+from pipeline.fitting.straight import gap_rays, images, straight_of, straight_share
 from weaves.fabric import Fabric
 
 BRDF_ANGLE: Final = 65.0
@@ -51,9 +49,8 @@ class Predicted(NamedTuple):
         basis, lights = scattering.basis, np.zeros(scattering.basis.patches, np.bool_)
         for patch in np.flatnonzero(np.isfinite(self.straight)):
             lights[images(basis, int(patch))] = True
-        straight, passed = straight_of(scattering, band, lights), np.nan
-        if len(straight.patches) and straight.share.max() >= LEAST_STRAIGHT:
-            passed = straight.error(self.straight[straight.patches])
+        straight = straight_of(scattering, band, lights)
+        passed = np.nan if straight.closed else straight.error(self.straight[straight.patches])
         measured = np.where(np.isfinite(self.reflected), scattering.bands[band][0], np.nan)
         predicted = np.where(np.isfinite(measured), self.reflected, np.nan)
         low = np.array(basis.bounds[1:])[basis.ring] <= BRDF_ANGLE
@@ -79,6 +76,7 @@ def predict(fabric: Fabric, scattering: Scattering, band: str, lights: Mask) -> 
     pairs = pairs_of(scattering, band, lights)
     pairs = pairs.take(np.flatnonzero(pairs.kind == 0))
     colours = np.array([getattr(y, f"{name}_rgb")[1] for name in COLOURS for y in (fabric.warp, fabric.weft)])
-    values = Scatterer(fabric, scattering.basis, pairs).values(YarnOptics.of(fabric), colours)
+    optics = YarnOptics((fabric.warp.roughness, fabric.weft.roughness), fabric.warp.blend)
+    values = Scatterer(fabric, scattering.basis, pairs).values(optics, colours)
     predicted.reflected[pairs.side, pairs.out, pairs.into] = values
     return predicted

@@ -34,20 +34,15 @@ from pipeline.truth.geometry import heightfield, visibility
 from pipeline.truth.scattering import slab_float32
 from weaves.colour import LUMINANCE
 
-ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...]]]] = {
-    "YARN": (heightfield, ("RADIUS", "INVERSE_RADIUS", "SIN_TWIST", "COS_TWIST", "ALPHA", "BETA", "BLEND", "BEND")),
-    "GROUP": (nodes, ("START", "LINES", "GROUP_FAMILY")),
-    "PIECE": (nodes, ("FAMILY", "BLOCK")),
-    "BOUNDS": (nodes, ("X_LOW", "X_HIGH", "Y_LOW", "Y_HIGH", "SHIFT", "CURVE", "BOUND")),
-}
-"""Columns of the arrays of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, by the name of the array."""
-
-ADDED: Final[dict[str, tuple[str, ...]]] = {
+ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...], tuple[str, ...]]]] = {
+    "YARN": (heightfield, ("RADIUS", "INVERSE_RADIUS", "SIN_TWIST", "COS_TWIST", "ALPHA", "BETA", "BLEND", "BEND"), ()),
     # The shader sums over the cells of a node, so that they are listed by group.
-    "GROUP": ("FIRST_CELL", "CELLS"),
-    "FLOAT": ("FLOAT_BEND", "FLOAT_HALF", "FLOAT_DROP", "CROWN"),
+    "GROUP": (nodes, ("START", "LINES", "GROUP_FAMILY"), ("FIRST_CELL", "CELLS")),
+    "PIECE": (nodes, ("FAMILY", "BLOCK"), ()),
+    "BOUNDS": (nodes, ("X_LOW", "X_HIGH", "Y_LOW", "Y_HIGH", "SHIFT", "CURVE", "BOUND"), ()),
+    "FLOAT": (nodes, (), ("FLOAT_BEND", "FLOAT_HALF", "FLOAT_DROP", "CROWN")),
 }
-"""Columns that the shader has beside them."""
+"""Columns of arrays: those of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, then what only the shader has."""
 
 TEXTURE_WIDTH: Final = 1024
 """Texels of a row of every texture."""
@@ -63,30 +58,17 @@ LEVEL_TINY: Final = 1e-18
 
 _SAMPLER: Final = inspect.signature(PatchBSDF).parameters
 POINTS: Final[int] = _SAMPLER["points"].default
-"""Points of a footprint that have a lobe each."""
 WIDENING: Final[float] = _SAMPLER["widening"].default
-"""Factor on the widening of lobes by the spread of the tangents."""
+"""Points of a footprint that have a lobe each; factor on the widening of lobes by the spread of the tangents."""
 
 _SAME: Final[tuple[tuple[ModuleType, tuple[str, ...]], ...]] = (
-    (heightfield, ("WARP", "WEFT", "GAP")),
-    (soft_horizons, ("AZIMUTHS",)),
-    (groups, ("COLUMNS",)),
-    (nodes, ("LEVELS", "UPPER")),
-    (shade, ("LEAST_SEEN", "FADED", "TINY")),
-    (answer, ("LONGEST", "SMALLEST")),
-    (view_lines, ("MOST_GAUSS",)),
-    (view_rays, ("FOOTPRINT_ENDS", "NEVER")),
-    (cuts, ("NEAREST",)),
-    (wide, ("RESOLVED",)),
-    (scratch, ("MOST_ON_LINES",)),
-    (query, ("LOWEST_VIEWER",)),
-    (seen_areas, ("SEEN_ANGLES",)),
-    (coverage, ("RAYS",)),
-    (soft_horizons, ("FALL",)),
-    (lobes, ("SCATTERED", "BROAD")),
-    (importance_mixture, ("LEAST_COSINE",)),
-    (threads, ("TINT_COLUMNS", "SPREAD_OUT", "BELL_ENDS")),
-)
+    (heightfield, ("WARP", "WEFT", "GAP")), (soft_horizons, ("AZIMUTHS",)), (groups, ("COLUMNS",)),
+    (nodes, ("LEVELS", "UPPER")), (shade, ("LEAST_SEEN", "FADED", "TINY")), (answer, ("LONGEST", "SMALLEST")),
+    (view_lines, ("MOST_GAUSS",)), (view_rays, ("FOOTPRINT_ENDS", "NEVER")), (cuts, ("NEAREST",)),
+    (wide, ("RESOLVED",)), (scratch, ("MOST_ON_LINES",)), (query, ("LOWEST_VIEWER",)),
+    (seen_areas, ("SEEN_ANGLES",)), (coverage, ("RAYS",)), (soft_horizons, ("FALL",)), (lobes, ("SCATTERED", "BROAD")),
+    (importance_mixture, ("LEAST_COSINE",)), (threads, ("TINT_COLUMNS", "SPREAD_OUT", "BELL_ENDS")),
+)  # fmt: skip
 # What a file keeps to itself is read by name: a shader has it from there, and a new name there is an error here.
 _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     float32: {
@@ -100,9 +82,7 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
         "LOBE_STEEPEST": "_STEEPEST", "ALONE": "_ALONE", "LOBE_TINY": "_TINY",
     },
     importance_mixture: {"LEFT_THROUGH": "STRAIGHT_ON", "LOBE_SHORTEST": "_SHORTEST"},
-    shade: {
-        "SHORTEST": "_SHORTEST", "FLAKES": "_FLAKES", "GAUSS": "_GAUSS", "AWAY": "_AWAY", "WHOLE_BOX": "_WHOLE"
-    },
+    shade: {**{name: f"_{name}" for name in ("SHORTEST", "FLAKES", "GAUSS", "AWAY")}, "WHOLE_BOX": "_WHOLE"},
     wide: {"REACH": "_REACH"},
     seen_areas: {"AREA_STEPS": "_STEPS", "AREA_TURN": "_TURN"},
     view_lines: {
@@ -112,10 +92,7 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     },
     view_rays: {
         "VIEW_HALVINGS": "_HALVINGS",
-        **{
-            name: f"_{name}"
-            for name in ("CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS", "THIRDS")
-        },
+        **{n: f"_{n}" for n in ("CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS", "THIRDS")},
     },
     visibility: {"NARROWINGS": "_NARROWINGS", "STRIP_POINTS": "_STRIP_POINTS"},
     line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING", "NEAR_END": "_NEAR_END"},
@@ -123,14 +100,9 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
 }  # fmt: skip
 
 
-_ERROR_FUNCTION: Final = (0.3275911, 0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429)
-
-
 def constants() -> dict[str, float | int]:
     """Return the constants of the shader, by name; those of type int are integers there."""
-    first, second, third = soft_horizons.CURVATURES
-    hidden_cosine, hidden_straight = vars(lobes)["_HIDDEN"]
-    red, green, blue = LUMINANCE
+    error_function = (0.3275911, 0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429)
     values: dict[str, object] = {
         "TEXTURE_WIDTH": TEXTURE_WIDTH,
         "PI": math.pi,
@@ -138,7 +110,7 @@ def constants() -> dict[str, float | int]:
         "RIGHT": 0.5 * math.pi,
         "ROOT_HALF": math.sqrt(0.5),
         "ROOT_RIGHT": math.sqrt(0.5 * math.pi),
-        **{f"ERF_{n}": value for n, value in enumerate(_ERROR_FUNCTION)},
+        **{f"ERF_{n}": value for n, value in enumerate(error_function)},
         "VERTICAL_SLOPE": 1e-6,
         "ROUNDING": 2.0**-22,
         "TURNS": 1e-6,
@@ -146,23 +118,16 @@ def constants() -> dict[str, float | int]:
         "STRONGEST": mixture.COARSE_LINE.most,
         **{f"NODE_{name}": row for row, name in enumerate(("NORMAL", "TANGENT", "ALONG", "ACROSS", "HORIZONS"))},
         "FALL_ROWS": FALL_ROWS,
-        "CURVATURE_0": first,
-        "CURVATURE_1": second,
-        "CURVATURE_2": third,
+        **{f"CURVATURE_{n}": value for n, value in enumerate(soft_horizons.CURVATURES)},
         "LEVEL_TINY": LEVEL_TINY,
         "POINTS": POINTS,
         "LOBES": POINTS + 2,
         "WIDENING": WIDENING,
-        "HIDDEN_COSINE": hidden_cosine,
-        "HIDDEN_STRAIGHT": hidden_straight,
-        "LUMINANCE_RED": red,
-        "LUMINANCE_GREEN": green,
-        "LUMINANCE_BLUE": blue,
+        **dict(zip(("HIDDEN_COSINE", "HIDDEN_STRAIGHT"), vars(lobes)["_HIDDEN"], strict=True)),
+        **{f"LUMINANCE_{name}": share for name, share in zip(("RED", "GREEN", "BLUE"), LUMINANCE, strict=True)},
     }
-    for name in {**ARRAYS, **ADDED}:
-        module, columns = ARRAYS.get(name, (nodes, ()))
+    for name, (module, columns, added) in ARRAYS.items():
         values |= {column: vars(module)[column] for column in columns}
-        added = ADDED.get(name, ())
         values |= {column: len(columns) + index for index, column in enumerate(added)}
         values[f"{name}_COLUMNS"] = len(columns) + len(added)
     for module, names in _SAME:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any, Final, NamedTuple
 
@@ -10,28 +10,15 @@ import numpy as np
 from pydantic import Field
 
 from pipeline.compiled.arrays import Float32
-from pipeline.models.domain import Domain
 from pipeline.scenes.shade import colours as linear_colours
 from pipeline.shader.constants import TEXTURE_WIDTH
 from pipeline.shader.golden import COLOUR, DENSITY_COLUMN, GOLDEN_COLUMNS, TRANSPARENCY_COLUMN, Golden
-from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
-from pipeline.shader.tables import ClothTables, Place
+from pipeline.shader.tables import Place
 from pipeline.truth.conventions import COMPONENTS
-from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.validation import Frozen
 
 GOLDEN: Final = "golden.json"
-
-_FILES: Final = {
-    "integers": {"int32": "tables/integers.i32"},
-    "numbers": {"float32": "tables/numbers.f32"},
-    "nodes": {"float32": "tables/nodes.f32", "float16": "tables/nodes.f16"},
-    "grid": {"uint8": "tables/grid.png"},
-}
-"""Files of each buffer, by type: little-endian, row after row; the grid as grey levels of a picture."""
-
-_CHANNELS: Final = {"integers": 1, "numbers": 1, "nodes": 4, "grid": 1}
 
 
 class Buffer(Frozen, use_attribute_docstrings=True):
@@ -79,20 +66,6 @@ class Networks(Frozen, use_attribute_docstrings=True):
     """Inputs of the ONNX form, each of N rows; its output is `components`, (N, 4)."""
 
 
-class Colours(Frozen):
-    """Linear Rec. 709 colours of the components: k_s, k_d, and k_dt in its place with light from the other side.
-
-    Means if threads differ in colour, as `threads` says; the array `tints` has the factors of each.
-    """
-
-    specular_warp: tuple[float, float, float]
-    specular_weft: tuple[float, float, float]
-    diffuse_warp: tuple[float, float, float]
-    diffuse_weft: tuple[float, float, float]
-    transmitted_warp: tuple[float, float, float]
-    transmitted_weft: tuple[float, float, float]
-
-
 INPUTS: Final = {
     "centre": "middle of the footprint, in yarn spacings: x along the weft, y along the warp; any number",
     "deviation": "standard deviations of the Gaussian footprint along x and y, in yarn spacings; at least 0.001",
@@ -130,7 +103,7 @@ class Descriptor(Frozen, use_attribute_docstrings=True):
     """Name of the fabric."""
     generator: str = f"twillight {version('twillight')}"
     """Program and version."""
-    level: int | None
+    level: int | None = None
     """Level of detail k of the soft nodes; none if the model has none."""
     inputs: dict[str, str] = INPUTS
     """Fields of a query, with their units."""
@@ -140,7 +113,7 @@ class Descriptor(Frozen, use_attribute_docstrings=True):
     """Axes, directions, cosine and colours."""
     components: tuple[str, ...] = COMPONENTS
     """Order of the four components."""
-    colours: Colours
+    colours: dict[str, list[float]]
     """Colours of the yarns."""
     repeat: tuple[int, int]
     """Ends and picks after which the weave repeats."""
@@ -150,11 +123,11 @@ class Descriptor(Frozen, use_attribute_docstrings=True):
     """Largest table that the shader takes."""
     texture_width: int = TEXTURE_WIDTH
     """Texels of a row of every texture."""
-    kinds: list[str]
+    kinds: list[str] = Field(default_factory=list)
     """Kinds of queries that the tables know, beside light and viewer in front of flat cloth."""
-    scalars: dict[str, int | float]
+    scalars: dict[str, int | float] = Field(default_factory=dict)
     """First elements of `integers` (whole numbers) and of `numbers`, in this order."""
-    back_scalars: dict[str, int | float]
+    back_scalars: dict[str, int | float] = Field(default_factory=dict)
     """The next ones of both, of the back of the cloth, if the tables know it."""
     buffers: dict[str, Buffer]
     """Buffers, by the name that they have in the source."""
@@ -173,13 +146,12 @@ class Descriptor(Frozen, use_attribute_docstrings=True):
 class Shader(NamedTuple):
     """A model of one fabric, ready to be written.
 
-    `name` is that of its file in the source and of its function there. `sources` are files of the source that are the
-    same for all fabrics, `generated` texts of the others by name, `files` contents of buffers by path in the folder.
-    `about` has no source and languages yet. `size` are words for a sentence; `sampled` says whether directions can be
+    `sources` are files of the source that are the same for all fabrics, `generated` texts of the others by name,
+    `files` contents of buffers by path in the folder. `about` has no source and languages yet; its `model` is the name
+    of a file and a function of the source. `size` are words for a sentence; `sampled` says whether directions can be
     drawn; `onnx` returns the network as an ONNX model, if there is one; `threads`, whether threads have their colours.
     """
 
-    name: str
     sources: tuple[str, ...]
     generated: dict[str, str]
     files: dict[str, bytes]
@@ -191,40 +163,14 @@ class Shader(NamedTuple):
     threads: bool = False
 
 
-def colours(fabric: Fabric) -> Colours:
-    """Return the colours of the yarns."""
+def colours(fabric: Fabric) -> dict[str, list[float]]:
+    """Return linear Rec. 709 colours of the yarns: k_s, k_d, and k_dt in its place with light from the other side.
+
+    Means if threads differ in colour, as `threads` says; the array `tints` has the factors of each.
+    """
+    names = [f"{kind}_{yarn}" for kind in ("specular", "diffuse", "transmitted") for yarn in ("warp", "weft")]
     rows = (*linear_colours(fabric), *linear_colours(fabric, transmitted=True)[2:])
-    return Colours(**{name: tuple(rgb.tolist()) for name, rgb in zip(Colours.model_fields, rows, strict=True)})
-
-
-def threads_of(fabric: Fabric) -> tuple[int, int]:
-    """Return after how many ends and picks their colours repeat."""
-    ends, picks = fabric.thread_colours()
-    return len(ends.diffuse), len(picks.diffuse)
-
-
-def descriptor(fabric: Fabric, level: int, tables: ClothTables, kinds: Collection[str]) -> Descriptor:
-    """Return the content of `soft_nodes.json`, before files are written."""
-    return Descriptor(
-        fabric=fabric.name,
-        level=level,
-        colours=colours(fabric),
-        repeat=(int(tables.scalars["ends"]), int(tables.scalars["picks"])),
-        threads=threads_of(fabric),
-        limits={"nodes": MOST_NODES, "cells": MOST_REPEAT_CELLS},
-        kinds=sorted(kinds),
-        scalars=tables.scalars,
-        back_scalars=tables.back_scalars,
-        buffers={
-            name: Buffer(
-                files=files,
-                channels=_CHANNELS[name],
-                elements=getattr(tables, name).size // _CHANNELS[name],
-                arrays=tables.places.get(name, {}),
-            )
-            for name, files in _FILES.items()
-        },
-    )
+    return {name: row.tolist() for name, row in zip(names, rows, strict=True)}
 
 
 def vectors(golden: Golden) -> dict[str, Any]:
@@ -255,23 +201,3 @@ def _short(values: Float32) -> list[Any]:
     numbers = [float(np.format_float_scientific(value, unique=True)) for value in values.ravel()]
     short: list[Any] = np.array(numbers).reshape(values.shape).tolist()
     return short
-
-
-def trained_ranges(domain: Domain | None) -> dict[str, tuple[float, float]]:
-    """Return the ranges of footprints, directions and yarns that a model was trained on."""
-    if domain is None:
-        return {}
-    queries = domain.queries
-    of_queries = {"footprint, yarn spacings": queries.sigma, "angle to the normal, degrees": (0.0, queries.max_angle)}
-    return of_queries | domain.yarns
-
-
-def why_outside(domain: Domain | None, fabric: Fabric) -> str:
-    """Return which yarn of a fabric lies outside the training, such as ``optical_thickness = 0.8``; empty if none."""
-    if domain is None:
-        return ""
-    try:
-        domain.refuse_fabric(fabric, "")
-    except BadInput as error:
-        return f"{error.key} = {error.value}"
-    return ""

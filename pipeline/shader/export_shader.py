@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Final
 
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.folders import own_files
@@ -20,12 +19,6 @@ from pipeline.shader.tables import wanted_kinds
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-CHOOSER: Final = "selvage"
-"""Name of the method that chooses among levels of soft nodes."""
-
-ENTRIES: Final = ("evaluate.slang", "draw.slang")
-"""Files of the source with entry points, the same for all models."""
-
 _HOME = Path(__file__).parent
 
 
@@ -39,34 +32,20 @@ def write_shader(
 ) -> str:
     """Write a model of a fabric for renderers, whole or not at all, and return a sentence on the folder.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth.
-    folder : Path
-        Folder to write; an earlier export of the same model is replaced (`pipeline.folders`).
-    model, level
-        As for `shader_of`.
-    language : sequence of str
-        Shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or ALL.
-    kind : sequence of str
-        Kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY.
-
-    Raises
-    ------
-    BadInput
-        If a name is not known, a program or package is missing, there is no network for ONNX, or as `shader_of`.
-    WorkFailed
-        If slangc refuses the source.
+    An earlier export of the same model is replaced (`pipeline.folders`). `model` and `level` are as for `shader_of`.
+    `language` names shading languages beside the source in Slang: keys of LANGUAGES, ONNX for the network alone, or
+    ALL; `kind` kinds of queries beside light and viewer in front of flat cloth: of QUERY_KINDS, or EVERY. BadInput if a
+    name is not known, a program or package is missing, there is no network for ONNX, or as `shader_of`; WorkFailed if
+    slangc refuses the source.
     """
-    refuse_unknown(language)
+    refuse_unknown("language", language, (SOURCE, *LANGUAGES, ONNX, ALL))
     known = wanted_kinds(kind)
     wanted = [name for name in LANGUAGES if ALL in language or name in language]
     compiler = compiler_for(wanted) if wanted else None
     shader = shader_of(model, fabric, level, known)
     source, network = _source(shader), _network(shader, language)
     golden = json.dumps(vectors(shader.golden), separators=(",", ":")) + "\n"
-    listing = f"{shader.name}.json"
+    listing = f"{shader.about.model}.json"
     entries = ("evaluate", "draw", *(("scatter",) if shader.sampled else ()))
     with own_files(folder, listing) as here:
         for name, content in {**source, **shader.files, **network, GOLDEN: golden.encode()}.items():
@@ -88,24 +67,19 @@ def _network(shader: Shader, languages: Sequence[str]) -> dict[str, bytes]:
     if ONNX not in languages and (ALL not in languages or shader.onnx is None):
         return {}
     if shader.onnx is None:
-        raise BadInput("export", "language", ONNX, f"{shader.name} has no network; choose another model")
+        raise BadInput("export", "language", ONNX, f"{shader.about.model} has no network; choose another model")
     if missing := no_onnx():
         raise BadInput("export", "language", ONNX, missing)
     return {f"{ONNX}/network.onnx": shader.onnx()}
 
 
 def _source(shader: Shader) -> dict[str, bytes]:
-    """Return the files of the source."""
-    texts = {name: (_HOME / name).read_text(encoding="utf-8") for name in (*shader.sources, *ENTRIES)}
-    name = shader.name
-    lines = ["// The model of this folder.", ""]
-    if shader.threads:
-        lines += ["/// Threads differ in colour.", "#define THREADS", ""]
-    lines += [f'#include "{name}.slang"']
-    if shader.sampled:
-        lines += ['#include "importance.slang"', "", "/// Directions can be drawn.", "#define SAMPLED"]
-    lines += ["", f"Answer bsdf(Query query) {{ return {name}(query); }}", ""]
-    texts |= {**shader.generated, "model.slang": "\n".join(lines)}
+    name, files = shader.about.model, (*shader.sources, "evaluate.slang", "draw.slang")
+    texts = {file: (_HOME / file).read_text(encoding="utf-8") for file in files}
+    threads = "/// Threads differ in colour.\n#define THREADS\n\n" if shader.threads else ""
+    sampled = '#include "importance.slang"\n\n/// Directions can be drawn.\n#define SAMPLED\n' if shader.sampled else ""
+    main = f'// The model of this folder.\n\n{threads}#include "{name}.slang"\n{sampled}\n'
+    texts |= {**shader.generated, "model.slang": f"{main}Answer bsdf(Query query) {{ return {name}(query); }}\n"}
     return {f"{SOURCE}/{file}": text.encode() for file, text in texts.items()}
 
 
@@ -113,17 +87,12 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
     """Return a model of a fabric, ready to be written.
 
     `model` is `soft_nodes`, which is meant if it is left out, or the folder of a trained `neumip`; `level` the level of
-    detail of the soft nodes; `kinds` are of QUERY_KINDS.
-
-    Raises
-    ------
-    BadInput
-        If there is no such model, its files are damaged or of another version, it was not trained on the fabric, it has
-        no shader, or has no such level or kinds.
+    detail of the soft nodes; `kinds` are of QUERY_KINDS. BadInput if there is no such model, its files are damaged or
+    of another version, it was not trained on the fabric, it has no shader, or has no such level or kinds.
     """
     if model is None or model == SOFT_NODES:
         return soft_nodes_shader(fabric, level, kinds)
-    if model.partition(":")[0] == CHOOSER:
+    if model.partition(":")[0] == "selvage":
         levels = ", ".join(map(str, DETAILS))
         allowed = f"chooses a level for each query and has no shader: export {SOFT_NODES} at one --level of {levels}"
         raise BadInput("export", "model", model, allowed)

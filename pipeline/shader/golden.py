@@ -20,11 +20,10 @@ from pipeline.analytic.importance.mixture import density_rows
 from pipeline.analytic.importance.surface import LobeSurface
 from pipeline.analytic.soft_nodes.answer import SMALLEST
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
-from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.scenes.shade import coloured
 from pipeline.shader.constants import POINTS, WIDENING
-from pipeline.shader.tables import BEHIND, CURVATURE, Sides
+from pipeline.shader.tables import Sides
 from pipeline.shader.threads import SeenTints
 from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.query import LOWEST_VIEWER, STEEPEST_CURVATURE, Queries
@@ -116,11 +115,11 @@ Colouring = Callable[[Queries], Float64]
 
 def golden(sides: Sides) -> Golden:
     """Return golden queries of a cloth, of all kinds that it knows."""
-    known = {CURVATURE: len(sides.front.falls) > 0, BEHIND: sides.back is not None}
+    curved, behind = len(sides.front.falls) > 0, sides.back is not None
     groups = {
         name: group
         for name, group in GROUPS.items()
-        if (known[CURVATURE] or not group.curved) and (known[BEHIND] or min(group.light, group.viewer) > 0.0)
+        if (curved or not group.curved) and (behind or min(group.light, group.viewer) > 0.0)
     }
     ends, picks = (math.lcm(int(n), len(rows)) for n, rows in zip(sides.front.repeat, sides.tints, strict=True))
     read, depth = partial(read_sides, sides), sides.front.plane - sides.front.lowest
@@ -157,13 +156,18 @@ def golden_of(
     Steady are those whose answers stay if the last digits of their footprints change by `digits`, and whose rays do not
     turn down to a `depth` below the reference plane.
     """
+
+    def in_colour(queries: Queries) -> Float32:
+        answers = read(queries)
+        return np.column_stack([answers, coloured(answers[:, :4], colours(queries))]).astype(np.float32)
+
     rng = np.random.default_rng(_SEED)
     rows, answers, places, share, stop = [], [], {}, [], 0
     for name, group in groups.items():
         queries = _candidates(repeat, group, rng)
         if not stretched:
             queries = queries._replace(sigma_minor=queries.sigma)
-        steady, answer = _steady(partial(_in_colour, read, colours), queries, rng, digits)
+        steady, answer = _steady(in_colour, queries, rng, digits)
         steady &= ~turning(queries, depth)
         chosen = np.flatnonzero(steady)[: group.rows]
         rows.append(rows_of(queries.take(chosen)))
@@ -190,20 +194,15 @@ def read_sides(sides: Sides, queries: Queries) -> Float32:
         result[~behind, :4], result[~behind, 4:8] = reflected.components, reflected.bounds
     if behind.any():
         result[behind, :4] = result[behind, 4:8] = read_behind(table, seen.take(behind))[:, :4]
-    result[:, TRANSPARENCY_COLUMN] = transparency(table, seen)
+    if not len(table.behind_grid):
+        # Horizons of the other side hide the light, of which the transparency knows nothing.
+        table = table._replace(behind_mean=table.mean, behind_sharpness=table.sharpness, behind_grid=table.grid)
+    result[:, TRANSPARENCY_COLUMN] = read_behind(table, seen._replace(wi=-seen.wo))[:, 4]
     lobes = lobes_of(sides, queries)
     wi, wo, density = (np.ascontiguousarray(a, np.float32) for a in (queries.wi, queries.wo, result[:, DENSITY_COLUMN]))
     density_rows(lobes, wi, wo, density)
     result[:, DENSITY_COLUMN] = density
     return result
-
-
-def transparency(table: SoftNodeTable, looks: Queries) -> Float32:
-    """Return the transparency of N footprints, (N,), the viewer in front; a table of the front alone suffices."""
-    if not len(table.behind_grid):
-        # Horizons of the other side hide the light, of which the transparency knows nothing.
-        table = table._replace(behind_mean=table.mean, behind_sharpness=table.sharpness, behind_grid=table.grid)
-    return read_behind(table, looks._replace(wi=-looks.wo))[:, 4]
 
 
 def lobes_of(sides: Sides, looks: Queries) -> Lobes:
@@ -245,12 +244,6 @@ def _front(rng: np.random.Generator, count: int, rise: tuple[float, float] = (_L
     z, turn = rng.uniform(*rise, count), rng.uniform(0.0, 2.0 * np.pi, count)
     level = np.sqrt(1.0 - z * z)
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), z]).astype(np.float32)
-
-
-def _in_colour(read: Answering, colours: Colouring, queries: Queries) -> Float32:
-    """Return answers, and the patch BSDF in colour, of N queries."""
-    answers = read(queries)
-    return np.column_stack([answers, coloured(answers[:, :4], colours(queries))]).astype(np.float32)
 
 
 def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits: int) -> tuple[Mask, Float32]:

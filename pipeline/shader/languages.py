@@ -13,13 +13,11 @@ from typing import Final, NamedTuple
 from weaves.errors import BadInput, WorkFailed, one_line
 
 SOURCE: Final = "slang"
-"""The language of the source, which needs no compiler."""
+ONNX: Final = "onnx"
+"""The language of the source, and the network of a model alone: they need no compiler."""
 
 ALL: Final = "all"
 """Every language."""
-
-ONNX: Final = "onnx"
-"""The network of a model alone, which needs no compiler."""
 
 
 class Program(NamedTuple):
@@ -61,12 +59,9 @@ LANGUAGES: Final = {
 }
 """Languages that slangc makes, by name."""
 
+_PRECISE = ("float", "int", "sampler2D", "isampler2D", "usampler2D")
 _ES: Final = (
-    (
-        r"#version 450\n",
-        "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
-        "precision highp isampler2D;\nprecision highp usampler2D;\n",
-    ),
+    (r"#version 450\n", "#version 300 es\n" + "".join(f"precision highp {kind};\n" for kind in _PRECISE)),
     (r"layout\(row_major\) (?:uniform|buffer);\n", ""),
     (r"layout\(binding = \d+\)\n", ""),
 )
@@ -74,12 +69,11 @@ _ES: Final = (
 matrices, of which there are none; bindings, which a program sets by name."""
 
 
-def refuse_unknown(languages: Sequence[str]) -> None:
-    """Refuse a name that is no language."""
-    for name in languages:
-        if name not in (ALL, SOURCE, ONNX, *LANGUAGES):
-            allowed = f"must be one of {', '.join((SOURCE, *LANGUAGES, ONNX, ALL))}"
-            raise BadInput("export", "language", one_line(name, 40), allowed)
+def refuse_unknown(key: str, names: Collection[str], known: Collection[str]) -> None:
+    """Refuse a name of an option that is not known."""
+    for name in names:
+        if name not in known:
+            raise BadInput("export", key, one_line(name, 40), f"must be one of {', '.join(known)}")
 
 
 def slangc() -> Path | None:
@@ -89,8 +83,7 @@ def slangc() -> Path | None:
         for name in ("slangc", "slangc.exe"):
             if (own := Path(spec.origin).parent / "bin" / name).is_file():
                 return own
-    program = shutil.which("slangc")
-    return None if program is None else Path(program)
+    return Path(program) if (program := shutil.which("slangc")) else None
 
 
 def compiler_for(languages: Sequence[str]) -> Path:
@@ -112,13 +105,12 @@ def translate(
     written: dict[str, list[str]] = {}
     for name in languages:
         (folder / name).mkdir()
-        language = LANGUAGES[name]
-        for program in language.programs:
+        target, programs = LANGUAGES[name]
+        for program in programs:
             present = program._replace(entries=tuple(entry for entry in program.entries if entry in entries))
-            if not present.entries:
-                continue
-            compile_program(compiler, source, present, language.target, folder / name / program.file)
-            written.setdefault(name, []).append(f"{name}/{program.file}")
+            if present.entries:
+                compile_program(compiler, source, present, target, folder / name / program.file)
+                written.setdefault(name, []).append(f"{name}/{program.file}")
     return written
 
 

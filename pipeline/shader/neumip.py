@@ -14,25 +14,14 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float32
+from pipeline.models.domain import Domain
 from pipeline.models.networks.layers import LinearLayer, layers_of
 from pipeline.models.networks.texture import DEPTH_SCALE, LAYERS, STEEPEST, texels_of
 from pipeline.models.neumip.model import Neumip, NeumipNetwork
 from pipeline.models.runtimes import as_onnx
-from pipeline.scenes.shade import colours as linear_colours
+from pipeline.scenes.shade import colours
+from pipeline.shader import descriptor
 from pipeline.shader.constants import TEXTURE_WIDTH, shared_constants
-from pipeline.shader.descriptor import (
-    CONVENTIONS,
-    OUTPUTS,
-    Buffer,
-    Descriptor,
-    Networks,
-    PlacedLayer,
-    Shader,
-    colours,
-    threads_of,
-    trained_ranges,
-    why_outside,
-)
 from pipeline.shader.golden import GROUPS, golden_of
 from pipeline.shader.limits import MOST_HEIGHT
 from pipeline.shader.tables import Place, constants_slang
@@ -46,11 +35,6 @@ MOST_ELEMENTS: Final = TEXTURE_WIDTH * MOST_HEIGHT
 """Most elements of the buffer: of a texture that every WebGL 2 allows."""
 
 
-def _quads(count: int) -> int:
-    """Return how many elements of four hold so many numbers."""
-    return -(-count // 4)
-
-
 class Weights:
     """Arrays, one after another, that fill whole elements."""
 
@@ -61,24 +45,20 @@ class Weights:
 
     def add(self, name: str, values: Float32, meaning: str) -> Place:
         """Append an array whose last axis is filled up to whole elements, and return its place."""
-        width = 4 * _quads(values.shape[-1])
-        filled = np.zeros((*values.shape[:-1], width), np.float32)
-        filled[..., : values.shape[-1]] = values
+        filled = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, -values.shape[-1] % 4)])
         place = Place(offset=self.count, shape=filled.shape, meaning=meaning)
         self._parts.append(filled.ravel())
         self.count += filled.size // 4
         self.places[name] = place
         return place
 
-    def add_perceptron(self, network: str, layers: Sequence[LinearLayer]) -> list[PlacedLayer]:
+    def add_perceptron(self, network: str, layers: Sequence[LinearLayer]) -> list[descriptor.PlacedLayer]:
         """Append the layers of a network; inputs of the first one are filled up to whole elements."""
         described = []
         for index, layer in enumerate(layers):
-            rows = np.zeros((4 * _quads(len(layer.weights)), layer.weights.shape[1]), np.float32)
-            rows[: len(layer.weights)] = layer.weights
-            name = f"{network} {index}"
+            rows, name = np.pad(layer.weights, ((0, -len(layer.weights) % 4), (0, 0))), f"{network} {index}"
             described.append(
-                PlacedLayer(
+                descriptor.PlacedLayer(
                     network=network,
                     biases=self.add(f"{name} biases", layer.biases, "biases"),
                     weights=self.add(f"{name} weights", rows, "weights (inputs, outputs)"),
@@ -87,17 +67,8 @@ class Weights:
             )
         return described
 
-    def buffer(self) -> Buffer:
-        """Return the description of the buffer."""
-        return Buffer(
-            files={"float32": "tables/weights.f32", "float16": "tables/weights.f16"},
-            channels=4,
-            elements=self.count,
-            arrays=self.places,
-        )
-
     def files(self) -> dict[str, bytes]:
-        """Return its files, by their paths; BadInput for more than MOST_ELEMENTS."""
+        """Return the files of the buffer, by their paths; BadInput for more than MOST_ELEMENTS."""
         if self.count > MOST_ELEMENTS:
             allowed = f"the shader takes at most {MOST_ELEMENTS:,} elements of weights"
             raise BadInput("export", "shader", f"{self.count:,} elements", allowed)
@@ -117,7 +88,7 @@ _NEUMIP_ONNX: Final = {
 }
 
 
-def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
+def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Collection[str]) -> descriptor.Shader:
     """Return the model for its fabric; BadInput if a level or kinds are wished, or its textures are too large."""
     if kinds:
         raise BadInput("export", "kind", ", ".join(sorted(kinds)), f"{method.name} answers in front of flat cloth only")
@@ -125,29 +96,33 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         raise BadInput("export", "level", level, f"leave it out: {method.name} has no soft nodes")
     network, weights = method.network_of(fabric), Weights()
     options = network.options
-    yarns = colours(fabric)
-    weights.add("colours", np.array([*yarns.model_dump().values()], np.float32)[:4], "k_s and k_d of warp and weft")
+    weights.add("colours", colours(fabric).astype(np.float32), "k_s and k_d of warp and weft")
     constants, layers = _pack(network, weights)
     channels = [f"feature {n}" for n in range(options.channels)]
     channels += ["0"] * (-len(channels) % 4)
-    described = Descriptor(
+    trained_on, outside = _training(method.domain, fabric)
+    ends, picks = fabric.thread_colours()
+    described = descriptor.Descriptor(
         model=NEUMIP,
         fabric=fabric.name,
-        level=None,
-        outputs=OUTPUTS | {"bounds": "the components: the network knows no bound of energy"},
-        conventions=[*CONVENTIONS, "An ellipse counts as the circle of its area, curved cloth as flat."],
-        colours=yarns,
+        outputs=descriptor.OUTPUTS | {"bounds": "the components: the network knows no bound of energy"},
+        conventions=[*descriptor.CONVENTIONS, "An ellipse counts as the circle of its area, curved cloth as flat."],
+        colours=descriptor.colours(fabric),
         repeat=fabric.weave.repeat,
-        threads=threads_of(fabric),
+        threads=(len(ends.diffuse), len(picks.diffuse)),
         limits={"elements": MOST_ELEMENTS},
-        kinds=[],
-        scalars={},
-        back_scalars={},
-        buffers={"weights": weights.buffer()},
-        network=Networks(
+        buffers={
+            "weights": descriptor.Buffer(
+                files={"float32": "tables/weights.f32", "float16": "tables/weights.f16"},
+                channels=4,
+                elements=weights.count,
+                arrays=weights.places,
+            )
+        },
+        network=descriptor.Networks(
             name=method.name,
-            trained_on=trained_ranges(method.domain),
-            outside=why_outside(method.domain, fabric),
+            trained_on=trained_on,
+            outside=outside,
             inputs={
                 "offset": [*channels, "wo.x", "wo.y", "0", "0"],
                 "decoder": [*channels, "wi.x", "wi.y", "wo.x", "wo.y"],
@@ -160,8 +135,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
             onnx=_NEUMIP_ONNX,
         ),
     )
-    return Shader(
-        NEUMIP,
+    return descriptor.Shader(
         NEUMIP_SOURCES,
         {
             "layout.slang": constants_slang(shared_constants(), "pipeline.analytic.soft_nodes"),
@@ -173,7 +147,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
             {"front": GROUPS["front"]},
             fabric.weave.repeat,
             lambda queries: np.tile(method.predict(fabric, queries), 2),  # components are their own bounds
-            lambda queries: np.tile(linear_colours(fabric), (len(queries.u), 1, 1)),
+            lambda queries: np.tile(colours(fabric), (len(queries.u), 1, 1)),
             stretched=False,
         ),
         f"{weights.count:,} elements",
@@ -182,36 +156,36 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
     )
 
 
-def _pack(network: NeumipNetwork, weights: Weights) -> tuple[dict[str, bool | int | float], list[PlacedLayer]]:
+def _pack(
+    network: NeumipNetwork, weights: Weights
+) -> tuple[dict[str, bool | int | float], list[descriptor.PlacedLayer]]:
     """Fill the buffer; return the constants of the source, and what the descriptor says of the layers."""
     options, (ends, picks) = network.options, network.repeat
-    places, described = {}, []
+    starts, described = {}, []
     for name, perceptron in (("offset", network.offset), ("decoder", network.decoder)):
-        places[name] = weights.count
+        starts[f"{name.upper()}_LAYERS"] = weights.count
         if perceptron is not None:
-            layers = layers_of(perceptron)
-            first = LinearLayer(_after_elements(layers[0].weights, options.channels), layers[0].biases)
-            described += weights.add_perceptron(name, [first, *layers[1:]])
-    places["pyramid"] = weights.count
+            first, *others = layers_of(perceptron)
+            # Rows of channels are filled up to whole elements, before those of directions.
+            rows = np.insert(first.weights, [options.channels] * (-options.channels % 4), 0.0, axis=0)
+            described += weights.add_perceptron(name, [LinearLayer(rows, first.biases), *others])
+    starts["PYRAMID"] = weights.count
     for index, texture in enumerate(network.levels):
         weights.add(f"level {index}", texels_of(texture), "texels (rows, columns, channels); row 0 at the smallest v")
-    places["depth"] = weights.count
+    starts["DEPTH"] = weights.count
     if network.depth is not None:
         weights.add("depth", texels_of(network.depth), "texels of the depth that shifts a place, at the finest level")
     constants: dict[str, bool | int | float] = {
         "COLOURS": weights.places["colours"].offset,
         "ENDS": ends,
         "PICKS": picks,
-        "CHANNEL_QUADS": _quads(options.channels),
-        "HIDDEN_QUADS": _quads(options.hidden),
+        "CHANNEL_QUADS": -(-options.channels // 4),
+        "HIDDEN_QUADS": -(-options.hidden // 4),
         "HIDDEN_LAYERS": LAYERS,
         "TEXELS_PER_YARN": options.texels_per_yarn,
         "LEVEL_COUNT": len(network.levels),
         "OFFSET": options.offset,
-        "OFFSET_LAYERS": places["offset"],
-        "DECODER_LAYERS": places["decoder"],
-        "PYRAMID": places["pyramid"],
-        "DEPTH": places["depth"],
+        **starts,
         "DEPTH_SCALE": DEPTH_SCALE,
         "STEEPEST": STEEPEST,
         "LOG_K": float(options.log_k),
@@ -219,7 +193,14 @@ def _pack(network: NeumipNetwork, weights: Weights) -> tuple[dict[str, bool | in
     return constants, described
 
 
-def _after_elements(rows: Float32, channels: int) -> Float32:
-    """Return weights whose rows of channels are filled up to whole elements, before those of directions."""
-    empty = np.zeros((-channels % 4, rows.shape[1]), np.float32)
-    return np.concatenate([rows[:channels], empty, rows[channels:]])
+def _training(domain: Domain | None, fabric: Fabric) -> tuple[dict[str, tuple[float, float]], str]:
+    """Return the ranges of a training, and what of a fabric lies outside, such as ``optical_thickness = 0.8``."""
+    if domain is None:
+        return {}, ""
+    sigma, angles = domain.queries.sigma, (0.0, domain.queries.max_angle)
+    ranges = {"footprint, yarn spacings": sigma, "angle to the normal, degrees": angles, **domain.yarns}
+    try:
+        domain.refuse_fabric(fabric, "")
+    except BadInput as error:
+        return ranges, f"{error.key} = {error.value}"
+    return ranges, ""

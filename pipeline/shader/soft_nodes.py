@@ -6,8 +6,9 @@ from collections.abc import Collection
 from typing import Final
 
 from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL
-from pipeline.shader.descriptor import Shader, descriptor
+from pipeline.shader.descriptor import Buffer, Descriptor, Shader, colours
 from pipeline.shader.golden import golden
+from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.tables import layout_slang, refuse_large_repeat, table_files, tables, tabulate_sides
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -22,6 +23,14 @@ SOFT_NODES_SOURCES: Final = (
 )  # fmt: skip
 """Files of the source."""
 
+_BUFFERS: Final = {
+    "integers": (1, {"int32": "tables/integers.i32"}),
+    "numbers": (1, {"float32": "tables/numbers.f32"}),
+    "nodes": (4, {"float32": "tables/nodes.f32", "float16": "tables/nodes.f16"}),
+    "grid": (1, {"uint8": "tables/grid.png"}),
+}
+"""Channels and files of each buffer, by type: little-endian, row after row; the grid as grey levels of a picture."""
+
 
 def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
     """Return the soft nodes of a fabric; BadInput if the level is none of DETAILS, or the cloth is too large."""
@@ -31,14 +40,34 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
     refuse_large_repeat(fabric)
     sides = tabulate_sides(fabric, level, kinds)
     cloth = tables(sides)
+    threads = len(sides.tints[0]), len(sides.tints[1])
+    described = Descriptor(
+        fabric=fabric.name,
+        level=level,
+        colours=colours(fabric),
+        repeat=fabric.weave.repeat,
+        threads=threads,
+        limits={"nodes": MOST_NODES, "cells": MOST_REPEAT_CELLS},
+        kinds=sorted(kinds),
+        scalars=cloth.scalars,
+        back_scalars=cloth.back_scalars,
+        buffers={
+            name: Buffer(
+                files=files,
+                channels=channels,
+                elements=getattr(cloth, name).size // channels,
+                arrays=cloth.places.get(name, {}),
+            )
+            for name, (channels, files) in _BUFFERS.items()
+        },
+    )
     return Shader(
-        SOFT_NODES,
         SOFT_NODES_SOURCES,
         {"layout.slang": layout_slang(cloth)},
         table_files(cloth),
-        descriptor(fabric, level, cloth, kinds),
+        described,
         golden(sides),
         f"level {level}, {sides.front.evenly.size} nodes",
         True,
-        threads=max(map(len, sides.tints)) > 1,
+        threads=max(threads) > 1,
     )

@@ -15,7 +15,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -32,10 +32,11 @@ from pipeline.analytic.soft_nodes.view_lines import GAUSS_PLACES, GAUSS_WEIGHTS
 from pipeline.compiled.arrays import Float32
 from pipeline.scenes.shade import colours
 from pipeline.shader.constants import FALL_ROWS, OTHER_ROW, POINTS, TEXTURE_WIDTH, constants
+from pipeline.shader.languages import refuse_unknown
 from pipeline.shader.limits import MOST_HEIGHT, MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.threads import family_heights, thread_tints
 from pipeline.truth.geometry.heightfield import AXIS_DROP, BEND_RADIUS, HALF_LENGTH
-from weaves.errors import BadInput, one_line
+from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
 BEHIND: Final = "behind"
@@ -105,9 +106,7 @@ _MEANINGS: Final = {
 
 def wanted_kinds(names: Collection[str]) -> frozenset[str]:
     """Return the kinds of queries that names choose; BadInput if one is none."""
-    for name in names:
-        if name not in (known := (*QUERY_KINDS, EVERY)):
-            raise BadInput("export", "kind", one_line(name, 40), f"must be one of {', '.join(known)}")
+    refuse_unknown("kind", names, (*QUERY_KINDS, EVERY))
     return frozenset(QUERY_KINDS if EVERY in names else names)
 
 
@@ -128,25 +127,29 @@ def refuse_large_repeat(fabric: Fabric) -> None:
     picks, ends = fabric.weave.warp_over.shape
     if ends * picks > MOST_REPEAT_CELLS:
         allowed = f"the shader takes repeats of at most {MOST_REPEAT_CELLS:,} cells"
-        raise BadInput("export", "shader", f"{ends} ends × {picks} picks", allowed)
+        raise BadInput("export", "", f"{fabric.name}: {ends} ends × {picks} picks", allowed)
 
 
 def tables(sides: Sides) -> ClothTables:
     """Return the buffers of a cloth; BadInput above MOST_NODES or MOST_HEIGHT."""
     known = [_side(table, sides.tints) for table in (sides.front, sides.back) if table is not None]
-    _refuse_large_tables(known)
-    shared = {
-        "colours": sides.colours, "point_places": point_places(POINTS), "tints": np.concatenate(sides.tints),
-    }  # fmt: skip
+    if (count := max(len(side.rows) for side in known)) > MOST_NODES:
+        allowed = f"the shader takes at most {MOST_NODES:,}; choose a lower level"
+        raise BadInput("export", "shader", f"{count:,} nodes", allowed)
+    if (size := sum(len(side.grid) for side in known)) > TEXTURE_WIDTH * MOST_HEIGHT:
+        allowed = f"the shader takes at most {TEXTURE_WIDTH * MOST_HEIGHT:,}; choose a fabric of fewer different floats"
+        raise BadInput("export", "shader", f"{size:,} horizons", allowed)
+    tints = np.concatenate(sides.tints)
+    shared = {"colours": sides.colours, "point_places": point_places(POINTS), "tints": tints}
     first = known[0]
-    own = len(first.integers) + len(_STARTS) + len(first.of_integers) + len(first.of_numbers) + len(shared)
+    own = len(first.integers) + 2 + len(first.of_integers) + len(first.of_numbers) + len(shared)
     integers, numbers = _Buffer(own * len(known)), _Buffer(len(first.numbers) * len(known))
     of_shared = numbers.add(shared)
     heads: list[dict[str, int | float]] = []
     node = grid = 0
     for prefix, side in zip(("", "back_"), known, strict=False):
         offsets = integers.add(side.of_integers, prefix) | numbers.add(side.of_numbers, prefix) | of_shared
-        heads.append({**side.integers, **dict(zip(_STARTS, (node, grid), strict=True)), **offsets, **side.numbers})
+        heads.append({**side.integers, "first_node": node, "first_grid": grid, **offsets, **side.numbers})
         node, grid = node + side.rows[..., 0].size, grid + side.grid.size
     return ClothTables(
         integers.filled([value for head in heads for value in head.values() if isinstance(value, int)], np.int32),
@@ -157,10 +160,6 @@ def tables(sides: Sides) -> ClothTables:
         heads[1] if len(heads) > 1 else {},
         {"integers": integers.places, "numbers": numbers.places},
     )
-
-
-_STARTS: Final = ("first_node", "first_grid")
-"""Scalars of where the nodes and the grids of a side begin."""
 
 
 class _Buffer:
@@ -197,13 +196,10 @@ class _Side(NamedTuple):
 
 
 def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
-    """Return what the shader reads of one side."""
     rows = _node_rows(table)
     groups, cells = _groups(table)
     grid = np.concatenate([table.grid.ravel(), table.behind_grid.ravel(), table.grid_falls.ravel()])
     behind, curvatures = int(len(table.behind_grid) > 0), len(table.grid_falls)
-    least, greatest = map(float, table.shown)
-    warp_height, weft_height = family_heights(table)
     integers: dict[str, int | float] = {
         "ends": int(table.repeat[0]),
         "picks": int(table.repeat[1]),
@@ -223,25 +219,13 @@ def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
         "end_tints": len(tints[0]),
         "pick_tints": len(tints[1]),
     }
-    numbers: dict[str, int | float] = {
-        "thickness": float(table.thickness),
-        "uniform": table.uniform,
-        "highest": table.highest,
-        "lowest": table.lowest,
-        "plane": table.plane,
-        "shown_least": least,
-        "shown_greatest": greatest,
-        "view_lines": table.view_lines,
-        "spacing": table.spacing,
-        "warp_height": warp_height,
-        "weft_height": weft_height,
-    }
-    of_integers: dict[str, npt.NDArray[Any]] = {
-        "groups": groups,
-        "group_cells": cells,
-        "piece_starts": table.piece_starts,
-        "pieces": table.pieces,
-    }
+    numbers: dict[str, int | float] = {"thickness": float(table.thickness)}
+    numbers |= {name: getattr(table, name) for name in ("uniform", "highest", "lowest", "plane")}
+    numbers |= zip(("shown_least", "shown_greatest"), map(float, table.shown), strict=True)
+    numbers |= {name: getattr(table, name) for name in ("view_lines", "spacing")}
+    numbers |= zip(("warp_height", "weft_height"), family_heights(table), strict=True)
+    of_integers: dict[str, npt.NDArray[Any]] = {"groups": groups, "group_cells": cells}
+    of_integers |= {"piece_starts": table.piece_starts, "pieces": table.pieces}
     floats = np.column_stack([table.floats[:, [BEND_RADIUS, HALF_LENGTH, AXIS_DROP]], table.crowns])
     of_numbers: dict[str, npt.NDArray[Any]] = {
         "yarn": table.yarn,
@@ -255,49 +239,32 @@ def _side(table: SoftNodeTable, tints: tuple[Float32, Float32]) -> _Side:
     return _Side(integers, numbers, of_integers, of_numbers, rows, np.append(grid, table.end_walls.ravel()))
 
 
-def _refuse_large_tables(known: Sequence[_Side]) -> None:
-    """Refuse tables above MOST_NODES or MOST_HEIGHT."""
-    count = max(len(side.rows) for side in known)
-    if count > MOST_NODES:
-        allowed = f"the shader takes at most {MOST_NODES:,}; choose a lower level"
-        raise BadInput("export", "shader", f"{count:,} nodes", allowed)
-    size = sum(len(side.grid) for side in known)
-    if size > TEXTURE_WIDTH * MOST_HEIGHT:
-        allowed = f"the shader takes at most {TEXTURE_WIDTH * MOST_HEIGHT:,}; choose a fabric of fewer different floats"
-        raise BadInput("export", "shader", f"{size:,} horizons", allowed)
-
-
 def constants_slang(values: Mapping[str, bool | int | float], origin: str) -> str:
     """Return a file of the source with constants, whose types are those of the values."""
     lines = [f"// Generated from {origin}; do not edit.", "", "#pragma once", ""]
     for name, value in values.items():
-        if isinstance(value, bool):
-            kind, text = "bool", str(value).lower()
-        else:
-            kind, text = ("int", str(value)) if isinstance(value, int) else ("float", f"{value:.9g}")
-        if kind == "float" and not any(mark in text for mark in ".e"):
+        text = f"{value:.9g}" if isinstance(value, float) else str(value).lower()
+        if isinstance(value, float) and not any(mark in text for mark in ".e"):
             text += ".0"
-        lines.append(f"static const {kind} {name} = {text};")
+        lines.append(f"static const {type(value).__name__} {name} = {text};")
     return "\n".join([*lines, ""])
 
 
 def layout_slang(cloth: ClothTables) -> str:
     """Return `layout.slang`, equal for all cloths: constants, the struct `Table`, and the functions that read it."""
     lines = [constants_slang(constants(), "pipeline.analytic").rstrip()]
-    kinds = {name: "int" if isinstance(value, int) else "float" for name, value in cloth.scalars.items()}
-    lines += ["", "struct Table {", *(f"    {kind} {name};" for name, kind in kinds.items()), "};", ""]
+    integers = [name for name, value in cloth.scalars.items() if isinstance(value, int)]
+    numbers = [name for name, value in cloth.scalars.items() if isinstance(value, float)]
+    lines += ["", "struct Table {", *(f"    int {name};" for name in integers)]
+    lines += [*(f"    float {name};" for name in numbers), "};", ""]
     lines += ["int integer(int i);", "float number(int i);", ""]
     lines += ["Table load_table_at(int first_integer, int first_number) {", "    Table table;"]
-    seen = {"int": 0, "float": 0}
-    for name, kind in kinds.items():
-        read = "integer(first_integer" if kind == "int" else "number(first_number"
-        lines.append(f"    table.{name} = {read} + {seen[kind]});")
-        seen[kind] += 1
-    behind = list(kinds).index("behind")
+    lines += [f"    table.{name} = integer(first_integer + {n});" for n, name in enumerate(integers)]
+    lines += [f"    table.{name} = number(first_number + {n});" for n, name in enumerate(numbers)]
     lines += ["    return table;", "}", "", "/// The front of the cloth.", "Table load_table() {"]
     lines += ["    return load_table_at(0, 0);", "}", "", "/// The side that a viewer sees, if the table knows both."]
-    lines += ["Table load_side(bool back) {", f"    bool other = back && integer({behind}) > 0;"]
-    lines += [f"    return load_table_at(other ? {seen['int']} : 0, other ? {seen['float']} : 0);", "}", ""]
+    lines += ["Table load_side(bool back) {", f"    bool other = back && integer({integers.index('behind')}) > 0;"]
+    lines += [f"    return load_table_at(other ? {len(integers)} : 0, other ? {len(numbers)} : 0);", "}", ""]
     return "\n".join(lines)
 
 
@@ -337,18 +304,14 @@ def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np
 
 def table_files(cloth: ClothTables) -> dict[str, bytes]:
     """Return the files of the four buffers, by their paths."""
+    # The lowest row of the texture comes first.
     rows = np.pad(cloth.grid, (0, -cloth.grid.size % TEXTURE_WIDTH)).reshape(-1, TEXTURE_WIDTH)
+    picture = io.BytesIO()
+    Image.fromarray(rows).save(picture, format="PNG", compress_level=9)
     return {
         "tables/integers.i32": cloth.integers.astype("<i4").tobytes(),
         "tables/numbers.f32": cloth.numbers.astype("<f4").tobytes(),
         "tables/nodes.f32": cloth.nodes.astype("<f4").tobytes(),
         "tables/nodes.f16": cloth.nodes.astype("<f2").tobytes(),
-        "tables/grid.png": _png(rows),
+        "tables/grid.png": picture.getvalue(),
     }
-
-
-def _png(rows: npt.NDArray[np.uint8]) -> bytes:
-    """Return rows of bytes as a picture; the lowest row of the texture comes first."""
-    buffer = io.BytesIO()
-    Image.fromarray(rows).save(buffer, format="PNG", compress_level=9)
-    return buffer.getvalue()

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from pipeline.atomic import refuse_unwritable
-from pipeline.bsdf.klems_xml import LayerFacts, write_klems
+from pipeline.bsdf.files import LayerFacts, write_klems
 from pipeline.bsdf.of_fabric import PAIR_POINTS, fabric_bsdf
 from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric
@@ -40,17 +38,10 @@ def write_bsdf(fabric: Fabric, path: Path, solar: str = "", points: int = PAIR_P
     write_klems(path, bsdf.scattering, LayerFacts(fabric.name, openness, EMISSIVITY_ASSUMED, thickness))
     size = "" if fabric.yarns_per_cm else ", thickness (no yarns_per_cm)"
     bands = "visible and solar" if solar else "visible, which stands for solar too"
+    (front, back), (through, _) = bsdf.scattering.hemispherical("visible")[:, :, 0]
     return (
-        f"{path}: {bsdf.scattering.basis.name}, {bands}; at normal "
-        f"incidence {_facts(bsdf.scattering.hemispherical('visible')[:, :, 0], openness)}. Assumed: emissivity "
+        f"{path}: {bsdf.scattering.basis.name}, {bands}; at normal incidence reflectance {front:.3f} front and "
+        f"{back:.3f} back, transmittance {through:.3f}, of it {openness:.3f} straight through. Assumed: emissivity "
         f"{EMISSIVITY_ASSUMED:g}{size}. Reciprocal: the mean of both ways of light, which differ by up to "
         f"{bsdf.asymmetry:.0%}"
-    )
-
-
-def _facts(shares: np.ndarray[tuple[int, ...], np.dtype[np.float64]], direct: float) -> str:
-    """Return reflectances and transmittance in words, from (kinds, sides)."""
-    return (
-        f"reflectance {shares[0, 0]:.3f} front and {shares[0, 1]:.3f} back, transmittance {shares[1, 0]:.3f}, of it "
-        f"{direct:.3f} straight through"
     )

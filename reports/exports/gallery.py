@@ -68,14 +68,9 @@ def write_fabric(fabric: Fabric, site: Path, size: int, languages: Sequence[str]
         "shader": f"{name}-shader.zip",
         "TOML": f"{name}.toml",
     }
-    return Card(
-        name=name,
-        weave=fabric.weave.name,
-        repeat=fabric.repeat,
-        fibres=tuple(fibre for fibre, names in FIBRES.items() if name in names),
-        source=fabric.source,
-        files=tuple((label, f"{name}/{file}", (home / file).stat().st_size) for label, file in files.items()),
-    )
+    listed = tuple((label, f"{name}/{file}", (home / file).stat().st_size) for label, file in files.items())
+    fibres = tuple(fibre for fibre, names in FIBRES.items() if name in names)
+    return Card(name, fabric.weave.name, fabric.repeat, fibres, fabric.source, listed)
 
 
 def gallery_page(cards: Sequence[Card]) -> str:

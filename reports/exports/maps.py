@@ -17,17 +17,9 @@ from pipeline.folders import own_files
 from pipeline.materials.lobes import SHEEN_ROUGHNESS, reflectance
 from pipeline.materials.occlusion import lit_coverage
 from pipeline.materials.planes import Layout, layout, planes, yarn_ids
-from pipeline.materials.textures import Constants, Textures, across_direction, constants, openpbr_roughness, textures
-from reports.exports.materials import (
-    DOCUMENT,
-    LARGEST_TEXTURE,
-    OPENPBR,
-    SAMPLE,
-    spacing_cm,
-    write_openpbr,
-    write_sample,
-    yarns_per_cm,
-)
+from pipeline.materials.textures import Textures, across_direction, constants, openpbr_roughness, textures
+from reports.exports import materials
+from reports.exports.materials import DOCUMENT, SAMPLE, spacing_cm, yarns_per_cm
 from reports.images.texture import Kind, write_texture
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -38,11 +30,12 @@ Plane = npt.NDArray[Any]
 
 
 class Map(NamedTuple):
-    """How a map is stored (`reports.images.texture`), its content, and where it is found in the textures of a level."""
+    """How a map is stored (`reports.images.texture`), its content, and how it follows from those of a level."""
 
     kind: Kind
     meaning: str
-    of: Callable[[Textures], Plane]
+    of: Callable[[Textures], Plane] | None = None
+    """None: it is one of the textures, of the same name."""
 
 
 def _rotation(level: Textures) -> Plane:
@@ -72,18 +65,14 @@ def _mask(level: Textures) -> Plane:
 _DOWN: Final = np.array([1.0, -1.0, 1.0], np.float32)
 
 MAPS: Final[dict[str, Map]] = {
-    "base_color": Map("colour", "diffuse colour, not multiplied by the opacity", lambda level: level.base_color),
-    "specular_color": Map(
-        "colour", "tint of the specular lobe; F0 is that of `ior` times it", lambda level: level.specular_color
-    ),
-    "transmission_color": Map(
-        "colour", "colour of the light that goes diffusely through", lambda level: level.transmission_color
-    ),
-    "opacity": Map("share", "0 in gaps between yarns, 1 on yarns", lambda level: level.opacity),
-    "height": Map("height", "height in yarn spacings; gaps at the lowest point", lambda level: level.height),
+    "base_color": Map("colour", "diffuse colour, not multiplied by the opacity"),
+    "specular_color": Map("colour", "tint of the specular lobe; F0 is that of `ior` times it"),
+    "transmission_color": Map("colour", "colour of the light that goes diffusely through"),
+    "opacity": Map("share", "0 in gaps between yarns, 1 on yarns"),
+    "height": Map("height", "height in yarn spacings; gaps at the lowest point"),
     "normal_opengl": Map("direction", "normal, green up (OpenGL, +Y)", lambda level: level.normal),
     "normal_directx": Map("direction", "normal, green down (DirectX, -Y)", lambda level: level.normal * _DOWN),
-    "tangent": Map("direction", "direction of the fibres, green up", lambda level: level.tangent),
+    "tangent": Map("direction", "direction of the fibres, green up"),
     "anisotropy_rotation": Map(
         "share", "direction across the fibres: angle from +U towards +V, in turns; do not filter", _rotation
     ),
@@ -95,9 +84,7 @@ MAPS: Final[dict[str, Map]] = {
     ),
     "roughness": Map("share", "roughness of OpenPBR; goes with anisotropy", lambda level: _openpbr(level)[0]),
     "anisotropy": Map("share", "anisotropy of OpenPBR, rougher across", lambda level: _openpbr(level)[1]),
-    "occlusion": Map(
-        "share", "ambient occlusion: the share of an even sky's light that arrives", lambda level: level.occlusion
-    ),
+    "occlusion": Map("share", "ambient occlusion: the share of an even sky's light that arrives"),
     "orm": Map(
         "share", "red occlusion, green roughness without anisotropy, blue metallic, which is 0 (glTF, Unreal)", _orm
     ),
@@ -105,11 +92,8 @@ MAPS: Final[dict[str, Map]] = {
 }
 """Every map that has mip levels, by its file name; `transmission_color` is left out where nothing goes through."""
 
-YARN_ID: Final[tuple[Kind, str]] = (
-    "number",
-    "0 in gaps, then ends from the left, then picks from below; do not filter",
-)
-"""Kind and meaning of the numbers of the yarns (`pipeline.materials.planes.yarn_ids`); without mip levels."""
+YARN_ID: Final = Map("number", "0 in gaps, then ends from the left, then picks from below; do not filter")
+"""The numbers of the yarns (`pipeline.materials.planes.yarn_ids`), without mip levels."""
 
 
 def write_maps(fabric: Fabric, folder: Path, size: int = 2048) -> str:
@@ -139,15 +123,16 @@ def _write(fabric: Fabric, shown: Layout, folder: Path) -> int:
     material, level, lit = constants(fabric, share), planes(fabric, shown, share), lit_coverage(fabric, shown)
     maps = {name: row for name, row in MAPS.items() if name != "transmission_color" or material.transmitted > 0.0}
     span = (float(level.height.min()), float(level.height.max()))
-    write_texture(folder / "yarn_id", yarn_ids(fabric, shown), YARN_ID[0])
+    write_texture(folder / "yarn_id", yarn_ids(fabric, shown), YARN_ID.kind)
     levels: list[tuple[int, int]] = []
     sampled, place = False, folder
     while True:
         level_maps = textures(level, material, lit)
         for name, row in maps.items():
-            write_texture(place / name, row.of(level_maps), row.kind, span)
-        if not sampled and max(level.coverage.shape) <= LARGEST_TEXTURE:
-            write_sample(folder / SAMPLE, fabric, shown, level_maps, material)
+            plane = row.of(level_maps) if row.of else getattr(level_maps, name)
+            write_texture(place / name, plane, row.kind, span)
+        if not sampled and max(level.coverage.shape) <= materials.LARGEST_TEXTURE:
+            materials.write_sample(folder / SAMPLE, fabric, shown, level_maps, material)
             sampled = True
         if level.coverage.size == 1:
             break
@@ -155,29 +140,10 @@ def _write(fabric: Fabric, shown: Layout, folder: Path) -> int:
         height, width = level.coverage.shape
         levels.append((width, height))
         (place := folder / "mips" / f"{width}x{height}").mkdir(parents=True)
-    listed = {**{name: (row.kind, row.meaning) for name, row in maps.items()}, "yarn_id": YARN_ID}
-    write_openpbr(folder / DOCUMENT, fabric.name, material)
-    about = _about(fabric, shown, material) | {
-        "height": {
-            "zero": "the middle plane of the cloth, where the axes of yarns change side",
-            "exr_unit_m": spacing_cm(fabric) / 100.0,
-            "png_black_m": span[0] * spacing_cm(fabric) / 100.0,
-            "png_white_m": span[1] * spacing_cm(fabric) / 100.0,
-        },
-        "maps": {
-            name: {"meaning": meaning, "kind": kind, "exr": f"{name}.exr", "png": f"{name}.png"}
-            for name, (kind, meaning) in listed.items()
-        },
-        "mip_levels": levels,
-    }
-    (folder / LISTING).write_text(json.dumps(about), encoding="utf-8")
-    return len(listed)
-
-
-def _about(fabric: Fabric, shown: Layout, material: Constants) -> dict[str, Any]:
-    """Return the size of the cloth that a map shows, and the numbers of the material."""
+    maps["yarn_id"] = YARN_ID
+    materials.write_openpbr(folder / DOCUMENT, fabric.name, material)
     ends, picks = yarns_per_cm(fabric)
-    return {
+    about = {
         "fabric": fabric.name,
         "generator": f"twillight {version('twillight')}",
         "yarns": (shown.ends, shown.picks),
@@ -185,7 +151,7 @@ def _about(fabric: Fabric, shown: Layout, material: Constants) -> dict[str, Any]
         "yarns_per_cm": (ends, picks),
         "yarns_per_cm_source": "fabric" if fabric.yarns_per_cm else "default",
         "size_cm": (shown.ends / ends, shown.picks / picks),
-        "openpbr": OPENPBR,
+        "openpbr": materials.OPENPBR,
         "orientation": "U along the picks, V along the ends; the lower left corner is the first end and pick",
         "material": {
             "ior": material.ior,
@@ -193,4 +159,17 @@ def _about(fabric: Fabric, shown: Layout, material: Constants) -> dict[str, Any]
             "sheen_roughness": SHEEN_ROUGHNESS,
             "transmitted": material.transmitted,
         },
+        "height": {
+            "zero": "the middle plane of the cloth, where the axes of yarns change side",
+            "exr_unit_m": spacing_cm(fabric) / 100.0,
+            "png_black_m": span[0] * spacing_cm(fabric) / 100.0,
+            "png_white_m": span[1] * spacing_cm(fabric) / 100.0,
+        },
+        "maps": {
+            name: {"meaning": row.meaning, "kind": row.kind, "exr": f"{name}.exr", "png": f"{name}.png"}
+            for name, row in maps.items()
+        },
+        "mip_levels": levels,
     }
+    (folder / LISTING).write_text(json.dumps(about), encoding="utf-8")
+    return len(maps)

@@ -142,9 +142,12 @@ def write_sample(path: Path, fabric: Fabric, shown: Layout, level: Textures, mat
 
     file = _File(gltf)
     vertices, faces = _draped(fabric, shown)
-    attributes = gltf.Attributes(**{name: file.vertices(values) for name, values in vertices.items()})
+    indices = {
+        name: file.array(values.astype(np.float32), f"VEC{values.shape[1]}", gltf.FLOAT, gltf.ARRAY_BUFFER)
+        for name, values in vertices.items()
+    }
     corners = file.array(faces.reshape(-1, 1), gltf.SCALAR, gltf.UNSIGNED_INT, gltf.ELEMENT_ARRAY_BUFFER)
-    primitive = gltf.Primitive(attributes=attributes, indices=corners, material=0)
+    primitive = gltf.Primitive(attributes=gltf.Attributes(**indices), indices=corners, material=0)
     document = file.document
     document.meshes.append(gltf.Mesh(name=fabric.name, primitives=[primitive]))
     document.nodes.append(gltf.Node(name=fabric.name, mesh=0))
@@ -152,7 +155,9 @@ def write_sample(path: Path, fabric: Fabric, shown: Layout, level: Textures, mat
     document.scene = 0
     document.materials.append(_material(gltf, file, fabric.name, level, material))
     document.asset = gltf.Asset(version="2.0", generator="twillight")
-    file.finish(path)
+    document.buffers.append(gltf.Buffer(byteLength=len(file.content)))
+    document.set_binary_blob(file.content)
+    document.save_binary(str(path))
 
 
 def _material(gltf: Any, file: _File, name: str, level: Textures, material: Constants) -> Any:
@@ -198,12 +203,7 @@ class _File:
         self.document = gltf.GLTF2()
         linear, repeat = gltf.LINEAR_MIPMAP_LINEAR, gltf.REPEAT
         self.document.samplers.append(gltf.Sampler(magFilter=gltf.LINEAR, minFilter=linear, wrapS=repeat, wrapT=repeat))
-        self._bytes = b""
-
-    def vertices(self, values: Float64) -> int:
-        """Add an attribute of the vertices, and return its index."""
-        kind = f"VEC{values.shape[1]}"
-        return self.array(values.astype(np.float32), kind, self.gltf.FLOAT, self.gltf.ARRAY_BUFFER)
+        self.content = b""
 
     def array(self, values: npt.NDArray[Any], kind: str, component: int, target: int) -> int:
         """Add an array (N, n), and return its index."""
@@ -221,17 +221,11 @@ class _File:
         self.document.textures.append(self.gltf.Texture(sampler=0, source=len(self.document.images) - 1))
         return len(self.document.textures) - 1
 
-    def finish(self, path: Path) -> None:
-        """Write the file."""
-        self.document.buffers.append(self.gltf.Buffer(byteLength=len(self._bytes)))
-        self.document.set_binary_blob(self._bytes)
-        self.document.save_binary(str(path))
-
     def _view(self, content: bytes, target: int | None) -> int:
-        start = len(self._bytes)
+        start = len(self.content)
         view = self.gltf.BufferView(buffer=0, byteOffset=start, byteLength=len(content), target=target)
         self.document.bufferViews.append(view)
-        self._bytes += content + bytes(-len(content) % 4)  # parts begin at multiples of four bytes
+        self.content += content + bytes(-len(content) % 4)  # parts begin at multiples of four bytes
         return len(self.document.bufferViews) - 1
 
 

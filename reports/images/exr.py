@@ -9,8 +9,8 @@ A film is one file: frame 0 is the picture itself, the others are layers with ch
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Mapping
-from itertools import count, takewhile
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -77,14 +77,12 @@ def read_exr(path: Path) -> Exr:
 
 def frame_layers(frames: npt.NDArray[np.floating]) -> dict[str, npt.NDArray[Any]]:
     """Return frames (F, H, W, 3) but the first as planes by name, for `reports.measure.pictures.write_picture`."""
-    names = [
-        (index, channel, f"frame_{index}.{name}") for index in range(1, len(frames)) for channel, name in enumerate(RGB)
-    ]
-    return {name: frames[index, ..., channel] for index, channel, name in names}
+    places = itertools.product(range(1, len(frames)), enumerate(RGB))
+    return {f"frame_{index}.{name}": frames[index, ..., channel] for index, (channel, name) in places}
 
 
 def film(exr: Exr) -> npt.NDArray[np.float32]:
     """Return all frames that a file holds, (F, H, W, 3); the picture alone where it has no layers."""
-    further = takewhile(lambda index: f"frame_{index}.R" in exr.channels, count(1))
+    further = itertools.takewhile(lambda index: f"frame_{index}.R" in exr.channels, itertools.count(1))
     layers = [exr.stack(*(f"frame_{index}.{name}" for name in RGB)) for index in further]
     return np.stack([exr.stack(*RGB), *layers])

@@ -47,8 +47,8 @@ def png_bytes(values: npt.NDArray[Any], kind: Kind, span: tuple[float, float] = 
     shown = values[::-1]
     if kind in ("height", "number"):
         low, high = span if kind == "height" else (0.0, 65535.0)
-        codes: npt.NDArray[Any] = np.rint(65535.0 * np.clip((shown - low) / max(high - low, 1e-12), 0.0, 1.0))
-        codes = codes.astype(np.uint16)
+        share = np.clip((shown - low) / max(high - low, 1e-12), 0.0, 1.0)
+        codes: npt.NDArray[Any] = np.rint(65535.0 * share).astype(np.uint16)
     else:
         codes = np.rint(255.0 * np.clip(shown, 0.0, 1.0)).astype(np.uint8)
         if kind == "colour":

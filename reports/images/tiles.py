@@ -44,7 +44,9 @@ Bytes8 = npt.NDArray[np.uint8]
 
 def picture(exr: Exr) -> bytes:
     """Return a rendering as it is shown."""
-    return png(_tone_mapped(exr))
+    cloth = exr.channels["A"] > 0
+    rgb = encoded(EXPOSURE * exr.stack(*RGB))
+    return png(np.concatenate([rgb * cloth[..., None], np.where(cloth, 255, 0)[..., None]], axis=-1).astype(np.uint8))
 
 
 def difference(exr: Exr, truth: Exr) -> bytes:
@@ -52,27 +54,24 @@ def difference(exr: Exr, truth: Exr) -> bytes:
     shown, reference = ((e.stack(*RGB).astype(np.float64) @ np.array(LUMINANCE)) for e in (exr, truth))
     cloth = truth.channels["A"] > 0
     scale = DIFFERENCE_RANGE * reference[cloth].mean() if cloth.any() else 1.0
-    share = 0.5 + 0.5 * np.clip((shown - reference) / scale, -1.0, 1.0)
-    rgba = mpl.colormaps["RdBu_r"](share, bytes=True)
-    rgba[~cloth] = 0
-    return png(rgba)
+    return _tile("RdBu_r", 0.5 + 0.5 * np.clip((shown - reference) / scale, -1.0, 1.0), cloth)
 
 
 def relative_tile(differences: Exr) -> bytes:
     """Return the relative difference of luminance: blue too dark, red too bright, full from `RELATIVE_RANGE` on."""
     share = np.clip(differences.channels["relative.Y"] / RELATIVE_RANGE, -1.0, 1.0)
-    return _tile("RdBu_r", 0.5 + 0.5 * share, differences)
+    return _tile("RdBu_r", 0.5 + 0.5 * share, differences.channels["lit"] != 0)
 
 
 def flip_tile(differences: Exr, channel: str = "flip_ldr") -> bytes:
     """Return a map of FLIP, black to white from 0 to 1 by way of purple and orange, as its authors show it."""
-    return _tile("magma", differences.channels[channel], differences)
+    return _tile("magma", differences.channels[channel], differences.channels["lit"] != 0)
 
 
-def _tile(colours: str, share: npt.NDArray[np.float32], differences: Exr) -> bytes:
-    """Return a map in colours, clear where nothing counts."""
+def _tile(colours: str, share: npt.NDArray[np.floating], shown: npt.NDArray[np.bool_]) -> bytes:
+    """Return a map in colours, clear where nothing is shown."""
     rgba = np.array(mpl.colormaps[colours](share, bytes=True))
-    rgba[differences.channels["lit"] == 0] = 0
+    rgba[~shown] = 0
     return png(rgba)
 
 
@@ -95,12 +94,6 @@ def normals(fabric: Fabric) -> bytes:
 def hex_colour(linear: Sequence[float]) -> str:
     """Return a linear RGB colour as ``#rrggbb``."""
     return "#" + "".join(f"{value:02x}" for value in encoded(np.asarray(linear)))
-
-
-def _tone_mapped(exr: Exr) -> Bytes8:
-    cloth = exr.channels["A"] > 0
-    rgb = encoded(EXPOSURE * exr.stack(*RGB))
-    return np.concatenate([rgb * cloth[..., None], np.where(cloth, 255, 0)[..., None]], axis=-1).astype(np.uint8)
 
 
 def encoded(linear: npt.NDArray[np.floating]) -> Bytes8:

@@ -11,12 +11,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Final
 
-from pipeline.bsdf.measured import read_bsdf
-from pipeline.fitting.geometry import STRAIGHT_NOISE
+from pipeline.bsdf.files import read_bsdf
 from pipeline.fitting.held_out import held_out_rings, predicted_transmittances
 from pipeline.fitting.measured import MEASURED
-from pipeline.fitting.optics import FACE_NOISE, SCATTERED_NOISE
 from pipeline.fitting.predicted import Errors
+from pipeline.fitting.scattered import FACE_NOISE, SCATTERED_NOISE
+from pipeline.fitting.straight import STRAIGHT_NOISE
 from reports.truth.row_records import RowRecords
 
 LABORATORY: Final = "a second measurement"  # the laboratories' own errors

@@ -107,7 +107,10 @@ def seen(camera: Viewpoint, size: int, ends: int, through: bool = False) -> Seen
     length = np.linalg.norm(rays, axis=1)
     rays /= length[:, None]
     eyes = np.broadcast_to(eye, rays.shape)
-    places = _meet(camera.shape, eyes, rays, radius)
+    if camera.shape == "sphere":
+        places = _on_sphere(eyes, rays, radius)
+    else:
+        places = _on_plane(eyes, rays) if camera.shape == "plane" else _on_drape(eyes, rays)
     facing = -_dot(rays, places.n)
     cloth = (places.reach > 0.0) & (facing > 0.0)
     light = direction(camera.light_turn, camera.light_tilt)
@@ -142,12 +145,6 @@ def _moves(step: Float64, places: _Places, ray: Float64, reach: Float64, facing:
     """Return by how much uv moves if the ray moves by `step`, on the tangent plane, (N, 2)."""
     moved = reach[:, None] * (step + ray * ((places.n @ step) / facing)[:, None])
     return places.scale * np.stack([_dot(moved, places.x), _dot(moved, places.y)], axis=-1)
-
-
-def _meet(shape: Shape, eye: Float64, ray: Float64, radius: float) -> _Places:
-    if shape == "plane":
-        return _on_plane(eye, ray)
-    return _on_sphere(eye, ray, radius) if shape == "sphere" else _on_drape(eye, ray)
 
 
 def _on_plane(eye: Float64, ray: Float64) -> _Places:

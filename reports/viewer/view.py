@@ -11,8 +11,10 @@ from __future__ import annotations
 import base64
 import gzip
 import html
+import itertools
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,8 +30,8 @@ from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
 from pipeline.scenes.shade import coloured, colours, colours_of
 from pipeline.shader.constants import TEXTURE_WIDTH
-from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
-from pipeline.shader.tables import ClothTables, Sides, tables, tabulate_sides
+from pipeline.shader.limits import MOST_NODES
+from pipeline.shader.tables import Sides, refuse_large_repeat, tables, tabulate_sides
 from pipeline.shader.threads import thread_tints
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA, BETA, BLEND, COS_TWIST, GAP, SIN_TWIST
@@ -97,10 +99,7 @@ def write_page(
     """
     if truth and not LEAST_TILE <= truth <= MOST_TILE:
         raise BadInput("export", "truth", truth, f"must be from {LEAST_TILE} to {MOST_TILE}, or 0 for none")
-    picks, ends = fabric.weave.warp_over.shape
-    if ends * picks > MOST_REPEAT_CELLS:
-        allowed = f"the shader takes repeats of at most {MOST_REPEAT_CELLS:,} cells"
-        raise BadInput("export", "", f"{fabric.name}: {ends} ends × {picks} picks", allowed)
+    refuse_large_repeat(fabric)
     shown = content(fabric, truth, progress)
     page = whole_page(shown)
     atomic_write(path, page.encode())
@@ -138,18 +137,17 @@ def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lamb
     through = sheer(fabric)
     views = VIEWS | (AGAINST_LIGHT if through else {})
     steps = len(factors[0]) * len(factors[1]) + len(views)
-    for bend in factors[0]:
-        for width in factors[1]:
-            shape = bent(fabric, bend, width)
-            levels = list(DETAILS) if (bend, width) == (1.0, 1.0) else [USUAL]
-            of_shape = [(level, _nodes(shape, level)) for level in levels]
-            # All levels of a shape have the same grid.
-            about = {"bend": bend, "width": width, "grid": len(grids)}
-            front = of_shape[0][1].front
-            grids.append(packed(np.concatenate([front.grid.ravel(), front.behind_grid.ravel()])))
-            kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
-            of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
-            progress(len(grids) / steps)
+    for bend, width in itertools.product(*factors):
+        shape = bent(fabric, bend, width)
+        levels = list(DETAILS) if (bend, width) == (1.0, 1.0) else [USUAL]
+        of_shape = [(level, _nodes(shape, level)) for level in levels]
+        # All levels of a shape have the same grid.
+        about = {"bend": bend, "width": width, "grid": len(grids)}
+        front = of_shape[0][1].front
+        grids.append(packed(np.concatenate([front.grid.ravel(), front.behind_grid.ravel()])))
+        kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
+        of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
+        progress(len(grids) / steps)
     still, irradiance = _still(fabric)
     methods = _methods(fabric) if truth else {}
     for name, camera in views.items():
@@ -232,7 +230,6 @@ def _twist(yarn: Yarn) -> float:
 
 
 def _table(fabric: Fabric, sides: Sides, about: dict[str, Any]) -> dict[str, Any]:
-    """Return a table for the page."""
     cloth, table = tables(sides), sides.front
     return about | {
         "bends": (fabric.warp.bend, fabric.weft.bend),
@@ -246,11 +243,11 @@ def _table(fabric: Fabric, sides: Sides, about: dict[str, Any]) -> dict[str, Any
         "integers": packed(cloth.integers),
         "numbers": packed(cloth.numbers),
         "nodes": packed(cloth.nodes),
-        "families": packed(_families(table, cloth)),
+        "families": packed(_families(table)),
     }
 
 
-def _families(table: SoftNodeTable, cloth: ClothTables) -> npt.NDArray[np.uint8]:
+def _families(table: SoftNodeTable) -> npt.NDArray[np.uint8]:
     """Return the family of every node; those that fill up blocks count as gaps."""
     families = np.full(table.evenly.size, GAP, np.uint8)
     for group in table.groups.astype(np.int64):
@@ -267,11 +264,9 @@ def _methods(fabric: Fabric) -> dict[str, Method]:
     methods: dict[str, Method] = {}
     for name in TILES:
         method = named_method(name, "view", "")
-        try:
+        with suppress(BadInput):
             method.prepare(fabric)
-        except BadInput:
-            continue
-        methods[name] = method
+            methods[name] = method
     return methods
 
 

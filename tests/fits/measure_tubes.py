@@ -22,14 +22,13 @@ import numpy.typing as npt
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
-from pipeline.bsdf.measured import read_bsdf
+from pipeline.bsdf.files import read_bsdf
 from pipeline.compiled.arrays import Float64, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.fitting.fit_bsdf import known_lights
 from pipeline.fitting.fitted import DRAFTS, cloth
-from pipeline.fitting.geometry import Straight, straight_of
 from pipeline.fitting.measured import MEASURED
-from pipeline.fitting.straight import middles
+from pipeline.fitting.straight import Straight, middles, straight_of
 
 BAND = "visible"
 STEP = 0.03  # of a ray, in spacings of ends

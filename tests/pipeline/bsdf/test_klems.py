@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from pipeline.bsdf.files import NAMESPACE, LayerFacts, mirrored, write_klems
 from pipeline.bsdf.klems import BASES, FACES, KLEMS_FULL, SCATTERED, Scattering
-from pipeline.bsdf.klems_xml import NAMESPACE, LayerFacts, mirrored, write_klems
 from pipeline.bsdf.of_fabric import fabric_bsdf
 from pipeline.scenes.shade import shade
 from pipeline.truth.estimator import estimate

@@ -7,8 +7,7 @@ from pipeline.bsdf.klems import BASES, Scattering
 from pipeline.bsdf.of_fabric import fabric_bsdf
 from pipeline.fitting.fit_bsdf import fit_bsdf
 from pipeline.fitting.fitted import cloth
-from pipeline.fitting.optics import fit_optics, optics_numbers
-from pipeline.fitting.scattered import Pairs, Scatterer, YarnOptics, solve, with_colours
+from pipeline.fitting.scattered import Pairs, Scatterer, YarnOptics, fit_optics, optics_numbers, solve, with_colours
 from weaves.errors import BadInput
 
 QUARTER = BASES["LBNL/Klems Quarter"]

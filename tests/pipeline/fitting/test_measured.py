@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pipeline.bsdf.files import read_bsdf
 from pipeline.bsdf.klems import KLEMS_FULL
-from pipeline.bsdf.measured import read_bsdf
 from pipeline.fitting.measured import SHADE
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.bsdf.measured import read_bsdf
+from pipeline.bsdf.files import read_bsdf
 from pipeline.fitting.held_out import RIVALS, rivals, roller_blind, woven_shade
 from pipeline.fitting.measured import SHADE
 

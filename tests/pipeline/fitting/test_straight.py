@@ -5,8 +5,15 @@ import pytest
 
 from pipeline.bsdf.klems import KLEMS_FULL
 from pipeline.fitting.fitted import DRAFTS, cloth
-from pipeline.fitting.geometry import Straight, fit_geometry, geometry_numbers, images
-from pipeline.fitting.straight import gap_rays, middles, straight_share
+from pipeline.fitting.straight import (
+    Straight,
+    fit_geometry,
+    gap_rays,
+    geometry_numbers,
+    images,
+    middles,
+    straight_share,
+)
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries

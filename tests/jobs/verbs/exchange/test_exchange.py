@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from pipeline.shader import tables
 from reports.viewer import view
 from tests.reports.viewer.conftest import shown_of
 from tests.weaves.draft_files.drafts import numbered, wif
@@ -126,7 +127,7 @@ def test_a_page_of_a_fabric_is_written_whole_and_one_of_a_large_repeat_refused_b
 ):
     found = shown_of(0, (2,), (1.0,), 32)
     with monkeypatch.context() as patch:
-        patch.setattr(view, "MOST_REPEAT_CELLS", 3)
+        patch.setattr(tables, "MOST_REPEAT_CELLS", 3)
         patch.setattr(view, "content", None)
         assert "at most 3 cells" in refused("view", "gingham", "--out", "x.html") and not list(tmp_path.iterdir())
     monkeypatch.setattr(view, "content", lambda fabric, truth, progress: progress(1.0) or found)

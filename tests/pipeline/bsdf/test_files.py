@@ -1,4 +1,4 @@
-"""Files of measured BSDFs: what is written is read, and faults are named in one sentence."""
+"""Files of BSDFs: what is written is read, and faults are named in one sentence."""
 
 import re
 
@@ -7,9 +7,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from pipeline.bsdf.files import LayerFacts, read_bsdf, write_klems
 from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Scattering
-from pipeline.bsdf.klems_xml import LayerFacts, write_klems
-from pipeline.bsdf.measured import read_bsdf
 from weaves.errors import BadInput
 
 QUARTER = BASES["LBNL/Klems Quarter"]
