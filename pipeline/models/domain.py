@@ -18,9 +18,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import field_validator
 
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.models.method import faults, refuse_other
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import WALLS_OF_PLANE, TruthOptions
@@ -83,7 +83,7 @@ class Domain(Frozen):
         """True if view rays that meet a wall see a rim."""
         return bool(self.physics["walls"] == "rim")
 
-    def out_of_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
+    def out_of_domain(self, fabric: Fabric, queries: Queries) -> Mask:
         """Return which queries on a fabric lie outside the ranges trained on, (N,); all of them if its yarns do.
 
         Kinds that were not trained on at all are not checked here, but by `faults`.
@@ -112,7 +112,7 @@ class Domain(Frozen):
         shrunk = np.where(averaged, self.queries.sigma[1] / _size(queries), 1.0).astype(np.float32)
         return queries._replace(sigma=queries.sigma * shrunk, sigma_minor=queries.sigma_minor * shrunk)
 
-    def _averaged(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
+    def _averaged(self, fabric: Fabric, queries: Queries) -> Mask:
         """Return which footprints are larger than those trained on and see the average of the repeat, (N,)."""
         size, high = _size(queries), self.queries.sigma[1]
         narrow = high * queries.sigma_minor / size
@@ -165,7 +165,7 @@ def domain_of(cards: Sequence[Mapping[str, Any]]) -> Domain | None:
     return domains[0].model_copy(update={"yarns": yarns})
 
 
-def _size(queries: Queries) -> npt.NDArray[np.float64]:
+def _size(queries: Queries) -> Float64:
     """Return the root of the product of each footprint's axes, the size that `QueryOptions.sigma` limits."""
     return np.asarray(np.sqrt(queries.sigma.astype(np.float64) * queries.sigma_minor))
 

@@ -26,10 +26,10 @@ from threading import Lock
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
+from pipeline.compiled.arrays import Float32
 from pipeline.models.method import Around, Method
 from pipeline.models.network import PerQuery, Portable, one_thread
 from pipeline.per_fabric import PerFabric
@@ -229,7 +229,7 @@ class RunBy(Around):
         """
         self._ready.of(fabric)
 
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries outside the domain."""
         part, program = self._ready.of(fabric)
         return part.answered(queries, program.run)

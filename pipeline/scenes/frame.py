@@ -22,8 +22,8 @@ from itertools import chain
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.lights import fibonacci
 from pipeline.scenes.loading import Camera, FilmWindow, Loaded
@@ -31,8 +31,6 @@ from pipeline.scenes.places import Places, curvature_of, dot, least_curvature, p
 from pipeline.scenes.rays import aovs_of, first_hits, in_sight, off
 from pipeline.scenes.scene import Cloth
 from weaves.errors import BadInput
-
-Floats = npt.NDArray[np.float64]
 
 _AOVS: Final = {
     "position": 3,
@@ -57,11 +55,11 @@ class SceneFrame(NamedTuple):
 
     gbuffers: dict[str, GBuffer]
     """By the cloth's key; a cloth out of sight has no places."""
-    backdrop: Floats
+    backdrop: Float64
     """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3)."""
-    depth: Floats
+    depth: Float64
     """Distance of what is seen along the camera's axis, in the world's lengths, (H, W); 0 where nothing is."""
-    normal: Floats
+    normal: Float64
     """Shading normal of what is seen, in the world, (H, W, 3); 0 where nothing is."""
 
 
@@ -90,9 +88,7 @@ def render(
     return SceneFrame(gbuffers, _backdrop(loaded, camera, sensor, shown), depth, aovs["sh_normal"])
 
 
-def _gbuffer(
-    loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: npt.NDArray[np.bool_], aovs: dict[str, Floats]
-) -> GBuffer:
+def _gbuffer(loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: Mask, aovs: dict[str, Float64]) -> GBuffer:
     """Return the G-buffer of one cloth, whose pixels are `mask`."""
     options = loaded.options
     # At a pole of Mitsuba's sphere, say, there are no derivatives: such a pixel is cloth, but no place.
@@ -123,7 +119,7 @@ def _gbuffer(
     )
 
 
-def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
+def _lit(loaded: Loaded, places: Places) -> tuple[Index, Float64, Float64]:
     """Return which places each light in sight reaches, from where, and with which irradiance."""
     beside = off(places.position)
     index, towards, power = [], [], []
@@ -160,7 +156,7 @@ def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
         raise BadInput(f"scene {loaded.scene.name}", "camera", place, "inside the cloth; a camera must be outside it")
 
 
-def _backdrop(loaded: Loaded, camera: Camera, sensor: Any, cloth: npt.NDArray[np.bool_]) -> Floats:
+def _backdrop(loaded: Loaded, camera: Camera, sensor: Any, cloth: Mask) -> Float64:
     """Return the linear RGB of a frame without its cloth, (H, W, 3).
 
     Where `cloth` (H, W) is seen, it is what lies behind, without the cloth's shadows.
@@ -169,7 +165,7 @@ def _backdrop(loaded: Loaded, camera: Camera, sensor: Any, cloth: npt.NDArray[np
     return np.where(cloth[..., None], _seen(loaded, loaded.behind, camera, sensor, cloth), picture)
 
 
-def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: npt.NDArray[np.bool_]) -> Floats:
+def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: Mask) -> Float64:
     """Return the radiance of the wanted pixels, and that of the environment where a ray leaves the scene."""
     mi = loaded.mi
     integrator = mi.load_dict({"type": "direct"})

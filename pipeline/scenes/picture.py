@@ -47,8 +47,6 @@ MOST_SAMPLES: Final = 8
 
 _AHEAD = 3  # windows under way: threads have work while a frame is traced
 
-Plane = npt.NDArray[np.float32]
-
 LightBetween = Callable[[Fabric, Queries], Float64]
 """Turns queries into the light of all bounces after the first, as `light_between`."""
 
@@ -101,7 +99,7 @@ class PicturePart(NamedTuple):
     """A window of a picture, finished."""
 
     window: FilmWindow
-    planes: dict[str, Plane]
+    planes: dict[str, Float32]
     """``rgb`` (H, W, 3); with layers also ``backdrop`` and each of `COMPONENTS`, which sum to it, ``cloth``, the share
     of a pixel that cloth covers, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
     ``fabric``, the number of the cloth in the scene from 1 on."""
@@ -272,7 +270,7 @@ def _gathered(asked: Sequence[Future[Float32]], shape: tuple[int, ...]) -> Float
     return np.concatenate([np.empty(shape, np.float32), *(future.result() for future in asked)])
 
 
-def _seen(frame: SceneFrame) -> dict[str, Plane]:
+def _seen(frame: SceneFrame) -> dict[str, Float32]:
     """Return what each ray meets: depth, normal, and of cloth the place, the footprint and its number."""
     height, width = frame.backdrop.shape[:2]
     channels = {"fabric": 1, "uv": 2, "sigma": 2}
@@ -285,7 +283,7 @@ def _seen(frame: SceneFrame) -> dict[str, Plane]:
     return shaped | {"depth": frame.depth[..., None].astype(np.float32), "normal": frame.normal.astype(np.float32)}
 
 
-def _mean(plane: npt.NDArray[np.generic], side: int) -> Plane:
+def _mean(plane: npt.NDArray[np.generic], side: int) -> Float32:
     """Return the mean over the rays of each pixel."""
     height, width, channels = plane.shape
     rays = plane.reshape(height // side, side, width // side, side, channels)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.footprint_colours import footprint_colours
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.scenes.bounces import check_bounces, later_bounces
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import BOUNCES, Bounces
@@ -17,7 +18,7 @@ from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 
-def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64]:
+def colours(fabric: Fabric, transmitted: bool = False) -> Float64:
     """Return the linear RGB colours of the components in the order of `pipeline.truth.conventions.COMPONENTS`, (4, 3).
 
     Where ends or picks differ in colour, these are the means of their repeats. Light that is `transmitted`, from the
@@ -28,7 +29,7 @@ def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64
     return np.array([*(yarn.specular_rgb for yarn in yarns), *diffuse], dtype=np.float64)
 
 
-def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
+def colours_of(fabric: Fabric, queries: Queries) -> Float64:
     """Return the colours of the components of each query, (N, 4, 3): transmitted light has its own.
 
     Where ends or picks differ in colour, these are mean colours of the footprint's threads
@@ -46,7 +47,7 @@ def shade(
     queries: Queries,
     bounces: Bounces = BOUNCES,
     colours: npt.NDArray[np.floating] | None = None,
-) -> npt.NDArray[np.float64]:
+) -> Float64:
     """Return the patch BSDF in linear RGB, (N, 3), from components with unit colour, (N, 4), and their queries.
 
     With all bounces, light that yarns give to each other is added. Colours, (N, 4, 3), are those of `colours_of` unless
@@ -58,7 +59,7 @@ def shade(
     return rgb if bounces == 1 else rgb + later_bounces(fabric, queries, colours).sum(axis=1)
 
 
-def coloured(components: npt.ArrayLike, colours: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
+def coloured(components: npt.ArrayLike, colours: npt.NDArray[np.floating]) -> Float64:
     """Return the patch BSDF in linear RGB, (N, 3), from components (N, 4) and the colours of each, (N, 4, 3)."""
     return np.asarray(np.einsum("nc,ncx->nx", np.asarray(components, np.float64), colours))
 
@@ -69,7 +70,7 @@ def compose(
     background: npt.ArrayLike = 0.0,
     transparency: npt.ArrayLike = 0.0,
     coverage: npt.ArrayLike = 1.0,
-) -> npt.NDArray[np.float32]:
+) -> Float32:
     """Lay a fabric over a background, in linear RGB (H, W, 3); several fabrics one after the other.
 
     A place shows C (L + T background) + (1 - C) background: C the coverage, T the transparency, L the sum of

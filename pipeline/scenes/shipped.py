@@ -11,12 +11,10 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.scenes import swatch
 from pipeline.scenes.scene import Cloth, Scene
-
-Floats = npt.NDArray[np.float64]
 
 DRAPE_YARNS: Final = 80.0
 """Yarns along a unit of uv of the scene `drape`."""
@@ -74,7 +72,7 @@ def _sphere(mi: Any) -> dict[str, Any]:
     }
 
 
-def drape_surface() -> tuple[Floats, Floats, Floats]:
+def drape_surface() -> tuple[Float64, Float64, Float64]:
     """Return points (R, C, 3), unit normals (R, C, 3) and uv (R, C, 2) of cloth held at one place; z is up.
 
     Every surface of straight lines through one point unrolls: at the distance r from the point it is r c(t), with c a
@@ -215,7 +213,7 @@ def _hem(mi: Any) -> dict[str, Any]:
     }
 
 
-def _waves(mi: Any, cloth: str, x: Floats, y: Floats, z: Floats) -> Any:
+def _waves(mi: Any, cloth: str, x: Float64, y: Float64, z: Float64) -> Any:
     """Return a strip with the waves z(y), swept along x."""
     length, along = developed(np.stack([y, z], axis=-1))
     normal = np.stack([np.zeros_like(y), -along[:, 1], along[:, 0]], axis=-1)[:, None]
@@ -224,7 +222,7 @@ def _waves(mi: Any, cloth: str, x: Floats, y: Floats, z: Floats) -> Any:
     return sheet(mi, cloth, points, np.broadcast_to(normal, points.shape), uv)
 
 
-def sheet(mi: Any, cloth: str, points: Floats, normals: Floats, uv: Floats) -> Any:
+def sheet(mi: Any, cloth: str, points: Float64, normals: Float64, uv: Float64) -> Any:
     """Return the mesh of a grid of points (R, C, 3), two triangles a cell, that wears the cloth of a key.
 
     `normals` (R, C, 3) are unit normals of the front, `uv` (R, C, 2) lengths along the weft and along the warp.
@@ -246,7 +244,7 @@ def sheet(mi: Any, cloth: str, points: Floats, normals: Floats, uv: Floats) -> A
     return mesh
 
 
-def developed(curve: Floats) -> tuple[Floats, Floats]:
+def developed(curve: Float64) -> tuple[Float64, Float64]:
     """Return arc length from the start along a curve of points (n, d), and unit tangents (n, d).
 
     The curve must be finely sampled; tangents are central differences.

@@ -17,6 +17,7 @@ from xml.parsers import expat
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.scenes.scene import PREFIX, Scene
 from weaves.errors import BadInput, one_line
 from weaves.reading import MIB, read_text, refuse_irregular
@@ -161,7 +162,7 @@ def _refuse_numbers(element: Element, where: str) -> None:
             raise BadInput(where, "matrix", of["value"], "must have an inverse")
 
 
-def _numbers(text: str) -> npt.NDArray[np.float64]:
+def _numbers(text: str) -> Float64:
     """Return the numbers of an attribute; none if it holds anything else."""
     try:
         return np.array(text.replace(",", " ").split(), np.float64)

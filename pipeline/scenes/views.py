@@ -18,13 +18,11 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import View, ViewOptions
 from pipeline.scenes.places import unit
-
-Floats = npt.NDArray[np.float64]
 
 HEADING: Final = 37.0
 """Direction in which the cloth slides from frame to frame, as an angle from the weft, in degrees."""
@@ -39,15 +37,15 @@ _SPHERE_FILL = 0.94  # share of the picture's shorter side that the sphere takes
 class _Surface(NamedTuple):
     """Where the rays of a view meet its surface; M rays."""
 
-    hit: npt.NDArray[np.bool_]
+    hit: Mask
     """Rays that do, (H, W); M of them."""
-    distance: Floats
+    distance: Float64
     """Ray parameter of the hits, in lengths of the unnormalised ray, (M,)."""
-    uv: Floats
+    uv: Float64
     """Coordinates in yarn spacings, (M, 2)."""
-    frame: Floats
+    frame: Float64
     """Rows: unit vectors along the weft, along the warp, and the normal, (M, 3, 3)."""
-    spacing: Floats
+    spacing: Float64
     """Length of a yarn spacing in the world, (M,)."""
 
 
@@ -108,7 +106,7 @@ def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuff
 
 
 def _gbuffer(
-    surface: _Surface, rays: Floats, focal: float, light: Floats, slide: float, options: ViewOptions
+    surface: _Surface, rays: Float64, focal: float, light: Float64, slide: float, options: ViewOptions
 ) -> GBuffer:
     """Bring directions and footprints into the local frames; `slide` in yarn spacings."""
     wo = -unit(np.einsum("mij,mj->mi", surface.frame, rays[surface.hit]))
@@ -129,7 +127,7 @@ def _gbuffer(
     return GBuffer(mask, np.flatnonzero(lit), u, v, sigma, sigma, flat, flat, wo[above], *queries)
 
 
-def _footprint(surface: _Surface, rays: Floats, focal: float, options: ViewOptions) -> Floats:
+def _footprint(surface: _Surface, rays: Float64, focal: float, options: ViewOptions) -> Float64:
     """Return the round footprint of every hit pixel, in yarn spacings.
 
     With the hit p = o + t d, moving the ray by e keeps p on the tangent plane when dp = t (e - d (n.e)/(n.d)).
@@ -153,7 +151,7 @@ def _footprint(surface: _Surface, rays: Floats, focal: float, options: ViewOptio
     return np.asarray(np.minimum(options.pixel_sigma * axis, options.largest_sigma))
 
 
-def _rays(width: int, height: int, focal: float) -> Floats:
+def _rays(width: int, height: int, focal: float) -> Float64:
     """Return screen coordinates of the pixel centres over the focal length, x right and y up, (H, W, 3); z is 0."""
     x = (np.arange(width) + 0.5 - 0.5 * width) / focal
     y = (0.5 * height - np.arange(height) - 0.5) / focal
@@ -162,14 +160,14 @@ def _rays(width: int, height: int, focal: float) -> Floats:
     return rays
 
 
-def _turned(position: Floats, along_x: Floats, along_y: Floats, turn: float) -> tuple[Floats, Floats, Floats]:
+def _turned(position: Float64, along_x: Float64, along_y: Float64, turn: float) -> tuple[Float64, Float64, Float64]:
     """Turn coordinates and axes counter-clockwise by `turn` degrees."""
     cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
     uv = position @ np.array([[cosine, -sine], [sine, cosine]])
     return uv, cosine * along_x + sine * along_y, cosine * along_y - sine * along_x
 
 
-def _direction(angles: tuple[float, float]) -> Floats:
+def _direction(angles: tuple[float, float]) -> Float64:
     """Return the unit vector at (angle from z, azimuth from x) in degrees."""
     polar, azimuth = (math.radians(angle) for angle in angles)
     return np.array([math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)])

@@ -10,12 +10,11 @@ from __future__ import annotations
 import itertools
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from pipeline.compiled.arrays import Float32
 from pipeline.models.network import QueryNetwork
 from pipeline.models.options import ComponentLossOptions
 
@@ -29,8 +28,8 @@ SLOPE = 0.01
 class LinearLayer(NamedTuple):
     """A layer for programs without torch: float32 weights (inputs, outputs) and biases (outputs,)."""
 
-    weights: npt.NDArray[np.float32]
-    biases: npt.NDArray[np.float32]
+    weights: Float32
+    biases: Float32
 
 
 def perceptron(inputs: int, hidden: int, layers: int, outputs: int) -> nn.Sequential:

@@ -29,6 +29,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from pipeline.compiled.arrays import Index
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import (
     EncoderDecoder,
@@ -77,7 +78,7 @@ class UnifiedBtfNetwork(EncoderDecoder):
         self._held = tuple(texels)  # kept in use, so that validation finds them
         self._texels = list(texels)
 
-    def encode(self, texels: Texels, chosen: npt.NDArray[np.int64] | None = None) -> Tensor:
+    def encode(self, texels: Texels, chosen: Index | None = None) -> Tensor:
         """Return the latents (rows, columns, latent) of a fabric's texels, from all samples or the `chosen` ones."""
         angles, values = texels.angles, texels.values
         if chosen is not None:

@@ -15,11 +15,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from pipeline.compiled.arrays import Float64
 from pipeline.models.networks.layers import SLOPE, Residual, activate
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.standard_position import SYMMETRIES, Placement, begun_at, moved, placement, standard
@@ -44,7 +44,7 @@ class WovenInputs(NamedTuple):
             self.maps[index], self.parameters[index], Placement(*(part[index] for part in self.placement))
         )
 
-    def begun(self, shares: npt.NDArray[np.float64]) -> WovenInputs:
+    def begun(self, shares: Float64) -> WovenInputs:
         """Return the same cloth, each repeat begun elsewhere: `shares` (F, 2) of it to the left and downwards.
 
         Queries follow exactly, maps to the nearest texel.
