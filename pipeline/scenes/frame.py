@@ -32,19 +32,8 @@ from pipeline.scenes.rays import aovs_of, first_hits, in_sight, off
 from pipeline.scenes.scene import Cloth
 from weaves.errors import BadInput
 
-_AOVS: Final = {
-    "position": 3,
-    "uv": 2,
-    "geo_normal": 3,
-    "sh_normal": 3,
-    "dp_du": 3,
-    "dp_dv": 3,
-    "duv_dx": 2,
-    "duv_dy": 2,
-    "shape_index": 1,
-}
-"""AOVs rendered by Mitsuba, and the number of channels of each."""
-_AOVS_BESIDE: Final = {"position": 3, "geo_normal": 3, "sh_normal": 3, "albedo": 3, "shape_index": 1}
+_AOVS: Final = ("position", "uv", "geo_normal", "sh_normal", "dp_du", "dp_dv", "duv_dx", "duv_dy", "shape_index")
+_AOVS_BESIDE: Final = ("position", "geo_normal", "sh_normal", "albedo", "shape_index")
 LEAST_SIGMA: Final = 1e-6
 """Least standard deviation of a footprint, in yarn spacings."""
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
@@ -56,7 +45,8 @@ class SceneFrame(NamedTuple):
     gbuffers: dict[str, GBuffer]
     """By the cloth's key; a cloth out of sight has no places."""
     backdrop: Float64
-    """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3)."""
+    """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3): there without the
+    cloth's shadows."""
     depth: Float64
     """Distance of what is seen along the camera's axis, in the world's lengths, (H, W); 0 where nothing is."""
     normal: Float64
@@ -76,16 +66,17 @@ def render(
     _refuse_inside(loaded, camera)
     sensor = camera.sensor(loaded.mi, size, window)
     aovs = aovs_of(loaded.mi, loaded.world, sensor, _AOVS)
-    gbuffers = {}
-    shown = np.zeros(aovs["uv"].shape[:2], np.bool_)
+    gbuffers, shown = {}, np.zeros(aovs["uv"].shape[:2], np.bool_)
     for key, (cloth, _) in loaded.cloths.items():
         mask = np.isin(aovs["shape_index"][..., 0], loaded.worn[key])
         gbuffers[key] = _gbuffer(loaded, key, cloth, camera, mask, aovs)
         shown |= mask
-    something = aovs["shape_index"][..., 0] > 0
     forward = camera.to_world[:3, 2] / np.linalg.norm(camera.to_world[:3, 2])
-    depth = np.where(something, (aovs["position"] - camera.to_world[:3, 3]) @ forward, 0.0)
-    return SceneFrame(gbuffers, _backdrop(loaded, camera, sensor, shown), depth, aovs["sh_normal"])
+    away = (aovs["position"] - camera.to_world[:3, 3]) @ forward
+    depth = np.where(aovs["shape_index"][..., 0] > 0, away, 0.0)
+    backdrop = _seen(loaded, loaded.world, camera, sensor, ~shown)
+    backdrop = np.where(shown[..., None], _seen(loaded, loaded.behind, camera, sensor, shown), backdrop)
+    return SceneFrame(gbuffers, backdrop, depth, aovs["sh_normal"])
 
 
 def _gbuffer(loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: Mask, aovs: dict[str, Float64]) -> GBuffer:
@@ -154,15 +145,6 @@ def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
     if touching.any() or (dot(hits.normal, around) > 0.0).all():
         place = tuple(round(float(x), 4) for x in camera.to_world[:3, 3])
         raise BadInput(f"scene {loaded.scene.name}", "camera", place, "inside the cloth; a camera must be outside it")
-
-
-def _backdrop(loaded: Loaded, camera: Camera, sensor: Any, cloth: Mask) -> Float64:
-    """Return the linear RGB of a frame without its cloth, (H, W, 3).
-
-    Where `cloth` (H, W) is seen, it is what lies behind, without the cloth's shadows.
-    """
-    picture = _seen(loaded, loaded.world, camera, sensor, ~cloth)
-    return np.where(cloth[..., None], _seen(loaded, loaded.behind, camera, sensor, cloth), picture)
 
 
 def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: Mask) -> Float64:

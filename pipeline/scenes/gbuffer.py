@@ -9,7 +9,6 @@ places under several lights are M queries, and one light that reaches every plac
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -56,11 +55,6 @@ class GBuffer:
         lit = np.zeros(self.mask.size, np.bool_)
         lit[self.pixel[self.place]] = True
         return lit.reshape(self.mask.shape)
-
-    @property
-    def transmitted(self) -> Mask:
-        """Queries whose light and viewer are on different sides of the cloth, (M,)."""
-        return cast(Mask, self.wi[:, 2] * self.wo[self.place, 2] < 0.0)
 
     def queries(self, repeat: tuple[int, int]) -> Queries:
         """Return the M queries in float32, centres reduced modulo `repeat` (extent in x and y) in float64 first."""

@@ -47,6 +47,9 @@ MOST_SAMPLES: Final = 8
 
 _AHEAD = 3  # windows under way: threads have work while a frame is traced
 
+Plane = Float32
+"""A picture of some channels, (H, W, channels)."""
+
 LightBetween = Callable[[Fabric, Queries], Float64]
 """Turns queries into the light of all bounces after the first, as `light_between`."""
 
@@ -99,7 +102,7 @@ class PicturePart(NamedTuple):
     """A window of a picture, finished."""
 
     window: FilmWindow
-    planes: dict[str, Float32]
+    planes: dict[str, Plane]
     """``rgb`` (H, W, 3); with layers also ``backdrop`` and each of `COMPONENTS`, which sum to it, ``cloth``, the share
     of a pixel that cloth covers, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
     ``fabric``, the number of the cloth in the scene from 1 on."""
@@ -197,7 +200,7 @@ class _UnderWay:
     ) -> None:
         self._answerer, self._pool, self._window, self._frame, self._names = answerer, pool, window, frame, names
         self._fabrics = fabrics
-        queries = {key: gbuffer.queries(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
+        queries = {key: gbuffer.queries(fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
         self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
         self._between = {
@@ -205,7 +208,7 @@ class _UnderWay:
             for key, asked in queries.items()
             if between is not None
         }
-        rims = {key: gbuffer.rims(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
+        rims = {key: gbuffer.rims(fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._coverage = {key: self._ask(answerer.coverage, key, asked, "rim") for key, asked in rims.items()}
 
     def part(self, side: int, layers: bool) -> PicturePart:
@@ -218,14 +221,12 @@ class _UnderWay:
         covered = {key: frame.gbuffers[key].coverage(_gathered(rims, (0,))) for key, rims in self._coverage.items()}
         planes = {"backdrop": frame.backdrop.astype(np.float32)}
         for key, gbuffer in frame.gbuffers.items():
-            dark = np.zeros((len(gbuffer.place), 3))
-            planes["backdrop"] = compose(gbuffer, dark, planes["backdrop"], through[key], covered[key])
+            planes["backdrop"] = compose(gbuffer, 0.0, planes["backdrop"], through[key], covered[key])
         kept = {name: np.arange(4) == index for index, name in enumerate(COMPONENTS)} if layers else {"light": True}
         for name, chosen in kept.items():
             planes[name] = np.zeros(frame.backdrop.shape, np.float32)
             for key, gbuffer in frame.gbuffers.items():
-                own = np.where(chosen, answers[key][:, :4], np.float32(0.0))
-                rgb = coloured(own, colours[key])
+                rgb = coloured(np.where(chosen, answers[key][:, :4], np.float32(0.0)), colours[key])
                 if key in later:
                     rgb += np.where(np.broadcast_to(chosen, 4)[2:, None], later[key], 0.0).sum(axis=1)
                 planes[name] = compose(gbuffer, rgb, planes[name], coverage=covered[key])
@@ -270,7 +271,7 @@ def _gathered(asked: Sequence[Future[Float32]], shape: tuple[int, ...]) -> Float
     return np.concatenate([np.empty(shape, np.float32), *(future.result() for future in asked)])
 
 
-def _seen(frame: SceneFrame) -> dict[str, Float32]:
+def _seen(frame: SceneFrame) -> dict[str, Plane]:
     """Return what each ray meets: depth, normal, and of cloth the place, the footprint and its number."""
     height, width = frame.backdrop.shape[:2]
     channels = {"fabric": 1, "uv": 2, "sigma": 2}
@@ -283,7 +284,7 @@ def _seen(frame: SceneFrame) -> dict[str, Float32]:
     return shaped | {"depth": frame.depth[..., None].astype(np.float32), "normal": frame.normal.astype(np.float32)}
 
 
-def _mean(plane: npt.NDArray[np.generic], side: int) -> Float32:
+def _mean(plane: npt.NDArray[np.generic], side: int) -> Plane:
     """Return the mean over the rays of each pixel."""
     height, width, channels = plane.shape
     rays = plane.reshape(height // side, side, width // side, side, channels)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
 
 _OFF = 2e-5  # float32 knows a position to 6e-8 of its size
+_CHANNELS: Final = {"uv": 2, "duv_dx": 2, "duv_dy": 2, "shape_index": 1}  # of AOVs; all others have 3
 
 
 class FirstHits(NamedTuple):
@@ -47,10 +48,9 @@ def first_hits(mi: Any, world: Any, origin: Float64, direction: Float64) -> Firs
                 found[row] = [hit.t, *hit.sh_frame.n, *hit.dp_du]
     else:
         hit = world.ray_intersect(_rays(mi, origin, direction, np.full(len(origin), np.inf)))
-        planes = [
-            np.asarray(column, np.float64).reshape(-1, len(origin)).T for column in (hit.t, hit.sh_frame.n, hit.dp_du)
-        ]
-        found = np.where(np.asarray(hit.is_valid())[:, None], np.concatenate(planes, axis=1), np.nan)
+        columns = (np.asarray(column, np.float64) for column in (hit.t, hit.sh_frame.n, hit.dp_du))
+        planes = np.concatenate([column.reshape(-1, len(origin)).T for column in columns], axis=1)
+        found = np.where(np.asarray(hit.is_valid())[:, None], planes, np.nan)
     return FirstHits(found[:, 0], found[:, 1:4], found[:, 4:])
 
 
@@ -80,15 +80,12 @@ def _rays(mi: Any, origin: Float64, direction: Float64, distance: Float64) -> An
     return mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d), mi.Float(distance.astype(np.float32)), 0.0, [])
 
 
-def aovs_of(mi: Any, world: Any, sensor: Any, channels: Mapping[str, int]) -> dict[str, Float64]:
-    """Render AOVs by name, each (H, W, its `channels`), with one ray a pixel, 0 where it hits nothing.
-
-    The camera's filter is a box.
-    """
-    integrator = mi.load_dict({"type": "aov", "aovs": ",".join(f"{name}:{name}" for name in channels)})
+def aovs_of(mi: Any, world: Any, sensor: Any, names: Sequence[str]) -> dict[str, Float64]:
+    """Render AOVs by name, each (H, W, channels), with one ray a pixel and a box filter; 0 where it hits nothing."""
+    integrator = mi.load_dict({"type": "aov", "aovs": ",".join(f"{name}:{name}" for name in names)})
     planes = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)
-    ends = np.cumsum(list(channels.values()))[:-1]
-    return dict(zip(channels, np.split(planes, ends, axis=-1), strict=True))
+    ends = np.cumsum([_CHANNELS.get(name, 3) for name in names])[:-1]
+    return dict(zip(names, np.split(planes, ends, axis=-1), strict=True))
 
 
 def shape_numbers(mi: Any, shapes: Sequence[Any]) -> list[int]:

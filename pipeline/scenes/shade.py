@@ -79,18 +79,8 @@ def compose(
     once, opacity is C (1 - gaps), and flat cloth has C = 1. The background is `SceneFrame.backdrop`: cloth behind
     cloth is not seen through gaps, nor past a silhouette.
 
-    Parameters
-    ----------
-    gbuffer : GBuffer
-        What the fabric's pixels show.
-    rgb : array_like (M, 3)
-        Patch BSDF of its M queries.
-    background : array_like
-        What is seen beside the fabric and through it: a number, or a picture (H, W, 3).
-    transparency : array_like
-        Share of the background that comes through the fabric's gaps and yarns: a number or (N,).
-    coverage : array_like
-        Share of the view rays that do not leave the cloth again: a number or (N,).
+    `rgb` (M, 3) is the patch BSDF of the M queries; the background a number or a picture (H, W, 3); transparency and
+    coverage of the N places are numbers or (N,).
     """
     light = np.zeros((len(gbuffer.pixel), 3))
     np.add.at(light, gbuffer.place, gbuffer.irradiance * np.asarray(rgb))

@@ -86,13 +86,7 @@ class Swatch(NamedTuple):
         return SceneFrame({"swatch": gbuffer}, *planes)
 
     def _gbuffer(
-        self,
-        mask: Mask,
-        pixels: Index,
-        position: Float64,
-        ray: Float64,
-        right: Float64,
-        down: Float64,
+        self, mask: Mask, pixels: Index, position: Float64, ray: Float64, right: Float64, down: Float64
     ) -> tuple[GBuffer, Float64]:
         """Return the G-buffer and the normals of the places of the cloth."""
         y = position[:, 1]
