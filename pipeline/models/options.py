@@ -84,15 +84,12 @@ class Options(Design):
         return ()
 
     @property
-    def kinds(self) -> frozenset[str]:
-        """Kinds of queries that it evaluates, of `behind`, `stretch` and `curvature` (`QueryOptions`)."""
-        return frozenset()
-
-    @property
     def extra_rows(self) -> tuple[ExtraRows, ...]:
         """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
         return ()
 
+    kinds: ClassVar[frozenset[str]] = frozenset()
+    """Kinds of queries that it evaluates, of `behind`, `stretch` and `curvature` (`QueryOptions`)."""
     turns: ClassVar[bool] = False
     """True if it evaluates a viewer behind the cloth as one in front of the cloth's back, which is a fabric too."""
 

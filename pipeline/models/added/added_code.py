@@ -122,7 +122,7 @@ class AddedMethod(AddedCode, Options):
         return self.has_one_fabric
 
     @property
-    def kinds(self) -> frozenset[str]:
+    def kinds(self) -> frozenset[str]:  # type: ignore[override]
         """Kinds of queries that it evaluates."""
         return frozenset(self.answers)
 

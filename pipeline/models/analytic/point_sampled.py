@@ -33,6 +33,7 @@ class PointSampledOptions(AnalyticOptions):
 
     parameter: ClassVar[str] = "counts"
     seconds: ClassVar[tuple[float, float]] = (0.0, 4e-7)
+    kinds: ClassVar[frozenset[str]] = frozenset({"behind", "stretch", "curvature"})
 
     model: Literal["point_sampled"] = "point_sampled"
     counts: list[Count] = Field(default=[1, 2, 3, 4, 8, 16, 64], min_length=1, max_length=16)
@@ -48,11 +49,6 @@ class PointSampledOptions(AnalyticOptions):
     @classmethod
     def _usual_walls(cls, options: Any) -> Any:
         return with_usual_walls(options)
-
-    @property
-    def kinds(self) -> frozenset[str]:
-        """All."""
-        return frozenset({"behind", "stretch", "curvature"})
 
     def methods(self) -> Sequence[Method]:
         """Return one method for each number of points."""

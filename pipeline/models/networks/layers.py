@@ -102,8 +102,8 @@ def to_components(output: Tensor, log_k: float) -> Tensor:
 
 
 def component_error(output: Tensor, target: Tensor, options: ComponentLossOptions) -> Tensor:
-    """Return the weighted mean squared error of outputs (..., 4), both in network space."""
-    squared = (output - target).square()
+    """Return the weighted mean squared error of outputs (..., 4), in network space, from target components (..., 4)."""
+    squared = (output - to_network(target, options.log_k)).square()
     return (
         options.specular_weight * squared[..., SPECULAR].mean() + options.diffuse_weight * squared[..., DIFFUSE].mean()
     )

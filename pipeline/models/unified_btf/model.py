@@ -31,14 +31,7 @@ from torch.nn import functional
 
 from pipeline.compiled.arrays import Index
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import (
-    EncoderDecoder,
-    component_error,
-    perceptron,
-    start_at_mean,
-    to_components,
-    to_network,
-)
+from pipeline.models.networks.layers import EncoderDecoder, component_error, perceptron, start_at_mean, to_components
 from pipeline.models.networks.texture import level_shapes, read_pyramid
 from pipeline.models.unified_btf import BtfOptions
 from pipeline.models.unified_btf.set_encoder import (
@@ -127,8 +120,7 @@ class UnifiedBtfNetwork(EncoderDecoder):
             u, v = batch.u[position] / ends, batch.v[position] / picks
             latents.append(self.read(pyramid, u, v, batch.sigma[position]))
         output = self.decode(torch.cat(latents), batch.wi.flatten(0, 1), batch.wo.flatten(0, 1))
-        target = to_network(batch.target.flatten(0, 1), options.log_k)
-        return component_error(output, target, options)
+        return component_error(output, batch.target.flatten(0, 1), options)
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean target, the last weights small, and the scale of samples to that of targets."""
