@@ -62,13 +62,10 @@ class Domain(Frozen):
     def of(cls, about: Mapping[str, Any], fabrics: Sequence[Fabric]) -> Domain:
         """Return the domain of a data set, from its manifest's `about` and the fabrics trained on."""
         truth = TruthOptions.model_validate(about.get("truth", {})).model_dump(mode="json")
-        numbers = [_numbers(fabric) for fabric in fabrics]
         return cls(
             queries=QueryOptions.model_validate(about.get("queries", {})),
             physics={name: truth[name] for name in PHYSICS},
-            yarns={
-                name: (min(min(n[name]) for n in numbers), max(max(n[name]) for n in numbers)) for name in numbers[0]
-            },
+            yarns=_ranges([_numbers(fabric) for fabric in fabrics]),
         )
 
     @property
@@ -160,9 +157,12 @@ def domain_of(cards: Sequence[Mapping[str, Any]]) -> Domain | None:
     domains = [Domain.model_validate(card["domain"]) for card in cards if "domain" in card]
     if not domains:
         return None
-    ranges = {name: [domain.yarns[name] for domain in domains] for name in domains[0].yarns}
-    yarns = {name: (min(low for low, _ in own), max(high for _, high in own)) for name, own in ranges.items()}
-    return domains[0].model_copy(update={"yarns": yarns})
+    return domains[0].model_copy(update={"yarns": _ranges([domain.yarns for domain in domains])})
+
+
+def _ranges(parts: Sequence[Mapping[str, Sequence[float]]]) -> dict[str, tuple[float, float]]:
+    """Return the range of each parameter over all parts."""
+    return {name: (min(min(p[name]) for p in parts), max(max(p[name]) for p in parts)) for name in parts[0]}
 
 
 def _size(queries: Queries) -> Float64:

@@ -113,12 +113,7 @@ class Fallback(Around):
         own = getattr(self.method, "transparency", None)
         if own is None:
             return fallback_rows(fabric, looks, seed)[:, 4]
-        return row_by_row(
-            looks,
-            looks.wo[:, 2] < 0.0,
-            lambda part: own(fabric.back(), self._nearest(part).turned(), seed),
-            lambda part: own(fabric, self._nearest(part), seed),
-        )
+        return self._in_front(fabric, looks, lambda side, part: own(side, part, seed))
 
     def coverage(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the share of view rays that do not leave curved cloth again, (N,); wo.z may have any sign.
@@ -159,21 +154,21 @@ class Fallback(Around):
         return result
 
     def _answers(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
-        """Answer queries by the method, in the nearest form that it knows."""
+        """Answer queries by the method; footprints that see the average are no larger than trained on."""
+
+        def answer(side: Fabric, part: Queries) -> Float32:
+            return self.method.predict(side, self._domain.within(side, part) if self._domain else part, seed)
+
+        return self._in_front(fabric, queries, answer)
+
+    def _in_front(self, fabric: Fabric, queries: Queries, answer: Callable[[Fabric, Queries], Float32]) -> Float32:
+        """Answer queries in the nearest form, those of viewers behind the cloth about its back."""
         return row_by_row(
             queries,
             queries.wo[:, 2] < 0.0,
-            lambda part: self._in_front(fabric.back(), part.turned(), seed),
-            lambda part: self._in_front(fabric, part, seed),
+            lambda part: answer(fabric.back(), self._nearest(part.turned())),
+            lambda part: answer(fabric, self._nearest(part)),
         )
-
-    def _in_front(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
-        """Answer queries of viewers in front of the cloth."""
-        nearest = self._nearest(queries)
-        if self._domain is not None:
-            # Footprints that see the average are no larger than trained on.
-            nearest = self._domain.within(fabric, nearest)
-        return self.method.predict(fabric, nearest, seed)
 
     def _nearest(self, queries: Queries) -> Queries:
         """Return queries in the nearest form that the method knows."""

@@ -132,21 +132,8 @@ class PatchBSDF:
     def sample(self, looks: Queries, random: npt.ArrayLike, lobes: Lobes | None = None, seed: int = 0) -> Sample:
         """Draw one direction for each of N looks, whose own wi does not matter.
 
-        Parameters
-        ----------
-        looks : Queries
-            N footprints with their viewers.
-        random : array_like (N, 3)
-            Numbers in [0, 1).
-        lobes : Lobes, optional
-            What `lobes` returned for these looks.
-        seed : int
-            Seed of the method.
-
-        Raises
-        ------
-        BadInput
-            If `random` has another shape, or numbers outside [0, 1).
+        `random` (N, 3) are numbers in [0, 1), `lobes` what the function of that name returned for these looks, `seed`
+        that of the method. BadInput if `random` has another shape, or numbers outside [0, 1).
         """
         wi, pdf, straight = self.draw(looks, random, lobes)
         queries = looks._replace(wi=wi)
@@ -195,9 +182,8 @@ class PatchBSDF:
         if lobes is None:
             return self.lobes(looks)
         if len(lobes.rest) != len(looks.u):
-            raise BadInput(
-                "PatchBSDF", "lobes", f"{len(lobes.rest)} rows", f"must be those of the {len(looks.u)} looks"
-            )
+            allowed = f"must be those of the {len(looks.u)} looks"
+            raise BadInput("PatchBSDF", "lobes", f"{len(lobes.rest)} rows", allowed)
         return lobes
 
 

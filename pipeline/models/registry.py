@@ -101,10 +101,8 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
     except (BadInput, WorkFailed):
         raise
     except (RuntimeError, KeyError, ValueError) as error:
-        where = ", ".join(str(folder) for folder in folders)
-        raise BadInput(
-            where, "", "not a whole model", "card and weights do not fit together: train it again"
-        ) from error
+        where, allowed = ", ".join(map(str, folders)), "card and weights do not fit together: train it again"
+        raise BadInput(where, "", "not a whole model", allowed) from error
 
 
 def load_model(folder: Path) -> list[Method]:

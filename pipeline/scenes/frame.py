@@ -103,11 +103,8 @@ def _gbuffer(loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: Mask,
             curvature[front] = least_curvature(loaded, seen, straight[front], curvature[front])
         rim = front[rims_of(loaded, seen, straight[front], curvature[front])]
     (u, v), (sigma_major, sigma_minor) = places.uv.T, sigma.T
-    angle = np.arctan2(axes[:, 1, 0], axes[:, 0, 0])
-    lit = _lit(loaded, places)
-    return GBuffer(
-        mask, pixel, u, v, sigma_major, sigma_minor, angle, curvature, wo, *lit, rim=rim, rim_wo=straight[rim]
-    )
+    angle, lit = np.arctan2(axes[:, 1, 0], axes[:, 0, 0]), _lit(loaded, places)
+    return GBuffer(mask, pixel, u, v, sigma_major, sigma_minor, angle, curvature, wo, *lit, rim, straight[rim])
 
 
 def _lit(loaded: Loaded, places: Places) -> tuple[Index, Float64, Float64]:
@@ -155,9 +152,7 @@ def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: Mask)
     picture = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)[..., :3].copy()
     aovs = aovs_of(mi, world, sensor, _AOVS_BESIDE)
     mask = wanted & (aovs["shape_index"][..., 0] > 0)
-    position, geometric, normal, albedo = (
-        aovs[name][mask] for name in ("position", "geo_normal", "sh_normal", "albedo")
-    )
+    position, geometric, normal, albedo = (aovs[name][mask] for name in _AOVS_BESIDE[:4])
     viewer = camera.to_viewer(position)
     geometric, normal = (unit(n * np.where(dot(n, viewer) < 0.0, -1.0, 1.0)[:, None]) for n in (geometric, normal))
     total, start = np.zeros_like(position), position + off(position)[:, None] * geometric

@@ -75,15 +75,14 @@ class Camera:
         if window is not None:
             film |= {"crop_offset_x": window.left, "crop_offset_y": window.top}
             film |= {"crop_width": window.width, "crop_height": window.height}
-        return mi.load_dict(
-            {
-                "type": "orthographic" if self.parallel else "perspective",
-                **self.settings,
-                "to_world": mi.ScalarTransform4f(self.to_world),
-                "film": {**film, "rfilter": {"type": "box"}},
-                "sampler": {"type": "stratified", "sample_count": 1, "jitter": False},
-            }
-        )
+        sensor = {
+            "type": "orthographic" if self.parallel else "perspective",
+            **self.settings,
+            "to_world": mi.ScalarTransform4f(self.to_world),
+            "film": {**film, "rfilter": {"type": "box"}},
+            "sampler": {"type": "stratified", "sample_count": 1, "jitter": False},
+        }
+        return mi.load_dict(sensor)
 
 
 @dataclass(frozen=True)

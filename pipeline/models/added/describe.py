@@ -91,12 +91,9 @@ def _stated_by_function(function: Callable[..., Any], text: str) -> dict[str, An
     if not definition:
         raise BadInput(ADD, "", text, "lacks a docstring, which defines the metric on the page")
     stated = {key: getattr(function, key, default) for key, default in _OF_METRICS.items()}
-    name = function.__name__
-    words = name.replace("_", " ")
-    return {**stated, "title": stated["title"] or words, "stated": str(getattr(function, "version", 1))} | {
-        "name": name,
-        "definition": definition,
-    }
+    name, version = function.__name__, str(getattr(function, "version", 1))
+    stated["title"] = stated["title"] or name.replace("_", " ")
+    return {**stated, "stated": version, "name": name, "definition": definition}
 
 
 def _check_options(make: Callable[..., Any], own: Mapping[str, Any], text: str) -> None:

@@ -47,10 +47,8 @@ def perceptron(inputs: int, hidden: int, layers: int, outputs: int) -> nn.Sequen
 
 def layers_of(network: nn.Sequential) -> list[LinearLayer]:
     """Return copies of the layers of a perceptron."""
-    linear = (layer for layer in network if isinstance(layer, nn.Linear))
-    return [
-        LinearLayer(layer.weight.t().numpy(force=True).copy(), layer.bias.numpy(force=True).copy()) for layer in linear
-    ]
+    linear = [(layer.weight.t(), layer.bias) for layer in network if isinstance(layer, nn.Linear)]
+    return [LinearLayer(*(values.numpy(force=True).copy() for values in layer)) for layer in linear]
 
 
 def activate(x: Tensor) -> Tensor:
@@ -104,9 +102,8 @@ def to_components(output: Tensor, log_k: float) -> Tensor:
 def component_error(output: Tensor, target: Tensor, options: ComponentLossOptions) -> Tensor:
     """Return the weighted mean squared error of outputs (..., 4), in network space, from target components (..., 4)."""
     squared = (output - to_network(target, options.log_k)).square()
-    return (
-        options.specular_weight * squared[..., SPECULAR].mean() + options.diffuse_weight * squared[..., DIFFUSE].mean()
-    )
+    specular, diffuse = squared[..., SPECULAR].mean(), squared[..., DIFFUSE].mean()
+    return options.specular_weight * specular + options.diffuse_weight * diffuse
 
 
 def start_at_mean(last: nn.Linear, target: Tensor, log_k: float) -> None:

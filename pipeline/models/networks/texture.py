@@ -71,10 +71,8 @@ def blurred(texture: Tensor, deviation: float) -> Tensor:
         return texture
     rows, columns = texture.shape[-2:]
     spectrum = torch.fft.rfft2(texture)
-    frequency = (
-        torch.fft.fftfreq(rows, device=texture.device).square().unsqueeze(-1)
-        + torch.fft.rfftfreq(columns, device=texture.device).square()
-    )
+    along = torch.fft.fftfreq(rows, device=texture.device).square().unsqueeze(-1)
+    frequency = along + torch.fft.rfftfreq(columns, device=texture.device).square()
     decay = torch.exp(-2.0 * math.pi**2 * deviation**2 * frequency)
     smooth: Tensor = torch.fft.irfft2(spectrum * decay, s=(rows, columns))
     return smooth

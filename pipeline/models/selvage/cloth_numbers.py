@@ -54,12 +54,10 @@ def probes(
     shape = QueryOptions(behind=float(behind), stretch=8.0)
     if curved:
         shape = QueryOptions(behind=float(behind), stretch=4.0, curvature=(0.01, 0.5))
-    parts = [
-        draw_queries(
-            shape.model_copy(update={"directions": name}), fabric.weave.repeat, seed + index, 0, rows // len(directions)
-        )
-        for index, name in enumerate(directions)
-    ]
+    parts, each = [], rows // len(directions)
+    for index, name in enumerate(directions):
+        options = shape.model_copy(update={"directions": name})
+        parts.append(draw_queries(options, fabric.weave.repeat, seed + index, 0, each))
     return Queries(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 

@@ -40,19 +40,16 @@ class WovenInputs(NamedTuple):
 
     def take(self, index: Tensor) -> WovenInputs:
         """Return the fabrics at `index`."""
-        return WovenInputs(
-            self.maps[index], self.parameters[index], Placement(*(part[index] for part in self.placement))
-        )
+        placement = Placement(*(part[index] for part in self.placement))
+        return WovenInputs(self.maps[index], self.parameters[index], placement)
 
     def begun(self, shares: Float64) -> WovenInputs:
         """Return the same cloth, each repeat begun elsewhere: `shares` (F, 2) of it to the left and downwards.
 
         Queries follow exactly, maps to the nearest texel.
         """
-        texels = np.rint(shares * self.maps.shape[-1]).astype(np.int64).tolist()
-        maps = [
-            torch.roll(one, (down, right), dims=(1, 2)) for one, (right, down) in zip(self.maps, texels, strict=True)
-        ]
+        moves = zip(self.maps, np.rint(shares * self.maps.shape[-1]).astype(np.int64).tolist(), strict=True)
+        maps = [torch.roll(own, (down, right), dims=(1, 2)) for own, (right, down) in moves]
         start = self.placement.start - torch.from_numpy(shares.astype(np.float32)).to(self.maps.device)
         return WovenInputs(torch.stack(maps), self.parameters, self.placement._replace(start=start))
 
