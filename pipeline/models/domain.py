@@ -5,8 +5,8 @@ The domain is on the model card. It limits two uses of a model.
 - A file of queries (`twillight evaluate`): kinds and yarns that were not trained on are refused. Within a kind the
   model is evaluated beyond the trained ranges too.
 - A scene (`pipeline.models.fallback`): queries beyond the trained ranges are `out_of_domain`. Footprints may exceed the
-  range by `_SLACK` of its logarithm, directions may be `ANGLE` degrees steeper, curvature may not exceed it. A
-  footprint of `AVERAGED` repeats sees the average of the repeat; if training reached that size, larger footprints are
+  range by `_SLACK` of its logarithm, directions may be `_ANGLE` degrees steeper, curvature may not exceed it. A
+  footprint of `_AVERAGED` repeats sees the average of the repeat; if training reached that size, larger footprints are
   replaced by the largest one trained on (`within`). A Gaussian of standard deviation s leaves exp(-2 pi^2 s^2) of what
   varies with period 1: at .5 less than a hundredth.
 """
@@ -34,12 +34,8 @@ PHYSICS: Final = ("footprint", "frame", "normaliser", "parallax", "shadows", "wa
 
 _YARN: Final = ("roughness", "bend", "twist", "relief", "width", "blend")
 _SLACK: Final = 0.02  # of a range, that a fabric or a footprint may lie outside
-
-ANGLE: Final = 1.0
-"""Degrees by which a direction may be steeper than the steepest trained on."""
-
-AVERAGED: Final = 0.5
-"""Standard deviation of a footprint that sees the average of the repeat, in repeats."""
+_ANGLE: Final = 1.0  # degrees by which a direction may be steeper than the steepest trained on
+_AVERAGED: Final = 0.5  # standard deviation of a footprint that sees the average of the repeat, in repeats
 
 
 class Domain(Frozen):
@@ -96,8 +92,8 @@ class Domain(Frozen):
             result |= queries.sigma > options.stretch * (1.0 + _SLACK) * queries.sigma_minor
         if options.curvature[1] > 0.0:
             result |= queries.curvature > options.curvature[1]
-        if options.max_angle + ANGLE < 90.0:
-            steepest = math.cos(math.radians(options.max_angle + ANGLE))
+        if options.max_angle + _ANGLE < 90.0:
+            steepest = math.cos(math.radians(options.max_angle + _ANGLE))
             result |= np.minimum(np.abs(queries.wi[:, 2]), np.abs(queries.wo[:, 2])) < steepest
         return np.asarray(result)
 
@@ -113,7 +109,7 @@ class Domain(Frozen):
         """Return which footprints are larger than those trained on and see the average of the repeat, (N,)."""
         size, high = _size(queries), self.queries.sigma[1]
         narrow = high * queries.sigma_minor / size
-        return np.asarray((size > high) & (narrow >= AVERAGED * max(fabric.weave.repeat)))
+        return np.asarray((size > high) & (narrow >= _AVERAGED * max(fabric.weave.repeat)))
 
     def refuse(self, queries: Queries, model: str) -> None:
         """Refuse queries of a kind that the model never saw: a BadInput that names the first row and column."""

@@ -17,9 +17,6 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=6
 Gaussian = Annotated[Literal["gaussian"], Field(description="Kernel it knows; must be the kernel of the truth.")]
 """The footprint of a method that knows one kernel."""
 
-LogK = Annotated[float, Field(gt=0, le=1e4, description="k of the specular space g(x) = ln(k x + 1).")]
-"""Strength of the logarithmic compression of highlights in the loss (`pipeline.models.networks.layers`)."""
-
 Weight = Annotated[float, Field(ge=0, le=1e4)]
 """A factor of one term of a loss."""
 
@@ -137,7 +134,8 @@ class Options(Design):
 class ComponentLossOptions(Options):
     """Options of a network that learns the four components in log space (`pipeline.models.networks.layers`)."""
 
-    log_k: LogK = 3.0
+    log_k: float = Field(default=3.0, gt=0, le=1e4)
+    """k of the specular space g(x) = ln(k x + 1), which compresses highlights in the loss."""
     specular_weight: Weight = 1.0
     """Weight of the specular squared error, taken in log space."""
     diffuse_weight: Weight = 2.0

@@ -20,11 +20,9 @@ from pipeline.scenes.scene import Cloth, Scene
 DRAPE_YARNS: Final = 80.0
 """Yarns along a unit of uv of the scene `drape`."""
 
-HEM_YARNS: Final = 100.0
-"""Yarns along a unit of uv of the scene `hem`."""
-
 _SIZE: Final = (256, 192)
-_HEM_FOCAL, _HEM_RADIUS = 1200.0, 8.0 / HEM_YARNS  # in pixels; in the scene's lengths
+_HEM_YARNS: Final = 100.0  # along a unit of uv of the scene `hem`
+_HEM_FOCAL, _HEM_RADIUS = 1200.0, 8.0 / _HEM_YARNS  # in pixels; in the scene's lengths
 _HEMS: Final = (  # pixels of a yarn; in the picture, from its centre: left and right, height of the axis, tilt
     (40.0, -300, -110, -190, 5.0),
     (40.0 / 3.0, -95, 25, -60, -8.0),
@@ -188,7 +186,7 @@ def _hem(mi: Any) -> dict[str, Any]:
     turn = np.linspace(math.pi, 0.0, 513)
     lines = {}
     for number, (pixels, left, right, height, tilt) in enumerate(_HEMS):
-        away = _HEM_FOCAL / (pixels * HEM_YARNS)
+        away = _HEM_FOCAL / (pixels * _HEM_YARNS)
         pixel, hang = away / _HEM_FOCAL, 0.5 * away
         profile = _HEM_RADIUS * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
         profile = np.concatenate([[[-_HEM_RADIUS, -hang]], profile, [[_HEM_RADIUS, -hang]]])
@@ -310,7 +308,7 @@ _SCENES: Final = (
         runner=Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
         napkin=Cloth(fabric="denim", yarns=(36.0, math.dist(_NEAR, _FAR) / _SPACING)),
     ),
-    _scene(_hem, (0.0001, 0.00005, 0.0), denim=Cloth(yarns=(HEM_YARNS, HEM_YARNS), turn=24.0)),
+    _scene(_hem, (0.0001, 0.00005, 0.0), denim=Cloth(yarns=(_HEM_YARNS, _HEM_YARNS), turn=24.0)),
     _scene(_swatch, (0.001, 0.0005, 0.0), swatch=Cloth(fabric="herringbone", yarns=(48.0, 48.0))),
 )
 

@@ -12,8 +12,7 @@ from pipeline.truth.options import Walls
 if TYPE_CHECKING:
     from pipeline.models.selvage.model import Selvage
 
-WishedError = Annotated[float, Field(gt=0, lt=1)]
-"""A relative error of the colour."""
+_WishedError = Annotated[float, Field(gt=0, lt=1)]
 
 
 class SelvageOptions(AnalyticOptions):
@@ -28,7 +27,7 @@ class SelvageOptions(AnalyticOptions):
     prepare_seconds: ClassVar[float] = 4.0
 
     model: Literal["selvage"] = "selvage"
-    errors: list[WishedError] = Field(default=[0.1, 0.05, 0.02, 0.01], min_length=1, max_length=16)
+    errors: list[_WishedError] = Field(default=[0.1, 0.05, 0.02, 0.01], min_length=1, max_length=16)
     """Wished relative errors of a grey cloth's colour; each is a row of the tables."""
     parallax: Literal[True] = True
     """Footprints are patches of view rays."""
