@@ -1,11 +1,9 @@
 """A method for all queries of real scenes, those outside its domain included.
 
 A query is first brought into the nearest form that the method knows: an ellipse becomes the round footprint of equal
-area (or of its major axis, which blurs and never aliases), and curvature is left out. Light from behind, yarns unlike
-those of the training (open cloth after solid cloth alone), and footprints and directions beyond its ranges have no such
-form: they are out of the method's domain (`pipeline.models.domain`), and the fallback answers them. The share of such
-queries is part of every result. A method that `turns` answers a viewer behind the
-cloth as one in front of the cloth's back.
+area (or of its major axis, which blurs and never aliases), and curvature is left out. The fallback answers what has no
+such form: light from behind, and all that is out of the method's domain (`pipeline.models.domain`). A method that
+`turns` answers a viewer behind the cloth as one in front of the cloth's back.
 
 The fallback is a node table of the ground truth with other nodes (`_NODES` is odd, the truth's numbers are even) and
 other azimuths: its error has nothing in common with that of the truth, and is measured like any method's error. It has
@@ -85,8 +83,7 @@ class Fallback(Around):
         super().__init__(method)
         self._footprint = footprint
         self._domain: Domain | None = getattr(method, "domain", None)
-        # A method may know a kind and not be trained on it: a scene's own recipe leaves out kinds that never occur
-        # there.
+        # A method may know a kind and not be trained on it: a scene's own recipe leaves out what never occurs there.
         self._kinds = frozenset(kinds)
         self._turns = bool(getattr(method, "turns", False))
         if self._domain:

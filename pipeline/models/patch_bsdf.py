@@ -61,23 +61,10 @@ class Drawn(NamedTuple):
 class PatchBSDF:
     """A cloth's patch BSDF: values, and directions drawn with their density.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth, with its colours.
-    method : str, Fallback or TruthAnswers
-        Method that evaluates: a name as on the command line (`pipeline.models.named`), a fallback, or the truth.
-    points : int
-        Points of the footprint that have a lobe each, at least 1; 1 has its exact lobe.
-    widening : float
-        Factor on the widening of a lobe by the spread of the tangents, >= 0.
-    bounces : 1 or "all"
-        All adds the light that yarns give to each other (`pipeline.scenes.bounces`).
-
-    Raises
-    ------
-    BadInput
-        If there is no such method, or a number is out of its range.
+    `method` evaluates: a name as on the command line (`pipeline.models.named`), a fallback, or the truth. `points` of
+    the footprint have a lobe each, at least 1; 1 has its exact lobe. `widening`, >= 0, is a factor on the widening of a
+    lobe by the spread of the tangents. All `bounces` add the light that yarns give to each other
+    (`pipeline.scenes.bounces`). BadInput if there is no such method, or a number is out of its range.
 
     Examples
     --------
@@ -155,10 +142,7 @@ class PatchBSDF:
         return Drawn(wi, pdf, straight)
 
     def pdf(self, queries: Queries, lobes: Lobes | None = None) -> Float32:
-        """Return the density of each query's wi, (N,), 1/sr.
-
-        Its integral over the sphere is 1 minus the probability `straight`.
-        """
+        """Return the density of each query's wi, (N,), 1/sr; its integral is 1 minus the probability `straight`."""
         found, result = self._known(queries, lobes), np.empty(len(queries.u), np.float32)
         wi, wo = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo))
         density_rows(found, wi, wo, result)

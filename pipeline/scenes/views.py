@@ -78,7 +78,7 @@ def _sphere(width: int, height: int, shift: float, options: ViewOptions) -> GBuf
     uv, weft, warp = _turned(np.stack([x, y], -1) / spacing, along_x, along_y, options.turn)
     surface = _Surface(hit, distance, uv, np.stack([unit(weft), unit(warp), normal], axis=1), spacing * scale)
     light = _direction(options.sphere_light)
-    return _gbuffer(surface, rays, focal, light, shift / _SPHERE_PIXELS, options)
+    return _gbuffer(surface, rays, light, shift / _SPHERE_PIXELS, options)
 
 
 def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuffer:
@@ -102,12 +102,10 @@ def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuff
     uv, weft, warp = _turned(position[:, :2], east, north, options.turn)
     surface = _Surface(hit, distance, uv, np.stack([weft, warp, up], axis=1), ones)
     light = _direction(_PLANE_LIGHT)
-    return _gbuffer(surface, rays, focal, light, shift / options.plane_pixels_per_yarn, options)
+    return _gbuffer(surface, rays, light, shift / options.plane_pixels_per_yarn, options)
 
 
-def _gbuffer(
-    surface: _Surface, rays: Float64, focal: float, light: Float64, slide: float, options: ViewOptions
-) -> GBuffer:
+def _gbuffer(surface: _Surface, rays: Float64, light: Float64, slide: float, options: ViewOptions) -> GBuffer:
     """Bring directions and footprints into the local frames; `slide` in yarn spacings."""
     wo = -unit(np.einsum("mij,mj->mi", surface.frame, rays[surface.hit]))
     wi = surface.frame @ light
@@ -119,24 +117,19 @@ def _gbuffer(
     # The cloth slides along `HEADING`: the same pixel then shows a patch further back.
     heading = math.radians(HEADING)
     uv = surface.uv - slide * np.array([math.cos(heading), math.sin(heading)])
-    sigma = _footprint(surface, rays, focal, options)[above]
-    flat, places = np.zeros_like(sigma), np.arange(len(sigma))
-    irradiance = np.full((len(sigma), 3), options.irradiance)
-    u, v = uv[above].T
-    queries = places, wi[above], irradiance
+    sigma = _footprint(surface, rays, options)[above]
+    flat, (u, v) = np.zeros_like(sigma), uv[above].T
+    queries = np.arange(len(sigma)), wi[above], np.full((len(sigma), 3), options.irradiance)
     return GBuffer(mask, np.flatnonzero(lit), u, v, sigma, sigma, flat, flat, wo[above], *queries)
 
 
-def _footprint(surface: _Surface, rays: Float64, focal: float, options: ViewOptions) -> Float64:
+def _footprint(surface: _Surface, rays: Float64, options: ViewOptions) -> Float64:
     """Return the round footprint of every hit pixel, in yarn spacings.
 
     With the hit p = o + t d, moving the ray by e keeps p on the tangent plane when dp = t (e - d (n.e)/(n.d)).
     """
-    step_right, step_up = (rays[0, 1] - rays[0, 0]), (rays[0, 0] - rays[1, 0])
-    ray = rays[surface.hit]
-    normal = surface.frame[:, 2]
-    columns = []
-    for step in (step_right, step_up):
+    ray, normal, columns = rays[surface.hit], surface.frame[:, 2], []
+    for step in (rays[0, 1] - rays[0, 0], rays[0, 0] - rays[1, 0]):  # to the right, and up
         slope = (normal @ step) / np.einsum("mi,mi->m", normal, ray)
         moved = surface.distance[:, None] * (step - ray * slope[:, None])
         columns.append(np.einsum("mij,mj->mi", surface.frame[:, :2], moved) / surface.spacing[:, None])
@@ -155,9 +148,7 @@ def _rays(width: int, height: int, focal: float) -> Float64:
     """Return screen coordinates of the pixel centres over the focal length, x right and y up, (H, W, 3); z is 0."""
     x = (np.arange(width) + 0.5 - 0.5 * width) / focal
     y = (0.5 * height - np.arange(height) - 0.5) / focal
-    rays = np.zeros((height, width, 3))
-    rays[..., 0], rays[..., 1] = x[None, :], y[:, None]
-    return rays
+    return np.stack(np.broadcast_arrays(x[None, :], y[:, None], 0.0), axis=-1)
 
 
 def _turned(position: Float64, along_x: Float64, along_y: Float64, turn: float) -> tuple[Float64, Float64, Float64]:
