@@ -147,17 +147,14 @@ def picture(
     `pipeline.scenes.frame.render`.
     """
     fine, whole = sharpened(loaded, side), (side * size[0], side * size[1])
-    yield from answered(
-        lambda window: render(fine, frame, whole, FilmWindow(*(side * edge for edge in window))),
-        windows(size, side**2 * (len(loaded.lights) + 1)),
-        {key: fabric for key, (_, fabric) in loaded.cloths.items()},
-        answerer,
-        pool,
-        (loaded.scene.name, frame, seed),
-        light_between if loaded.options.bounces == "all" else None,
-        side,
-        layers,
-    )
+    parts, names = windows(size, side**2 * (len(loaded.lights) + 1)), (loaded.scene.name, frame, seed)
+    fabrics = {key: fabric for key, (_, fabric) in loaded.cloths.items()}
+    between = light_between if loaded.options.bounces == "all" else None
+
+    def trace(window: FilmWindow) -> SceneFrame:
+        return render(fine, frame, whole, FilmWindow(*(side * edge for edge in window)))
+
+    yield from answered(trace, parts, fabrics, answerer, pool, names, between, side, layers)
 
 
 def answered(

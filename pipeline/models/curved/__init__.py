@@ -63,13 +63,9 @@ class CurvedOptions(TextureOptions):
         """The queries about the silhouette."""
         return SilhouetteRows(
             kind="opacity" if self.silhouette == "opacity" else "grazing_cosine",
-            rows=self.silhouette_rows,
-            points=self.silhouette_points,
-            sigma=self.silhouette_sigma,
             largest_curvature=self.largest_curvature,
-            anywhere=self.silhouette_anywhere,
             footprint=self.footprint,
-            seed=self.silhouette_seed,
+            **{name: getattr(self, f"silhouette_{name}") for name in ("rows", "points", "sigma", "anywhere", "seed")},
         )
 
     @property

@@ -26,16 +26,14 @@ Answer = Callable[[Fabric, Queries, int], object]
 
 _ENDS: Final = (0.03, *SIZE_LIMITS, 10.0)  # of standard deviations, in yarn spacings
 _SIZES: Final = len(_ENDS) - 1
-USUAL_SECONDS: Final = 1e-6 * np.array(
-    [
-        [3.6, 4.4, 4.6, 5.6, 167.0],
-        [3.8, 6.8, 8.4, 11.7, 139.0],
-        [2.5, 5.1, 15.8, 21.5, 75.0],
-        [2.1, 3.0, 4.8, 8.1, 40.0],
-        [0.76, 0.96, 1.4, 2.35, 20.0],
-    ]
-    * CASES
-)
+_MICROSECONDS: Final = [
+    [3.6, 4.4, 4.6, 5.6, 167.0],
+    [3.8, 6.8, 8.4, 11.7, 139.0],
+    [2.5, 5.1, 15.8, 21.5, 75.0],
+    [2.1, 3.0, 4.8, 8.1, 40.0],
+    [0.76, 0.96, 1.4, 2.35, 20.0],
+]
+USUAL_SECONDS: Final = 1e-6 * np.array(_MICROSECONDS * CASES)
 """Seconds of a query by kind and answer: ratios of processor times, geometric means of denim, twill 4/4 and gauze."""
 
 _ROWS: Final = (1024, 1024, 1024, 1024, 64)  # queries a timed call, by answer

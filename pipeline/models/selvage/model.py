@@ -93,7 +93,8 @@ class Selvage:
         kinds = kinds_of(queries)
         squares = squared_errors(queries, self._coefficients(fabric, queries))
         if time is None:
-            prices = self._prices(fabric, queries, self.error if error is None else error)
+            curves, wish = self._curves[_behind(queries)].of(fabric), self.error if error is None else error
+            prices = np.repeat([price_of(curve, wish) for curve in curves], len(USUAL_SECONDS) // CASES)
             chosen = np.empty(len(kinds), np.uint8)
             choose_at(squares, kinds, prices[:, None] * USUAL_SECONDS[:, : len(self._answers)], chosen)
             return chosen
@@ -123,11 +124,6 @@ class Selvage:
     def _coefficients(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the coefficients of the answers at hand, as `coefficients_of`."""
         return coefficients_of(fabric, _behind(queries))[:, : len(self._answers)]
-
-    def _prices(self, fabric: Fabric, queries: Queries, error: float) -> Float64:
-        """Return the prices of all kinds of queries for a wished error, (kinds,)."""
-        curves = self._curves[_behind(queries)].of(fabric)
-        return np.repeat([price_of(curve, error) for curve in curves], len(USUAL_SECONDS) // CASES)
 
     def _error_curves(self, fabric: Fabric, behind: bool) -> list[Float64]:
         """Return the curve of errors over prices of each case; those of light from behind only if it is wanted."""
