@@ -21,10 +21,8 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import refuse_other
-from pipeline.models.selvage import SelvageOptions
-from pipeline.models.selvage.choice import Chosen, choose_at, error_curve, price_of, within_time
+from pipeline.models.selvage import SelvageOptions, choice
 from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
-from pipeline.models.selvage.costs import USUAL_SECONDS, kinds_of, seconds_of
 from pipeline.models.selvage.errors import CASES, CURVED, coefficients_of, squared_errors
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import Walls
@@ -54,6 +52,7 @@ class Selvage:
         self._answers: list[Callable[[Fabric, Queries, int], Float32]] = [node.predict for node in self._nodes]
         if walls == "rim":
             self._answers.append(fallback_answers)
+        self._seconds = choice.USUAL_SECONDS[:, : len(self._answers)]
 
     def covers(self, fabric: Fabric) -> bool:
         """Return True: any fabric can be tabulated."""
@@ -81,7 +80,9 @@ class Selvage:
                 result[rows] = answer(fabric, queries.take(rows), seed)
         return result
 
-    def choose(self, fabric: Fabric, queries: Queries, error: float | None = None, time: float | None = None) -> Chosen:
+    def choose(
+        self, fabric: Fabric, queries: Queries, error: float | None = None, time: float | None = None
+    ) -> choice.Chosen:
         """Return which answer each of N queries gets, (N,): a level of soft nodes by its place, 4 the fallback."""
         refuse_other(queries, f"the method {self.name} answers", SelvageOptions.kinds)
         if error is not None and time is not None:
@@ -90,20 +91,20 @@ class Selvage:
             raise BadInput(self.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
         if time is not None and not 0.0 < time < math.inf:
             raise BadInput(self.name, "time", time, "seconds a query above 0 are needed, such as 5e-6")
-        kinds = kinds_of(queries)
+        kinds = choice.kinds_of(queries)
         squares = squared_errors(queries, self._coefficients(fabric, queries))
         if time is None:
             curves, wish = self._curves[_behind(queries)].of(fabric), self.error if error is None else error
-            prices = np.repeat([price_of(curve, wish) for curve in curves], len(USUAL_SECONDS) // CASES)
+            prices = np.repeat([choice.price_of(curve, wish) for curve in curves], len(choice.USUAL_SECONDS) // CASES)
             chosen = np.empty(len(kinds), np.uint8)
-            choose_at(squares, kinds, prices[:, None] * USUAL_SECONDS[:, : len(self._answers)], chosen)
+            choice.choose_at(squares, kinds, prices[:, None] * self._seconds, chosen)
             return chosen
-        seconds = seconds_of(kinds, self._answers, fabric)
+        seconds = choice.seconds_of(kinds, self._answers, fabric)
         least = float(seconds[kinds].min(axis=1).mean()) if len(kinds) else 0.0
         if time < least:
             allowed = f"these queries take at least {least:.2g} seconds each on this machine"
             raise BadInput(self.name, "time", time, allowed)
-        return within_time(squares, kinds, seconds, time)
+        return choice.within_time(squares, kinds, seconds, time)
 
     def expected_errors(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the expected relative errors of all answers to N queries, root mean squares, (N, answers)."""
@@ -132,7 +133,7 @@ class Selvage:
         for case in range(CASES):
             queries = probes(fabric, bool(case % 2) and behind, case >= CURVED, directions=("projected_disc",))
             squares = squared_errors(queries, coefficients)
-            curves.append(error_curve(squares, kinds_of(queries), USUAL_SECONDS[:, : len(self._answers)]))
+            curves.append(choice.error_curve(squares, choice.kinds_of(queries), self._seconds))
         return curves
 
 
