@@ -10,8 +10,8 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32
 from pipeline.cores import cores
 from pipeline.fingerprint import fingerprint
 from pipeline.models.method import CHUNK_ROWS, Around, Method
@@ -30,7 +30,7 @@ class AllCores(Around):
 
     def predict(
         self, fabric: Fabric, queries: Queries, seed: int = 0, error: float | None = None, time: float | None = None
-    ) -> npt.NDArray[np.float32]:
+    ) -> Float32:
         """Answer N queries in runs of `CHUNK_ROWS`, float32 (N, 4); each run but the first has a seed of its own.
 
         `error` or `time` are the wishes of a method that takes them (`pipeline.models.selvage`); BadInput by others.
@@ -41,7 +41,7 @@ class AllCores(Around):
             raise BadInput(self.name, key, value, f"leave it out: only selvage answers within a wished {key}")
         starts = range(CHUNK_ROWS, len(queries.u), CHUNK_ROWS)
 
-        def answer(start: int) -> npt.NDArray[np.float32]:
+        def answer(start: int) -> Float32:
             own = int(fingerprint([seed, start]), 16)
             return self.method.predict(fabric, queries.take(slice(start, start + CHUNK_ROWS)), own, **wishes)
 

@@ -22,12 +22,11 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.analytic.soft_nodes.groups import USUAL
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
-from pipeline.compiled.arrays import nbytes
+from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.analytic.soft_nodes import soft_tables
 from pipeline.models.domain import Domain
 from pipeline.models.method import Around, Method, in_chunks, refuse_other, row_by_row
@@ -51,7 +50,7 @@ class Bounded(Around):
         self.method.prepare(fabric)
         self._tables.of(fabric)
 
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries, float32 (N, 4). BadInput for queries that the method or the soft nodes do not know."""
         refuse_other(queries, f"the method {self.name} answers", ("stretch", "behind"))
         result, table = self.method.predict(fabric, queries, seed), self._tables.of(fabric)
@@ -74,7 +73,7 @@ def _with_open_back(table: SoftNodeTable) -> SoftNodeTable:
     return table._replace(behind_mean=low, behind_sharpness=table.sharpness, behind_grid=np.zeros_like(table.grid))
 
 
-def limited(components: npt.NDArray[np.float32], bounds: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def limited(components: Float32, bounds: Float32) -> Float32:
     """Return components (N, 4), at most their bounds (N, 4); both >= 0.
 
     An excess of one yarn is added to the other yarn's component, up to its bound.

@@ -17,9 +17,7 @@ from weaves.reading import MIB, read_bytes
 
 WEIGHTS, CARD = "model.safetensors", "card.json"
 
-HASHES: Final = "sha256"
-"""Key of a card: the hash of the weights' file, and that of the card without this second hash."""
-
+_HASHES: Final = "sha256"  # key of a card: hashes of the weights' file, and of the card without this second hash
 _MOST_BYTES: Final = 8 * MIB  # of a card; those of a hundred fabrics have 100 kB
 _MOST_WEIGHTS: Final = 256 * MIB  # the largest networks of the recipes have a tenth
 
@@ -44,7 +42,7 @@ def read_card(folder: Path) -> dict[str, Any]:
         raise _damaged(path) from error
     if not isinstance(card, dict):
         raise _damaged(path)
-    hashes = card.get(HASHES)
+    hashes = card.get(_HASHES)
     if hashes is None:
         raise BadInput(str(path), "", "has no hashes: it is of an earlier version, or damaged", "train it again")
     if not isinstance(hashes, dict) or content != _with_hashes(card, hashes.get("weights")):
@@ -59,15 +57,15 @@ def read_weights(folder: Path, card: Mapping[str, Any]) -> bytes:
         content = read_bytes(path, _MOST_WEIGHTS, "a file of weights")
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "train it again") from error
-    if _sha256(content) != card[HASHES]["weights"]:
+    if _sha256(content) != card[_HASHES]["weights"]:
         raise BadInput(str(path), "", "damaged, its SHA-256 is not the one on the card", "train it again")
     return content
 
 
 def _with_hashes(card: Mapping[str, Any], weights: Any) -> bytes:
     """Return the bytes of a card with the hash of its weights and its own."""
-    own = _encoded({**card, HASHES: {"weights": weights}})
-    return _encoded({**card, HASHES: {"weights": weights, "card": _sha256(own)}})
+    own = _encoded({**card, _HASHES: {"weights": weights}})
+    return _encoded({**card, _HASHES: {"weights": weights, "card": _sha256(own)}})
 
 
 def _encoded(card: Mapping[str, Any]) -> bytes:

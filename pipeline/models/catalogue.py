@@ -1,9 +1,8 @@
 """The models that exist: every folder beside this file that has a network, and every file of `analytic`.
 
-Options are data: they enter the fingerprint of a trained model, and a recipe's ``[[models]]`` table is validated by
-`ModelOptions`, the union distinguished by ``model``. Nothing heavy is imported here, so that plans can be made without
-torch. A new model is a new file or folder; nothing else names it. Methods from outside the package are one more member
-of the union, `AddedMethod`.
+A new model is a new file or folder; nothing else names it. A recipe's ``[[models]]`` table is validated by
+`ModelOptions`, of which methods from outside the package, `AddedMethod`, are one more member. Nothing heavy is imported
+here, so that plans can be made without torch.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Final, Union
 
 from pydantic import Field
@@ -20,26 +18,19 @@ from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.options import Options
 
 
-def _options_of(module: ModuleType) -> dict[str, type[Options]]:
-    """Return the options' classes that a module defines, by the model that they are of."""
-    members = [member for member in vars(module).values() if isinstance(member, type) and issubclass(member, Options)]
-    own = [member for member in members if member.__module__ == module.__name__]
-    models = {member.model_fields["model"].default: member for member in own}
-    return {model: member for model, member in models.items() if model}
-
-
-def _modules() -> Iterator[str]:
-    """Yield the names of modules with the options of a model."""
+def _options() -> Iterator[tuple[str, type[Options]]]:
+    """Yield the models and the classes of their options, in the order of the names of their modules."""
     here = Path(__file__).parent
-    yield from (f"analytic.{path.stem}" for path in here.glob("analytic/*.py"))
-    yield from (path.parent.name for path in here.glob("*/model.py"))
+    names = [f"analytic.{path.stem}" for path in here.glob("analytic/*.py")]
+    names += [path.parent.name for path in here.glob("*/model.py")]
+    for name in sorted(names, key=lambda name: name.rpartition(".")[2]):
+        module = import_module(f"pipeline.models.{name}")
+        classes = [value for value in vars(module).values() if isinstance(value, type) and issubclass(value, Options)]
+        own = [options for options in classes if options.__module__ == module.__name__]
+        yield from ((model, options) for options in own if (model := options.model_fields["model"].default))
 
 
-CLASSES: dict[str, type[Options]] = {
-    model: options
-    for name in sorted(_modules(), key=lambda name: name.rpartition(".")[2])
-    for model, options in _options_of(import_module(f"pipeline.models.{name}")).items()
-}
+CLASSES: dict[str, type[Options]] = dict(_options())
 """The options' class of every model of the package, by its name."""
 
 REPLACED_MODELS: Final = {"gauss_nodes": "soft_nodes", "summed_area": "soft_nodes"}

@@ -5,8 +5,8 @@ The domain is on the model card. It limits two uses of a model.
 - A file of queries (`twillight evaluate`): kinds and yarns that were not trained on are refused. Within a kind the
   model is evaluated beyond the trained ranges too.
 - A scene (`pipeline.models.fallback`): queries beyond the trained ranges are `out_of_domain`. Footprints may exceed the
-  range by `_SLACK` of its logarithm, directions may be `ANGLE` degrees steeper, curvature may not exceed it. A
-  footprint of `AVERAGED` repeats sees the average of the repeat; if training reached that size, larger footprints are
+  range by `_SLACK` of its logarithm, directions may be `_ANGLE` degrees steeper, curvature may not exceed it. A
+  footprint of `_AVERAGED` repeats sees the average of the repeat; if training reached that size, larger footprints are
   replaced by the largest one trained on (`within`). A Gaussian of standard deviation s leaves exp(-2 pi^2 s^2) of what
   varies with period 1: at .5 less than a hundredth.
 """
@@ -18,9 +18,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import field_validator
 
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.models.method import faults, refuse_other
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import WALLS_OF_PLANE, TruthOptions
@@ -34,12 +34,8 @@ PHYSICS: Final = ("footprint", "frame", "normaliser", "parallax", "shadows", "wa
 
 _YARN: Final = ("roughness", "bend", "twist", "relief", "width", "blend")
 _SLACK: Final = 0.02  # of a range, that a fabric or a footprint may lie outside
-
-ANGLE: Final = 1.0
-"""Degrees by which a direction may be steeper than the steepest trained on."""
-
-AVERAGED: Final = 0.5
-"""Standard deviation of a footprint that sees the average of the repeat, in repeats."""
+_ANGLE: Final = 1.0  # degrees by which a direction may be steeper than the steepest trained on
+_AVERAGED: Final = 0.5  # standard deviation of a footprint that sees the average of the repeat, in repeats
 
 
 class Domain(Frozen):
@@ -62,13 +58,10 @@ class Domain(Frozen):
     def of(cls, about: Mapping[str, Any], fabrics: Sequence[Fabric]) -> Domain:
         """Return the domain of a data set, from its manifest's `about` and the fabrics trained on."""
         truth = TruthOptions.model_validate(about.get("truth", {})).model_dump(mode="json")
-        numbers = [_numbers(fabric) for fabric in fabrics]
         return cls(
             queries=QueryOptions.model_validate(about.get("queries", {})),
             physics={name: truth[name] for name in PHYSICS},
-            yarns={
-                name: (min(min(n[name]) for n in numbers), max(max(n[name]) for n in numbers)) for name in numbers[0]
-            },
+            yarns=_ranges([_numbers(fabric) for fabric in fabrics]),
         )
 
     @property
@@ -83,7 +76,7 @@ class Domain(Frozen):
         """True if view rays that meet a wall see a rim."""
         return bool(self.physics["walls"] == "rim")
 
-    def out_of_domain(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
+    def out_of_domain(self, fabric: Fabric, queries: Queries) -> Mask:
         """Return which queries on a fabric lie outside the ranges trained on, (N,); all of them if its yarns do.
 
         Kinds that were not trained on at all are not checked here, but by `faults`.
@@ -99,8 +92,8 @@ class Domain(Frozen):
             result |= queries.sigma > options.stretch * (1.0 + _SLACK) * queries.sigma_minor
         if options.curvature[1] > 0.0:
             result |= queries.curvature > options.curvature[1]
-        if options.max_angle + ANGLE < 90.0:
-            steepest = math.cos(math.radians(options.max_angle + ANGLE))
+        if options.max_angle + _ANGLE < 90.0:
+            steepest = math.cos(math.radians(options.max_angle + _ANGLE))
             result |= np.minimum(np.abs(queries.wi[:, 2]), np.abs(queries.wo[:, 2])) < steepest
         return np.asarray(result)
 
@@ -112,11 +105,11 @@ class Domain(Frozen):
         shrunk = np.where(averaged, self.queries.sigma[1] / _size(queries), 1.0).astype(np.float32)
         return queries._replace(sigma=queries.sigma * shrunk, sigma_minor=queries.sigma_minor * shrunk)
 
-    def _averaged(self, fabric: Fabric, queries: Queries) -> npt.NDArray[np.bool_]:
+    def _averaged(self, fabric: Fabric, queries: Queries) -> Mask:
         """Return which footprints are larger than those trained on and see the average of the repeat, (N,)."""
         size, high = _size(queries), self.queries.sigma[1]
         narrow = high * queries.sigma_minor / size
-        return np.asarray((size > high) & (narrow >= AVERAGED * max(fabric.weave.repeat)))
+        return np.asarray((size > high) & (narrow >= _AVERAGED * max(fabric.weave.repeat)))
 
     def refuse(self, queries: Queries, model: str) -> None:
         """Refuse queries of a kind that the model never saw: a BadInput that names the first row and column."""
@@ -160,12 +153,15 @@ def domain_of(cards: Sequence[Mapping[str, Any]]) -> Domain | None:
     domains = [Domain.model_validate(card["domain"]) for card in cards if "domain" in card]
     if not domains:
         return None
-    ranges = {name: [domain.yarns[name] for domain in domains] for name in domains[0].yarns}
-    yarns = {name: (min(low for low, _ in own), max(high for _, high in own)) for name, own in ranges.items()}
-    return domains[0].model_copy(update={"yarns": yarns})
+    return domains[0].model_copy(update={"yarns": _ranges([domain.yarns for domain in domains])})
 
 
-def _size(queries: Queries) -> npt.NDArray[np.float64]:
+def _ranges(parts: Sequence[Mapping[str, Sequence[float]]]) -> dict[str, tuple[float, float]]:
+    """Return the range of each parameter over all parts."""
+    return {name: (min(min(p[name]) for p in parts), max(max(p[name]) for p in parts)) for name in parts[0]}
+
+
+def _size(queries: Queries) -> Float64:
     """Return the root of the product of each footprint's axes, the size that `QueryOptions.sigma` limits."""
     return np.asarray(np.sqrt(queries.sigma.astype(np.float64) * queries.sigma_minor))
 

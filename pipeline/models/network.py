@@ -129,7 +129,12 @@ class PerQuery(NamedTuple):
         """Return the components of N queries, (N, 4), by the module; or what runs in its place returns, (N, width)."""
         self.refuse(queries)
         run = run or self.module
-        return evaluated(queries, self.inputs, lambda *inputs: run(*inputs, *self.constants), width)
+
+        def read(part: Queries) -> Float32:
+            return run(*map(torch.from_numpy, self.inputs(part)), *self.constants).numpy()
+
+        with torch.inference_mode():
+            return in_chunks(queries, read, width)
 
 
 @runtime_checkable
@@ -163,17 +168,6 @@ def one_thread() -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
-
-
-def evaluated(
-    queries: Queries, inputs: Callable[[Queries], Columns], answer: Callable[..., Tensor], width: int = 4
-) -> Float32:
-    """Evaluate N queries in chunks, without gradients: float32 (N, width).
-
-    `answer` takes the inputs of some queries as tensors.
-    """
-    with torch.inference_mode():
-        return in_chunks(queries, lambda part: answer(*map(torch.from_numpy, inputs(part))).numpy(), width)
 
 
 class NetworkMethod(Generic[Net]):

@@ -17,9 +17,6 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=6
 Gaussian = Annotated[Literal["gaussian"], Field(description="Kernel it knows; must be the kernel of the truth.")]
 """The footprint of a method that knows one kernel."""
 
-LogK = Annotated[float, Field(gt=0, le=1e4, description="k of the specular space g(x) = ln(k x + 1).")]
-"""Strength of the logarithmic compression of highlights in the loss (`pipeline.models.networks.layers`)."""
-
 Weight = Annotated[float, Field(ge=0, le=1e4)]
 """A factor of one term of a loss."""
 
@@ -84,15 +81,12 @@ class Options(Design):
         return ()
 
     @property
-    def kinds(self) -> frozenset[str]:
-        """Kinds of queries that it evaluates, of `behind`, `stretch` and `curvature` (`QueryOptions`)."""
-        return frozenset()
-
-    @property
     def extra_rows(self) -> tuple[ExtraRows, ...]:
         """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
         return ()
 
+    kinds: ClassVar[frozenset[str]] = frozenset()
+    """Kinds of queries that it evaluates, of `behind`, `stretch` and `curvature` (`QueryOptions`)."""
     turns: ClassVar[bool] = False
     """True if it evaluates a viewer behind the cloth as one in front of the cloth's back, which is a fabric too."""
 
@@ -140,7 +134,8 @@ class Options(Design):
 class ComponentLossOptions(Options):
     """Options of a network that learns the four components in log space (`pipeline.models.networks.layers`)."""
 
-    log_k: LogK = 3.0
+    log_k: float = Field(default=3.0, gt=0, le=1e4)
+    """k of the specular space g(x) = ln(k x + 1), which compresses highlights in the loss."""
     specular_weight: Weight = 1.0
     """Weight of the specular squared error, taken in log space."""
     diffuse_weight: Weight = 2.0

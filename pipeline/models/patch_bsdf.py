@@ -61,23 +61,10 @@ class Drawn(NamedTuple):
 class PatchBSDF:
     """A cloth's patch BSDF: values, and directions drawn with their density.
 
-    Parameters
-    ----------
-    fabric : Fabric
-        The cloth, with its colours.
-    method : str, Fallback or TruthAnswers
-        Method that evaluates: a name as on the command line (`pipeline.models.named`), a fallback, or the truth.
-    points : int
-        Points of the footprint that have a lobe each, at least 1; 1 has its exact lobe.
-    widening : float
-        Factor on the widening of a lobe by the spread of the tangents, >= 0.
-    bounces : 1 or "all"
-        All adds the light that yarns give to each other (`pipeline.scenes.bounces`).
-
-    Raises
-    ------
-    BadInput
-        If there is no such method, or a number is out of its range.
+    `method` evaluates: a name as on the command line (`pipeline.models.named`), a fallback, or the truth. `points` of
+    the footprint have a lobe each, at least 1; 1 has its exact lobe. `widening`, >= 0, is a factor on the widening of a
+    lobe by the spread of the tangents. All `bounces` add the light that yarns give to each other
+    (`pipeline.scenes.bounces`). BadInput if there is no such method, or a number is out of its range.
 
     Examples
     --------
@@ -132,21 +119,8 @@ class PatchBSDF:
     def sample(self, looks: Queries, random: npt.ArrayLike, lobes: Lobes | None = None, seed: int = 0) -> Sample:
         """Draw one direction for each of N looks, whose own wi does not matter.
 
-        Parameters
-        ----------
-        looks : Queries
-            N footprints with their viewers.
-        random : array_like (N, 3)
-            Numbers in [0, 1).
-        lobes : Lobes, optional
-            What `lobes` returned for these looks.
-        seed : int
-            Seed of the method.
-
-        Raises
-        ------
-        BadInput
-            If `random` has another shape, or numbers outside [0, 1).
+        `random` (N, 3) are numbers in [0, 1), `lobes` what the function of that name returned for these looks, `seed`
+        that of the method. BadInput if `random` has another shape, or numbers outside [0, 1).
         """
         wi, pdf, straight = self.draw(looks, random, lobes)
         queries = looks._replace(wi=wi)
@@ -168,10 +142,7 @@ class PatchBSDF:
         return Drawn(wi, pdf, straight)
 
     def pdf(self, queries: Queries, lobes: Lobes | None = None) -> Float32:
-        """Return the density of each query's wi, (N,), 1/sr.
-
-        Its integral over the sphere is 1 minus the probability `straight`.
-        """
+        """Return the density of each query's wi, (N,), 1/sr; its integral is 1 minus the probability `straight`."""
         found, result = self._known(queries, lobes), np.empty(len(queries.u), np.float32)
         wi, wo = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo))
         density_rows(found, wi, wo, result)
@@ -195,9 +166,8 @@ class PatchBSDF:
         if lobes is None:
             return self.lobes(looks)
         if len(lobes.rest) != len(looks.u):
-            raise BadInput(
-                "PatchBSDF", "lobes", f"{len(lobes.rest)} rows", f"must be those of the {len(looks.u)} looks"
-            )
+            allowed = f"must be those of the {len(looks.u)} looks"
+            raise BadInput("PatchBSDF", "lobes", f"{len(lobes.rest)} rows", allowed)
         return lobes
 
 

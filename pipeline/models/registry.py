@@ -1,7 +1,7 @@
 """Models by name and from folders; a model's file is imported when it is needed.
 
-The options of a model that learns nothing make its methods. For one that learns ``pipeline/models/NAME/model.py``
-offers ``restore(options, trained) -> list of Method`` and ``build(options, fabrics, *extra) -> Trainable``, where
+The options of a model that learns nothing make its methods. For one that learns, `model.py` beside its options has the
+functions ``restore(options, trained) -> list of Method`` and ``build(options, fabrics, *extra) -> Trainable``, where
 `trained` pairs each model card with its weights. `extra` is one list for each set that ``options.extra_rows`` declares:
 the columns of its rows, fabric by fabric.
 """
@@ -42,7 +42,7 @@ def module_of(model: str) -> ModuleType:
     """Import the file of a model; BadInput, with the nearest name, if there is none."""
     if model not in CLASSES:
         raise BadInput("models", "model", model, nearest(model, CLASSES))
-    return import_module(f"pipeline.models.{model}.model")
+    return import_module(f"{CLASSES[model].__module__}.model")
 
 
 def model_folder(model: str, where: str, key: str, others: Iterable[str] = ()) -> Path:
@@ -59,11 +59,9 @@ def model_folder(model: str, where: str, key: str, others: Iterable[str] = ()) -
 
 
 def build_network(options: ModelOptions, fabrics: Sequence[Fabric], extra: Iterable[Any] = ()) -> Any:
-    """Return an untrained `pipeline.models.network.Trainable` of a design that learns.
+    """Return an untrained `pipeline.models.network.Trainable` of a design that learns; one material learns one fabric.
 
-    A model of one material learns one fabric. `extra` has one list for each set that ``options.extra_rows`` declares:
-    the columns of its rows, fabric by fabric. MethodFailed if the code of a network from outside is not the planned
-    one, or fails.
+    MethodFailed if the code of a network from outside is not the planned one, or fails.
     """
     if isinstance(options, AddedMethod):
         from pipeline.models.added.network import build_added
@@ -101,10 +99,8 @@ def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Me
     except (BadInput, WorkFailed):
         raise
     except (RuntimeError, KeyError, ValueError) as error:
-        where = ", ".join(str(folder) for folder in folders)
-        raise BadInput(
-            where, "", "not a whole model", "card and weights do not fit together: train it again"
-        ) from error
+        where, allowed = ", ".join(map(str, folders)), "card and weights do not fit together: train it again"
+        raise BadInput(where, "", "not a whole model", allowed) from error
 
 
 def load_model(folder: Path) -> list[Method]:

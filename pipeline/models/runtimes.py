@@ -8,7 +8,7 @@ All use the same weights. They differ in speed, and some of them in rounding.
     onnx                     ONNX Runtime on the exported module
     onnx-int8                the same with weights of 8 bits, and activations rounded to 8 bits as they come
 
-A runtime in single precision (`EXACT`) must agree with the method itself: both are compared once for every module, and
+A runtime in single precision (`_EXACT`) must agree with the method itself: both are compared once for every module, and
 a difference above `RUNTIME_TOLERANCE` is refused.
 """
 
@@ -26,10 +26,10 @@ from threading import Lock
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
+from pipeline.compiled.arrays import Float32
 from pipeline.models.method import Around, Method
 from pipeline.models.network import PerQuery, Portable, one_thread
 from pipeline.per_fabric import PerFabric
@@ -63,10 +63,6 @@ class Runtime(NamedTuple):
     """Returns why this machine cannot; empty if it can."""
     load: Callable[[nn.Module, Sequence[Tensor], int], _Program]
     """Takes a module, its inputs, and the number of inputs (the first ones) that have a row per query."""
-
-
-def _eager(module: nn.Module, example: Sequence[Tensor], rows: int, dtype: torch.dtype) -> _Program:
-    return _Program(_rounding(module, dtype))
 
 
 def _compiled(module: nn.Module, example: Sequence[Tensor], rows: int, dtype: torch.dtype | None) -> _Program:
@@ -200,8 +196,8 @@ def _quiet() -> Iterator[None]:
 
 
 RUNTIMES: Final[dict[str, Runtime]] = {
-    "eager-bf16": Runtime(lambda: "", partial(_eager, dtype=torch.bfloat16)),
-    "eager-fp16": Runtime(lambda: "", partial(_eager, dtype=torch.float16)),
+    "eager-bf16": Runtime(lambda: "", lambda module, *_: _Program(_rounding(module, torch.bfloat16))),
+    "eager-fp16": Runtime(lambda: "", lambda module, *_: _Program(_rounding(module, torch.float16))),
     "compile": Runtime(_no_compiler, partial(_compiled, dtype=None)),
     "compile-bf16": Runtime(_no_compiler, partial(_compiled, dtype=torch.bfloat16)),
     "onnx": Runtime(no_onnx, partial(_onnx, quantised=False)),
@@ -209,8 +205,7 @@ RUNTIMES: Final[dict[str, Runtime]] = {
 }
 """Runtimes by name (`reports.options.RuntimeName`)."""
 
-EXACT: Final = frozenset({"compile", "onnx"})
-"""Runtimes in single precision."""
+_EXACT: Final = frozenset({"compile", "onnx"})  # in single precision
 
 
 class RunBy(Around):
@@ -229,7 +224,7 @@ class RunBy(Around):
         """
         self._ready.of(fabric)
 
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> npt.NDArray[np.float32]:
+    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries, float32 (N, 4); `seed` is not used. BadInput for kinds of queries outside the domain."""
         part, program = self._ready.of(fabric)
         return part.answered(queries, program.run)
@@ -248,7 +243,7 @@ class RunBy(Around):
         inputs = [torch.from_numpy(column) for column in part.inputs(queries)]
         with _LOADING, one_thread():  # what is compiled for several threads would be compiled again for one
             program = RUNTIMES[self._runtime].load(part.module, [*inputs, *part.constants], len(inputs))
-            if self._runtime in EXACT:
+            if self._runtime in _EXACT:
                 self._compare(fabric, part, program, queries)
         # The module is kept beside its program: an identity is another object's once its own is gone.
         self._programs[key] = part.module, program
@@ -260,10 +255,8 @@ class RunBy(Around):
         difference = np.linalg.norm(part.answered(queries, program.run) - own)
         error = float(difference) / max(float(np.linalg.norm(own)), 1e-30)
         if not error <= RUNTIME_TOLERANCE:
-            raise WorkFailed(
-                f"{self.name} by {self._runtime} on {fabric.name}: answers differ from the method's own by "
-                f"{error:.1e}, beyond {RUNTIME_TOLERANCE:g}"
-            )
+            differ = f"answers differ from the method's own by {error:.1e}, beyond {RUNTIME_TOLERANCE:g}"
+            raise WorkFailed(f"{self.name} by {self._runtime} on {fabric.name}: {differ}")
 
 
 def runs(method: Method, names: Iterable[str]) -> list[Method]:

@@ -1,14 +1,4 @@
-"""Scenes by name: those that come with the package, a Mitsuba XML file, or a TOML file that describes one.
-
-name = "sofa"
-source = "sofa.xml"          # beside the TOML file
-frames = 24
-step = [0.001, 0.0, 0.0]     # of the camera, from frame to frame
-
-[cloths.denim]               # what shapes with the BSDF id fabric_denim wear
-fabric = "denim"             # a preset, or a fabric's TOML beside this file
-yarns = [400.0, 300.0]       # yarn spacings in one unit of u and of v
-"""
+"""Scenes by name: those that come with the package, a Mitsuba XML file, or a TOML file that describes one."""
 
 from __future__ import annotations
 
@@ -44,7 +34,6 @@ def load_scene(name_or_path: str | Path) -> Scene:
     if path.suffix == ".xml":
         if not path.is_file():
             raise BadInput("scene", "name", str(path), "does not exist; a Mitsuba XML is needed")
-        name = re.sub(r"[^A-Za-z0-9_-]", "_", path.stem)[:60]
-        return Scene(name=name, source=path)
+        return Scene(name=re.sub(r"[^A-Za-z0-9_-]", "_", path.stem)[:60], source=path)
     allowed = "a path ending in .xml or .toml, or a scene that comes with the package, is needed; "
     raise BadInput("scene", "name", str(name_or_path), allowed + nearest(str(name_or_path), SHIPPED))

@@ -22,8 +22,8 @@ from itertools import chain
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.lights import fibonacci
 from pipeline.scenes.loading import Camera, FilmWindow, Loaded
@@ -32,21 +32,8 @@ from pipeline.scenes.rays import aovs_of, first_hits, in_sight, off
 from pipeline.scenes.scene import Cloth
 from weaves.errors import BadInput
 
-Floats = npt.NDArray[np.float64]
-
-_AOVS: Final = {
-    "position": 3,
-    "uv": 2,
-    "geo_normal": 3,
-    "sh_normal": 3,
-    "dp_du": 3,
-    "dp_dv": 3,
-    "duv_dx": 2,
-    "duv_dy": 2,
-    "shape_index": 1,
-}
-"""AOVs rendered by Mitsuba, and the number of channels of each."""
-_AOVS_BESIDE: Final = {"position": 3, "geo_normal": 3, "sh_normal": 3, "albedo": 3, "shape_index": 1}
+_AOVS: Final = ("position", "uv", "geo_normal", "sh_normal", "dp_du", "dp_dv", "duv_dx", "duv_dy", "shape_index")
+_AOVS_BESIDE: Final = ("position", "geo_normal", "sh_normal", "albedo", "shape_index")
 LEAST_SIGMA: Final = 1e-6
 """Least standard deviation of a footprint, in yarn spacings."""
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
@@ -57,11 +44,12 @@ class SceneFrame(NamedTuple):
 
     gbuffers: dict[str, GBuffer]
     """By the cloth's key; a cloth out of sight has no places."""
-    backdrop: Floats
-    """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3)."""
-    depth: Floats
+    backdrop: Float64
+    """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3): there without the
+    cloth's shadows."""
+    depth: Float64
     """Distance of what is seen along the camera's axis, in the world's lengths, (H, W); 0 where nothing is."""
-    normal: Floats
+    normal: Float64
     """Shading normal of what is seen, in the world, (H, W, 3); 0 where nothing is."""
 
 
@@ -78,21 +66,20 @@ def render(
     _refuse_inside(loaded, camera)
     sensor = camera.sensor(loaded.mi, size, window)
     aovs = aovs_of(loaded.mi, loaded.world, sensor, _AOVS)
-    gbuffers = {}
-    shown = np.zeros(aovs["uv"].shape[:2], np.bool_)
+    gbuffers, shown = {}, np.zeros(aovs["uv"].shape[:2], np.bool_)
     for key, (cloth, _) in loaded.cloths.items():
         mask = np.isin(aovs["shape_index"][..., 0], loaded.worn[key])
         gbuffers[key] = _gbuffer(loaded, key, cloth, camera, mask, aovs)
         shown |= mask
-    something = aovs["shape_index"][..., 0] > 0
     forward = camera.to_world[:3, 2] / np.linalg.norm(camera.to_world[:3, 2])
-    depth = np.where(something, (aovs["position"] - camera.to_world[:3, 3]) @ forward, 0.0)
-    return SceneFrame(gbuffers, _backdrop(loaded, camera, sensor, shown), depth, aovs["sh_normal"])
+    away = (aovs["position"] - camera.to_world[:3, 3]) @ forward
+    depth = np.where(aovs["shape_index"][..., 0] > 0, away, 0.0)
+    backdrop = _seen(loaded, loaded.world, camera, sensor, ~shown)
+    backdrop = np.where(shown[..., None], _seen(loaded, loaded.behind, camera, sensor, shown), backdrop)
+    return SceneFrame(gbuffers, backdrop, depth, aovs["sh_normal"])
 
 
-def _gbuffer(
-    loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: npt.NDArray[np.bool_], aovs: dict[str, Floats]
-) -> GBuffer:
+def _gbuffer(loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: Mask, aovs: dict[str, Float64]) -> GBuffer:
     """Return the G-buffer of one cloth, whose pixels are `mask`."""
     options = loaded.options
     # At a pole of Mitsuba's sphere, say, there are no derivatives: such a pixel is cloth, but no place.
@@ -116,14 +103,11 @@ def _gbuffer(
             curvature[front] = least_curvature(loaded, seen, straight[front], curvature[front])
         rim = front[rims_of(loaded, seen, straight[front], curvature[front])]
     (u, v), (sigma_major, sigma_minor) = places.uv.T, sigma.T
-    angle = np.arctan2(axes[:, 1, 0], axes[:, 0, 0])
-    lit = _lit(loaded, places)
-    return GBuffer(
-        mask, pixel, u, v, sigma_major, sigma_minor, angle, curvature, wo, *lit, rim=rim, rim_wo=straight[rim]
-    )
+    angle, lit = np.arctan2(axes[:, 1, 0], axes[:, 0, 0]), _lit(loaded, places)
+    return GBuffer(mask, pixel, u, v, sigma_major, sigma_minor, angle, curvature, wo, *lit, rim, straight[rim])
 
 
-def _lit(loaded: Loaded, places: Places) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
+def _lit(loaded: Loaded, places: Places) -> tuple[Index, Float64, Float64]:
     """Return which places each light in sight reaches, from where, and with which irradiance."""
     beside = off(places.position)
     index, towards, power = [], [], []
@@ -160,16 +144,7 @@ def _refuse_inside(loaded: Loaded, camera: Camera) -> None:
         raise BadInput(f"scene {loaded.scene.name}", "camera", place, "inside the cloth; a camera must be outside it")
 
 
-def _backdrop(loaded: Loaded, camera: Camera, sensor: Any, cloth: npt.NDArray[np.bool_]) -> Floats:
-    """Return the linear RGB of a frame without its cloth, (H, W, 3).
-
-    Where `cloth` (H, W) is seen, it is what lies behind, without the cloth's shadows.
-    """
-    picture = _seen(loaded, loaded.world, camera, sensor, ~cloth)
-    return np.where(cloth[..., None], _seen(loaded, loaded.behind, camera, sensor, cloth), picture)
-
-
-def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: npt.NDArray[np.bool_]) -> Floats:
+def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: Mask) -> Float64:
     """Return the radiance of the wanted pixels, and that of the environment where a ray leaves the scene."""
     mi = loaded.mi
     integrator = mi.load_dict({"type": "direct"})
@@ -177,9 +152,7 @@ def _seen(loaded: Loaded, world: Any, camera: Camera, sensor: Any, wanted: npt.N
     picture = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)[..., :3].copy()
     aovs = aovs_of(mi, world, sensor, _AOVS_BESIDE)
     mask = wanted & (aovs["shape_index"][..., 0] > 0)
-    position, geometric, normal, albedo = (
-        aovs[name][mask] for name in ("position", "geo_normal", "sh_normal", "albedo")
-    )
+    position, geometric, normal, albedo = (aovs[name][mask] for name in _AOVS_BESIDE[:4])
     viewer = camera.to_viewer(position)
     geometric, normal = (unit(n * np.where(dot(n, viewer) < 0.0, -1.0, 1.0)[:, None]) for n in (geometric, normal))
     total, start = np.zeros_like(position), position + off(position)[:, None] * geometric

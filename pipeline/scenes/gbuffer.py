@@ -9,59 +9,52 @@ places under several lights are M queries, and one light that reaches every plac
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.query import Queries
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class GBuffer:
     """N places of one fabric in a picture of H by W pixels, and M queries about them."""
 
-    mask: npt.NDArray[np.bool_]
+    mask: Mask
     """Pixels that show the fabric; places are among them, bool (H, W)."""
-    pixel: npt.NDArray[np.int64]
+    pixel: Index
     """Where each place is: row * W + column, int64 (N,)."""
-    u: Floats
-    v: Floats
+    u: Float64
+    v: Float64
     """Centre of the footprint, in yarn spacings, not reduced, float64 (N,)."""
-    sigma: Floats
-    sigma_minor: Floats
+    sigma: Float64
+    sigma_minor: Float64
     """Standard deviations of the footprint along its two axes, in yarn spacings, float64 (N,)."""
-    angle: Floats
+    angle: Float64
     """Angle from x to the first axis, radians, float64 (N,)."""
-    curvature: Floats
+    curvature: Float64
     """Of the cloth along the view ray, 1/yarn spacings, 0 to 1, float64 (N,)."""
-    wo: Floats
+    wo: Float64
     """Unit vectors to the viewer, in the local frame, float64 (N, 3)."""
-    place: npt.NDArray[np.int64]
+    place: Index
     """Which place each query is about, int64 (M,)."""
-    wi: Floats
+    wi: Float64
     """Unit vectors to the light, in the place's local frame, float64 (M, 3)."""
-    irradiance: Floats
+    irradiance: Float64
     """Linear RGB irradiance that the light would bring to a surface facing it there, float64 (M, 3)."""
-    rim: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    rim: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     """Places at a silhouette: curved cloth whose view rays may leave it again and show what is behind it, int64
     (R,)."""
-    rim_wo: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    rim_wo: Float64 = field(default_factory=lambda: np.zeros((0, 3)))
     """Unit vectors from them to the viewer, tilted nowhere; z may have any sign, float64 (R, 3)."""
 
     @property
-    def lit(self) -> npt.NDArray[np.bool_]:
+    def lit(self) -> Mask:
         """Pixels that any query is about, (H, W)."""
         lit = np.zeros(self.mask.size, np.bool_)
         lit[self.pixel[self.place]] = True
         return lit.reshape(self.mask.shape)
-
-    @property
-    def transmitted(self) -> npt.NDArray[np.bool_]:
-        """Queries whose light and viewer are on different sides of the cloth, (M,)."""
-        return cast(npt.NDArray[np.bool_], self.wi[:, 2] * self.wo[self.place, 2] < 0.0)
 
     def queries(self, repeat: tuple[int, int]) -> Queries:
         """Return the M queries in float32, centres reduced modulo `repeat` (extent in x and y) in float64 first."""
@@ -78,14 +71,14 @@ class GBuffer:
         wo = self.rim_wo.astype(np.float32)
         return self.looks(repeat).take(self.rim)._replace(wi=wo, wo=wo)
 
-    def coverage(self, of_rims: npt.ArrayLike) -> Floats:
+    def coverage(self, of_rims: npt.ArrayLike) -> Float64:
         """Return the coverage of each place, (N,), from those of the rims, (R,): cloth covers all other places."""
         result = np.ones(len(self.pixel))
         result[self.rim] = of_rims
         return result
 
 
-def reduced(coordinate: Floats, period: int) -> npt.NDArray[np.float32]:
+def reduced(coordinate: Float64, period: int) -> Float32:
     """Reduce modulo the repeat in float64; what float32 rounds up to the period becomes 0."""
     result = np.mod(coordinate, period).astype(np.float32)
     return np.where(result >= period, np.float32(0), result).astype(np.float32)

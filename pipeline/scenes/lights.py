@@ -14,14 +14,12 @@ import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import KDTree
 
+from pipeline.compiled.arrays import Float64
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.rays import radiance
 from weaves.errors import BadInput
-
-Floats = npt.NDArray[np.float64]
 
 _PARTS: Final = 4  # shadow rays of a direction of an environment, on average
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
@@ -32,14 +30,14 @@ class Light(NamedTuple):
 
     distant: bool
     """True if it shines from one direction everywhere."""
-    place: Floats
+    place: Float64
     """Unit vector to it if distant, else its position, (3,)."""
-    power: Floats
+    power: Float64
     """Linear RGB irradiance on a surface that faces it, (3,); of a point light, at distance 1."""
     parts: tuple[Light, ...] = ()
     """Lights that it stands for, of which each may be in shadow; none: it is one itself."""
 
-    def reach(self, position: Floats) -> tuple[Floats, Floats, Floats]:
+    def reach(self, position: Float64) -> tuple[Float64, Float64, Float64]:
         """Return unit vectors to the light (N, 3), distances (N,), irradiances on facing surfaces (N, 3)."""
         if self.distant:
             ones = np.ones((len(position), 1))
@@ -49,7 +47,7 @@ class Light(NamedTuple):
         return towards / distance[:, None], distance, self.power / np.square(distance)[:, None]
 
 
-def fibonacci(count: int) -> Floats:
+def fibonacci(count: int) -> Float64:
     """Return `count` unit vectors that part the sphere into equal solid angles, (count, 3)."""
     k = np.arange(count)
     z = 1.0 - (2.0 * k + 1.0) / count
@@ -104,5 +102,5 @@ def _quadrature(mi: Any, environment: Any, options: SceneOptions) -> list[Light]
     return [light for light in lights if light.parts]
 
 
-def _vector(value: Any) -> Floats:
+def _vector(value: Any) -> Float64:
     return np.asarray(value, np.float64).reshape(-1)

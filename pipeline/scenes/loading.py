@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.scenes.lights import Light, lights_of
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.rays import shape_numbers
@@ -19,8 +19,6 @@ from pipeline.scenes.sources import refuse_deadly
 from pipeline.scenes.variant import instantiate, mitsuba
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
-
-Floats = npt.NDArray[np.float64]
 
 MOST_PIXELS: Final = 16_384
 """Most pixels a side of a film."""
@@ -39,7 +37,7 @@ class FilmWindow(NamedTuple):
 class Camera:
     """A pinhole, or parallel rays; it looks along the third column of `to_world`."""
 
-    to_world: Floats
+    to_world: Float64
     """From the camera's axes, left, up and forward, to the world, (4, 4)."""
     parallel: bool
     """True if its rays are."""
@@ -56,12 +54,12 @@ class Camera:
         moved[:3, 3] += axes @ [-right, up, forward]
         return replace(self, to_world=moved)
 
-    def to_viewer(self, position: Floats) -> Floats:
+    def to_viewer(self, position: Float64) -> Float64:
         """Return the unit vectors from positions to the viewer, (N, 3)."""
         towards = -self.to_world[:3, 2] + 0.0 * position if self.parallel else self.to_world[:3, 3] - position
         return np.asarray(towards / np.linalg.norm(towards, axis=-1, keepdims=True))
 
-    def widening(self, position: Floats) -> Floats:
+    def widening(self, position: Float64) -> Float64:
         """Return what derivatives by the pixel at positions must be multiplied with, (N,).
 
         Mitsuba lets the rays of a pixel's neighbours start where its own ray crosses the near plane.
@@ -77,15 +75,14 @@ class Camera:
         if window is not None:
             film |= {"crop_offset_x": window.left, "crop_offset_y": window.top}
             film |= {"crop_width": window.width, "crop_height": window.height}
-        return mi.load_dict(
-            {
-                "type": "orthographic" if self.parallel else "perspective",
-                **self.settings,
-                "to_world": mi.ScalarTransform4f(self.to_world),
-                "film": {**film, "rfilter": {"type": "box"}},
-                "sampler": {"type": "stratified", "sample_count": 1, "jitter": False},
-            }
-        )
+        sensor = {
+            "type": "orthographic" if self.parallel else "perspective",
+            **self.settings,
+            "to_world": mi.ScalarTransform4f(self.to_world),
+            "film": {**film, "rfilter": {"type": "box"}},
+            "sampler": {"type": "stratified", "sample_count": 1, "jitter": False},
+        }
+        return mi.load_dict(sensor)
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,8 @@ MOST_SAMPLES: Final = 8
 
 _AHEAD = 3  # windows under way: threads have work while a frame is traced
 
-Plane = npt.NDArray[np.float32]
+Plane = Float32
+"""A picture of some channels, (H, W, channels)."""
 
 LightBetween = Callable[[Fabric, Queries], Float64]
 """Turns queries into the light of all bounces after the first, as `light_between`."""
@@ -146,17 +147,14 @@ def picture(
     `pipeline.scenes.frame.render`.
     """
     fine, whole = sharpened(loaded, side), (side * size[0], side * size[1])
-    yield from answered(
-        lambda window: render(fine, frame, whole, FilmWindow(*(side * edge for edge in window))),
-        windows(size, side**2 * (len(loaded.lights) + 1)),
-        {key: fabric for key, (_, fabric) in loaded.cloths.items()},
-        answerer,
-        pool,
-        (loaded.scene.name, frame, seed),
-        light_between if loaded.options.bounces == "all" else None,
-        side,
-        layers,
-    )
+    parts, names = windows(size, side**2 * (len(loaded.lights) + 1)), (loaded.scene.name, frame, seed)
+    fabrics = {key: fabric for key, (_, fabric) in loaded.cloths.items()}
+    between = light_between if loaded.options.bounces == "all" else None
+
+    def trace(window: FilmWindow) -> SceneFrame:
+        return render(fine, frame, whole, FilmWindow(*(side * edge for edge in window)))
+
+    yield from answered(trace, parts, fabrics, answerer, pool, names, between, side, layers)
 
 
 def answered(
@@ -199,7 +197,7 @@ class _UnderWay:
     ) -> None:
         self._answerer, self._pool, self._window, self._frame, self._names = answerer, pool, window, frame, names
         self._fabrics = fabrics
-        queries = {key: gbuffer.queries(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
+        queries = {key: gbuffer.queries(fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
         self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
         self._between = {
@@ -207,7 +205,7 @@ class _UnderWay:
             for key, asked in queries.items()
             if between is not None
         }
-        rims = {key: gbuffer.rims(self._fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
+        rims = {key: gbuffer.rims(fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._coverage = {key: self._ask(answerer.coverage, key, asked, "rim") for key, asked in rims.items()}
 
     def part(self, side: int, layers: bool) -> PicturePart:
@@ -220,14 +218,12 @@ class _UnderWay:
         covered = {key: frame.gbuffers[key].coverage(_gathered(rims, (0,))) for key, rims in self._coverage.items()}
         planes = {"backdrop": frame.backdrop.astype(np.float32)}
         for key, gbuffer in frame.gbuffers.items():
-            dark = np.zeros((len(gbuffer.place), 3))
-            planes["backdrop"] = compose(gbuffer, dark, planes["backdrop"], through[key], covered[key])
+            planes["backdrop"] = compose(gbuffer, 0.0, planes["backdrop"], through[key], covered[key])
         kept = {name: np.arange(4) == index for index, name in enumerate(COMPONENTS)} if layers else {"light": True}
         for name, chosen in kept.items():
             planes[name] = np.zeros(frame.backdrop.shape, np.float32)
             for key, gbuffer in frame.gbuffers.items():
-                own = np.where(chosen, answers[key][:, :4], np.float32(0.0))
-                rgb = coloured(own, colours[key])
+                rgb = coloured(np.where(chosen, answers[key][:, :4], np.float32(0.0)), colours[key])
                 if key in later:
                     rgb += np.where(np.broadcast_to(chosen, 4)[2:, None], later[key], 0.0).sum(axis=1)
                 planes[name] = compose(gbuffer, rgb, planes[name], coverage=covered[key])

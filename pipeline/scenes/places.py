@@ -25,15 +25,13 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.scenes.loading import Loaded
 from pipeline.scenes.rays import first_hits, in_sight
 from pipeline.scenes.scene import Cloth
 from pipeline.truth.query import STEEPEST_CURVATURE
 from weaves.errors import BadInput
-
-Floats = npt.NDArray[np.float64]
 
 _STEP = 0.1  # in yarn spacings
 _PROBES = 6
@@ -45,20 +43,20 @@ LEAST_CURVATURE: Final = 1e-4
 class Places(NamedTuple):
     """N places of one cloth in the world, the cloth's own scale and turn applied."""
 
-    position: Floats
-    outward: Floats
+    position: Float64
+    outward: Float64
     """Geometric normal on the shading normal's side, (N, 3)."""
-    frame: Floats
+    frame: Float64
     """Rows x, y, z, (N, 3, 3)."""
-    uv: Floats
+    uv: Float64
     """In yarn spacings, (N, 2)."""
-    jacobian: Floats
+    jacobian: Float64
     """d(uv)/d(pixel), (N, 2, 2)."""
-    tangents: Floats
+    tangents: Float64
     """Columns: the world's length along u and along v of one yarn spacing, (N, 3, 2)."""
 
 
-def places_of(loaded: Loaded, key: str, cloth: Cloth, found: dict[str, Floats]) -> Places:
+def places_of(loaded: Loaded, key: str, cloth: Cloth, found: dict[str, Float64]) -> Places:
     """Bring the AOVs of a cloth's pixels into its scale and turn."""
     normal = unit(found["sh_normal"])
     outward = found["geo_normal"] * np.where(dot(found["geo_normal"], normal) < 0.0, -1.0, 1.0)[:, None]
@@ -80,7 +78,7 @@ def places_of(loaded: Loaded, key: str, cloth: Cloth, found: dict[str, Floats]) 
     return Places(found["position"], outward, frame, (found["uv"] * yarns) @ turn.T, turn @ jacobian, tangents)
 
 
-def tilted(wo: Floats, side: Floats, largest_angle: float) -> Floats:
+def tilted(wo: Float64, side: Float64, largest_angle: float) -> Float64:
     """Lift directions that are more grazing than allowed, or on the wrong side, up to the limit."""
     least = math.cos(math.radians(largest_angle))
     grazing = side * wo[:, 2] < least
@@ -90,7 +88,7 @@ def tilted(wo: Floats, side: Floats, largest_angle: float) -> Floats:
     return lifted
 
 
-def curvature_of(loaded: Loaded, places: Places, wo: Floats) -> Floats:
+def curvature_of(loaded: Loaded, places: Places, wo: Float64) -> Float64:
     """Return the curvature along the view ray in 1/yarn spacings."""
     tangent, spacing = _along_view(places, wo)
     step, normal = _STEP * spacing[:, None], places.frame[:, 2]
@@ -108,7 +106,7 @@ def curvature_of(loaded: Loaded, places: Places, wo: Floats) -> Floats:
     return np.asarray(np.minimum(kappa, STEEPEST_CURVATURE))
 
 
-def least_curvature(loaded: Loaded, places: Places, wo: Floats, at_place: Floats) -> Floats:
+def least_curvature(loaded: Loaded, places: Places, wo: Float64, at_place: Float64) -> Float64:
     """Return the least curvature along the view ray past N places, which have `at_place`, (N,).
 
     `wo` are tilted nowhere. Where no ray leaves the boundary, it is that at the place.
@@ -139,7 +137,7 @@ def least_curvature(loaded: Loaded, places: Places, wo: Floats, at_place: Floats
     return np.where(least > LEAST_CURVATURE, least, 0.0)
 
 
-def rims_of(loaded: Loaded, places: Places, wo: Floats, curvature: Floats) -> npt.NDArray[np.int64]:
+def rims_of(loaded: Loaded, places: Places, wo: Float64, curvature: Float64) -> Index:
     """Return which of N places are at a silhouette, as indices; `wo` are tilted nowhere."""
     slope, shallow = _shallow(wo, curvature)
     # Past the place where a ray comes up again.
@@ -150,13 +148,13 @@ def rims_of(loaded: Loaded, places: Places, wo: Floats, curvature: Floats) -> np
     return in_sight(loaded.mi, loaded.dressed, start, away, np.full(len(wo), np.inf), shallow)
 
 
-def _shallow(wo: Floats, curvature: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _shallow(wo: Float64, curvature: Float64) -> tuple[Float64, Mask]:
     """Return the slopes of view rays to the tangent plane, (N,), and whether they may leave the cloth again."""
     slope = wo[:, 2] / np.maximum(np.linalg.norm(wo[:, :2], axis=-1), 1e-12)
     return slope, (curvature > 0.0) & ((slope <= 0.0) | (slope * slope < 2.0 * _DEEPEST * curvature))
 
 
-def _along_view(places: Places, wo: Floats) -> tuple[Floats, Floats]:
+def _along_view(places: Places, wo: Float64) -> tuple[Float64, Float64]:
     """Return the unit tangents towards the viewer, (N, 3), and the world's length of a yarn spacing along them."""
     # A viewer on the normal looks along x.
     flat = np.where(np.linalg.norm(wo[:, :2], axis=-1, keepdims=True) > 1e-6, wo[:, :2], [1.0, 0.0])
@@ -165,7 +163,7 @@ def _along_view(places: Places, wo: Floats) -> tuple[Floats, Floats]:
     return tangent, 1.0 / np.maximum(yarns, 1e-12)
 
 
-def _refuse_shear(loaded: Loaded, key: str, du: Floats, dv: Floats) -> None:
+def _refuse_shear(loaded: Loaded, key: str, du: Float64, dv: Float64) -> None:
     """Refuse cloth whose coordinates are sheared more than allowed."""
     cosine = np.abs(dot(unit(du), unit(dv)))
     shear = math.degrees(math.asin(min(float(cosine.max(initial=0.0)), 1.0)))
@@ -174,11 +172,11 @@ def _refuse_shear(loaded: Loaded, key: str, du: Floats, dv: Floats) -> None:
         raise BadInput(f"scene {loaded.scene.name}", f"fabric_{key}", f"sheared by {shear:.1f} degrees", allowed)
 
 
-def dot(a: Floats, b: Floats) -> Floats:
+def dot(a: Float64, b: Float64) -> Float64:
     """Return the dot products of N pairs of vectors, (N,)."""
     return np.asarray(np.einsum("ni,ni->n", a, b))
 
 
-def unit(vectors: Floats) -> Floats:
+def unit(vectors: Float64) -> Float64:
     """Return the unit vectors along N vectors, (N, 3); 0 for 0."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))

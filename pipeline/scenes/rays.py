@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from pipeline.compiled.arrays import Float64, Index, Mask
 
 _OFF = 2e-5  # float32 knows a position to 6e-8 of its size
+_CHANNELS: Final = {"uv": 2, "duv_dx": 2, "duv_dy": 2, "shape_index": 1}  # of AOVs; all others have 3
 
 
 class FirstHits(NamedTuple):
     """Where N rays hit first; NaN where they miss."""
 
-    distance: Floats
+    distance: Float64
     """In lengths of the direction, (N,)."""
-    normal: Floats
+    normal: Float64
     """Shading normal, (N, 3)."""
-    dp_du: Floats
+    dp_du: Float64
     """Change of position with u, (N, 3)."""
 
 
-def in_sight(
-    mi: Any, world: Any, origin: Floats, direction: Floats, distance: Floats, among: npt.NDArray[np.bool_]
-) -> npt.NDArray[np.int64]:
+def in_sight(mi: Any, world: Any, origin: Float64, direction: Float64, distance: Float64, among: Mask) -> Index:
     """Return which rays `among` N, (N,), hit nothing nearer than `distance` (inf: nothing at all), as indices."""
     index = np.flatnonzero(among)
     origin, direction, distance = origin[index], direction[index], distance[index] * (1.0 - 1e-4)
@@ -40,7 +38,7 @@ def in_sight(
     return index[~blocked]
 
 
-def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> FirstHits:
+def first_hits(mi: Any, world: Any, origin: Float64, direction: Float64) -> FirstHits:
     """Return where N rays hit first."""
     if mi.variant().startswith("scalar") or not len(origin):
         found = np.full((len(origin), 7), np.nan)
@@ -50,14 +48,13 @@ def first_hits(mi: Any, world: Any, origin: Floats, direction: Floats) -> FirstH
                 found[row] = [hit.t, *hit.sh_frame.n, *hit.dp_du]
     else:
         hit = world.ray_intersect(_rays(mi, origin, direction, np.full(len(origin), np.inf)))
-        planes = [
-            np.asarray(column, np.float64).reshape(-1, len(origin)).T for column in (hit.t, hit.sh_frame.n, hit.dp_du)
-        ]
-        found = np.where(np.asarray(hit.is_valid())[:, None], np.concatenate(planes, axis=1), np.nan)
+        columns = (np.asarray(column, np.float64) for column in (hit.t, hit.sh_frame.n, hit.dp_du))
+        planes = np.concatenate([column.reshape(-1, len(origin)).T for column in columns], axis=1)
+        found = np.where(np.asarray(hit.is_valid())[:, None], planes, np.nan)
     return FirstHits(found[:, 0], found[:, 1:4], found[:, 4:])
 
 
-def radiance(mi: Any, environment: Any, direction: Floats) -> Floats:
+def radiance(mi: Any, environment: Any, direction: Float64) -> Float64:
     """Return an environment light's linear RGB radiance from N directions, (N, 3)."""
     if mi.variant().startswith("scalar"):
         hit = mi.SurfaceInteraction3f()
@@ -73,25 +70,22 @@ def radiance(mi: Any, environment: Any, direction: Floats) -> Floats:
     return np.broadcast_to(np.asarray(environment.eval(hit), np.float64).T, (len(direction), 3))
 
 
-def off(position: Floats) -> Floats:
+def off(position: Float64) -> Float64:
     """Return how far beside each place of a surface a ray should start, (N,)."""
     return np.asarray(_OFF * (1.0 + np.abs(position).max(axis=-1, initial=0.0)))
 
 
-def _rays(mi: Any, origin: Floats, direction: Floats, distance: Floats) -> Any:
+def _rays(mi: Any, origin: Float64, direction: Float64, distance: Float64) -> Any:
     o, d = (vector.T.astype(np.float32) for vector in (origin, direction))
     return mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d), mi.Float(distance.astype(np.float32)), 0.0, [])
 
 
-def aovs_of(mi: Any, world: Any, sensor: Any, channels: Mapping[str, int]) -> dict[str, Floats]:
-    """Render AOVs by name, each (H, W, its `channels`), with one ray a pixel, 0 where it hits nothing.
-
-    The camera's filter is a box.
-    """
-    integrator = mi.load_dict({"type": "aov", "aovs": ",".join(f"{name}:{name}" for name in channels)})
+def aovs_of(mi: Any, world: Any, sensor: Any, names: Sequence[str]) -> dict[str, Float64]:
+    """Render AOVs by name, each (H, W, channels), with one ray a pixel and a box filter; 0 where it hits nothing."""
+    integrator = mi.load_dict({"type": "aov", "aovs": ",".join(f"{name}:{name}" for name in names)})
     planes = np.asarray(mi.render(world, sensor=sensor, integrator=integrator, spp=1), np.float64)
-    ends = np.cumsum(list(channels.values()))[:-1]
-    return dict(zip(channels, np.split(planes, ends, axis=-1), strict=True))
+    ends = np.cumsum([_CHANNELS.get(name, 3) for name in names])[:-1]
+    return dict(zip(names, np.split(planes, ends, axis=-1), strict=True))
 
 
 def shape_numbers(mi: Any, shapes: Sequence[Any]) -> list[int]:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from pipeline.compiled.arrays import Float32
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries
 from weaves.errors import BadInput
@@ -113,7 +114,7 @@ def _range(values: npt.NDArray[np.floating]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _steepest(directions: npt.NDArray[np.float32], margin: float) -> float:
+def _steepest(directions: Float32, margin: float) -> float:
     """Return the largest angle to the normal on either side, in degrees, with its margin."""
     angles = np.degrees(np.arccos(np.clip(np.abs(directions[:, 2].astype(np.float64)), 0.0, 1.0)))
     largest = _range(angles)[1]

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.footprint_colours import footprint_colours
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.scenes.bounces import check_bounces, later_bounces
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import BOUNCES, Bounces
@@ -17,7 +18,7 @@ from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
 
-def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64]:
+def colours(fabric: Fabric, transmitted: bool = False) -> Float64:
     """Return the linear RGB colours of the components in the order of `pipeline.truth.conventions.COMPONENTS`, (4, 3).
 
     Where ends or picks differ in colour, these are the means of their repeats. Light that is `transmitted`, from the
@@ -28,7 +29,7 @@ def colours(fabric: Fabric, transmitted: bool = False) -> npt.NDArray[np.float64
     return np.array([*(yarn.specular_rgb for yarn in yarns), *diffuse], dtype=np.float64)
 
 
-def colours_of(fabric: Fabric, queries: Queries) -> npt.NDArray[np.float64]:
+def colours_of(fabric: Fabric, queries: Queries) -> Float64:
     """Return the colours of the components of each query, (N, 4, 3): transmitted light has its own.
 
     Where ends or picks differ in colour, these are mean colours of the footprint's threads
@@ -46,7 +47,7 @@ def shade(
     queries: Queries,
     bounces: Bounces = BOUNCES,
     colours: npt.NDArray[np.floating] | None = None,
-) -> npt.NDArray[np.float64]:
+) -> Float64:
     """Return the patch BSDF in linear RGB, (N, 3), from components with unit colour, (N, 4), and their queries.
 
     With all bounces, light that yarns give to each other is added. Colours, (N, 4, 3), are those of `colours_of` unless
@@ -58,7 +59,7 @@ def shade(
     return rgb if bounces == 1 else rgb + later_bounces(fabric, queries, colours).sum(axis=1)
 
 
-def coloured(components: npt.ArrayLike, colours: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
+def coloured(components: npt.ArrayLike, colours: npt.NDArray[np.floating]) -> Float64:
     """Return the patch BSDF in linear RGB, (N, 3), from components (N, 4) and the colours of each, (N, 4, 3)."""
     return np.asarray(np.einsum("nc,ncx->nx", np.asarray(components, np.float64), colours))
 
@@ -69,7 +70,7 @@ def compose(
     background: npt.ArrayLike = 0.0,
     transparency: npt.ArrayLike = 0.0,
     coverage: npt.ArrayLike = 1.0,
-) -> npt.NDArray[np.float32]:
+) -> Float32:
     """Lay a fabric over a background, in linear RGB (H, W, 3); several fabrics one after the other.
 
     A place shows C (L + T background) + (1 - C) background: C the coverage, T the transparency, L the sum of
@@ -78,18 +79,8 @@ def compose(
     once, opacity is C (1 - gaps), and flat cloth has C = 1. The background is `SceneFrame.backdrop`: cloth behind
     cloth is not seen through gaps, nor past a silhouette.
 
-    Parameters
-    ----------
-    gbuffer : GBuffer
-        What the fabric's pixels show.
-    rgb : array_like (M, 3)
-        Patch BSDF of its M queries.
-    background : array_like
-        What is seen beside the fabric and through it: a number, or a picture (H, W, 3).
-    transparency : array_like
-        Share of the background that comes through the fabric's gaps and yarns: a number or (N,).
-    coverage : array_like
-        Share of the view rays that do not leave the cloth again: a number or (N,).
+    `rgb` (M, 3) is the patch BSDF of the M queries; the background a number or a picture (H, W, 3); transparency and
+    coverage of the N places are numbers or (N,).
     """
     light = np.zeros((len(gbuffer.pixel), 3))
     np.add.at(light, gbuffer.place, gbuffer.irradiance * np.asarray(rgb))

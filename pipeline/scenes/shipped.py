@@ -13,19 +13,16 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.scenes import swatch
 from pipeline.scenes.scene import Cloth, Scene
-
-Floats = npt.NDArray[np.float64]
 
 DRAPE_YARNS: Final = 80.0
 """Yarns along a unit of uv of the scene `drape`."""
 
-HEM_YARNS: Final = 100.0
-"""Yarns along a unit of uv of the scene `hem`."""
-
 _SIZE: Final = (256, 192)
-_HEM_FOCAL, _HEM_RADIUS = 1200.0, 8.0 / HEM_YARNS  # in pixels; in the scene's lengths
+_HEM_YARNS: Final = 100.0  # along a unit of uv of the scene `hem`
+_HEM_FOCAL, _HEM_RADIUS = 1200.0, 8.0 / _HEM_YARNS  # in pixels; in the scene's lengths
 _HEMS: Final = (  # pixels of a yarn; in the picture, from its centre: left and right, height of the axis, tilt
     (40.0, -300, -110, -190, 5.0),
     (40.0 / 3.0, -95, 25, -60, -8.0),
@@ -63,10 +60,10 @@ def _sphere(mi: Any) -> dict[str, Any]:
     u, v = np.meshgrid(line, line)
     square = u * u + v * v
     # The near pole looks to -y, where the camera is; z is up.
-    points = np.stack([4.0 * u, square - 4.0, 4.0 * v], axis=-1) / (4.0 + square)[..., None]
+    points = _joined(4.0 * u, square - 4.0, 4.0 * v) / (4.0 + square)[..., None]
     return {
         "type": "scene",
-        "ball": sheet(mi, "silk_charmeuse", points, points, np.stack([u, v], axis=-1)),
+        "ball": sheet(mi, "silk_charmeuse", points, points, _joined(u, v)),
         "core": {"type": "sphere", "radius": 0.98},
         "sun": sun([-0.45, -0.7, 0.55], 2.6),
         "sky": _sky(0.08, 0.09, 0.11),
@@ -74,7 +71,7 @@ def _sphere(mi: Any) -> dict[str, Any]:
     }
 
 
-def drape_surface() -> tuple[Floats, Floats, Floats]:
+def drape_surface() -> tuple[Float64, Float64, Float64]:
     """Return points (R, C, 3), unit normals (R, C, 3) and uv (R, C, 2) of cloth held at one place; z is up.
 
     Every surface of straight lines through one point unrolls: at the distance r from the point it is r c(t), with c a
@@ -91,7 +88,7 @@ def drape_surface() -> tuple[Floats, Floats, Floats]:
     normal = np.cross(along, -curve)
     radius = np.linspace(0.25, 1.6, 25)[::-1, None]
     points = radius[..., None] * curve
-    uv = np.stack([radius * np.sin(angle), -radius * np.cos(angle)], axis=-1)
+    uv = _joined(radius * np.sin(angle), -radius * np.cos(angle))
     return points, np.broadcast_to(normal, points.shape), uv
 
 
@@ -121,13 +118,10 @@ def _roll(mi: Any) -> dict[str, Any]:
 
 def _curtain(mi: Any) -> dict[str, Any]:
     """Return voile with the sun behind it, and the bars of a window, whose shadows fall on it."""
-    x = np.linspace(-1.3, 1.3, 1601)
+    x, height = np.linspace(-1.3, 1.3, 1601), np.linspace(-0.9, 0.9, 3)[:, None]
     curve = np.stack([x, 0.075 * np.sin(14.0 * x + 0.9 * np.sin(3.1 * x))], axis=-1)
     length, along = developed(curve)
-    normal = np.stack([along[:, 1], -along[:, 0], np.zeros_like(x)], axis=-1)
-    height = np.linspace(-0.9, 0.9, 3)[:, None]
-    points = np.stack(np.broadcast_arrays(curve[:, 0], curve[:, 1], height), axis=-1)
-    uv = np.stack(np.broadcast_arrays(length, height), axis=-1)
+    normal = _joined(along[:, 1], -along[:, 0], 0.0)
     wood = {"type": "diffuse", "reflectance": _rgb(0.25, 0.18, 0.12)}
     bars = {"upright": ([0.0, 0.4, 0.0], [0.05, 0.03, 2.0]), "across": ([0.0, 0.4, 0.1], [2.0, 0.03, 0.05])}
     window = {
@@ -136,7 +130,7 @@ def _curtain(mi: Any) -> dict[str, Any]:
     }
     return {
         "type": "scene",
-        "curtain": sheet(mi, "voile", points, np.broadcast_to(normal, points.shape), uv),
+        "curtain": sheet(mi, "voile", _joined(curve[:, 0], curve[:, 1], height), normal, _joined(length, height)),
         **window,
         "sun": sun([0.35, 0.8, 0.45], 3.0),
         "sky": _sky(0.30, 0.36, 0.45),
@@ -192,20 +186,19 @@ def _hem(mi: Any) -> dict[str, Any]:
     turn = np.linspace(math.pi, 0.0, 513)
     lines = {}
     for number, (pixels, left, right, height, tilt) in enumerate(_HEMS):
-        away = _HEM_FOCAL / (pixels * HEM_YARNS)
+        away = _HEM_FOCAL / (pixels * _HEM_YARNS)
         pixel, hang = away / _HEM_FOCAL, 0.5 * away
         profile = _HEM_RADIUS * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
         profile = np.concatenate([[[-_HEM_RADIUS, -hang]], profile, [[_HEM_RADIUS, -hang]]])
         length, along = developed(profile)
         along[[0, 1, -2, -1]] = [[0, 1], [0, 1], [0, -1], [0, -1]]
         x = np.linspace(left * pixel, right * pixel, 3)
-        sheets = np.broadcast_arrays(x, away + profile[:, :1], height * pixel + profile[:, 1:])
-        normal = np.stack([np.zeros(len(along)), -along[:, 1], along[:, 0]], axis=-1)[:, None]
+        points = _joined(x, away + profile[:, :1], height * pixel + profile[:, 1:])
+        normal = _joined(0.0, -along[:, 1:], along[:, :1])
         sine, cosine = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
         roll = np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]])
-        points = np.stack(sheets, axis=-1) @ roll.T
-        uv = np.stack(np.broadcast_arrays(x, length[:, None]), axis=-1)
-        lines[f"strip_{number}"] = sheet(mi, "denim", points, np.broadcast_to(normal @ roll.T, points.shape), uv)
+        uv = _joined(x, length[:, None])
+        lines[f"strip_{number}"] = sheet(mi, "denim", points @ roll.T, normal @ roll.T, uv)
     return {
         "type": "scene",
         **lines,
@@ -215,19 +208,22 @@ def _hem(mi: Any) -> dict[str, Any]:
     }
 
 
-def _waves(mi: Any, cloth: str, x: Floats, y: Floats, z: Floats) -> Any:
+def _waves(mi: Any, cloth: str, x: Float64, y: Float64, z: Float64) -> Any:
     """Return a strip with the waves z(y), swept along x."""
     length, along = developed(np.stack([y, z], axis=-1))
-    normal = np.stack([np.zeros_like(y), -along[:, 1], along[:, 0]], axis=-1)[:, None]
-    points = np.stack(np.broadcast_arrays(x, y[:, None], z[:, None]), axis=-1)
-    uv = np.stack(np.broadcast_arrays(x, length[:, None]), axis=-1)
-    return sheet(mi, cloth, points, np.broadcast_to(normal, points.shape), uv)
+    points, normal = _joined(x, y[:, None], z[:, None]), _joined(0.0, -along[:, 1:], along[:, :1])
+    return sheet(mi, cloth, points, normal, _joined(x, length[:, None]))
 
 
-def sheet(mi: Any, cloth: str, points: Floats, normals: Floats, uv: Floats) -> Any:
+def _joined(*coordinates: npt.ArrayLike) -> Float64:
+    """Return vectors (..., n) from n coordinates, which are broadcast."""
+    return np.stack(np.broadcast_arrays(*coordinates), axis=-1)
+
+
+def sheet(mi: Any, cloth: str, points: Float64, normals: Float64, uv: Float64) -> Any:
     """Return the mesh of a grid of points (R, C, 3), two triangles a cell, that wears the cloth of a key.
 
-    `normals` (R, C, 3) are unit normals of the front, `uv` (R, C, 2) lengths along the weft and along the warp.
+    `normals`, which broadcast to the points, are unit normals of the front, `uv` (R, C, 2) lengths along weft and warp.
     """
     rows, columns = points.shape[:2]
     corner = np.arange(rows * columns).reshape(rows, columns)
@@ -238,15 +234,15 @@ def sheet(mi: Any, cloth: str, points: Floats, normals: Floats, uv: Floats) -> A
     has = {"has_vertex_normals": True, "has_vertex_texcoords": True}
     mesh = mi.Mesh(cloth, vertex_count=rows * columns, face_count=len(faces), props=settings, **has)
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = points.astype(np.float32).ravel()
-    parameters["vertex_normals"] = normals.astype(np.float32).ravel()
-    parameters["vertex_texcoords"] = uv.astype(np.float32).ravel()
+    of_vertices = {"positions": points, "normals": np.broadcast_to(normals, points.shape), "texcoords": uv}
+    for name, values in of_vertices.items():
+        parameters[f"vertex_{name}"] = values.astype(np.float32).ravel()
     parameters["faces"] = faces.astype(np.uint32).ravel()
     parameters.update()
     return mesh
 
 
-def developed(curve: Floats) -> tuple[Floats, Floats]:
+def developed(curve: Float64) -> tuple[Float64, Float64]:
     """Return arc length from the start along a curve of points (n, d), and unit tangents (n, d).
 
     The curve must be finely sampled; tangents are central differences.
@@ -312,7 +308,7 @@ _SCENES: Final = (
         runner=Cloth(fabric="silk_charmeuse", yarns=(1.0 / _SPACING, 1.0 / _SPACING)),
         napkin=Cloth(fabric="denim", yarns=(36.0, math.dist(_NEAR, _FAR) / _SPACING)),
     ),
-    _scene(_hem, (0.0001, 0.00005, 0.0), denim=Cloth(yarns=(HEM_YARNS, HEM_YARNS), turn=24.0)),
+    _scene(_hem, (0.0001, 0.00005, 0.0), denim=Cloth(yarns=(_HEM_YARNS, _HEM_YARNS), turn=24.0)),
     _scene(_swatch, (0.001, 0.0005, 0.0), swatch=Cloth(fabric="herringbone", yarns=(48.0, 48.0))),
 )
 

@@ -17,13 +17,12 @@ from xml.parsers import expat
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64
 from pipeline.scenes.scene import PREFIX, Scene
 from weaves.errors import BadInput, one_line
 from weaves.reading import MIB, read_text, refuse_irregular
 
-MOST_DEPTH: Final = 32
-"""Most elements inside one another."""
-
+_MOST_DEPTH: Final = 32  # elements inside one another
 _MOST_BYTES: Final = 16 * MIB
 _MOST_ELEMENTS: Final = 200_000
 _MOST_INCLUDED: Final = 64
@@ -76,7 +75,7 @@ def refuse_deadly(scene: Scene) -> None:
 def elements(scene: Scene) -> list[Element]:
     """Return the elements of a scene's XML and of the files that it includes; none of a scene that is no file.
 
-    BadInput if a file is no XML, too large, nested more deeply than `MOST_DEPTH`, of too many elements, has a document
+    BadInput if a file is no XML, too large, nested more deeply than `_MOST_DEPTH`, of too many elements, has a document
     type or an element `path`, or names a file by a parameter or one that is no regular file.
     """
     if not isinstance(scene.source, Path):
@@ -103,8 +102,8 @@ def _parsed(path: Path) -> list[Element]:
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth
         depth += 1
-        if depth > MOST_DEPTH:
-            raise BadInput(where, "", "nested too deeply", f"at most {MOST_DEPTH} levels are allowed")
+        if depth > _MOST_DEPTH:
+            raise BadInput(where, "", "nested too deeply", f"at most {_MOST_DEPTH} levels are allowed")
         if len(found) == _MOST_ELEMENTS:
             raise BadInput(where, "", "too many elements", f"at most {_MOST_ELEMENTS:,} are allowed")
         found.append(Element(tag, attributes, path.parent))
@@ -161,7 +160,7 @@ def _refuse_numbers(element: Element, where: str) -> None:
             raise BadInput(where, "matrix", of["value"], "must have an inverse")
 
 
-def _numbers(text: str) -> npt.NDArray[np.float64]:
+def _numbers(text: str) -> Float64:
     """Return the numbers of an attribute; none if it holds anything else."""
     try:
         return np.array(text.replace(",", " ").split(), np.float64)

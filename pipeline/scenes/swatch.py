@@ -12,15 +12,13 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.scenes.frame import LEAST_SIGMA, SceneFrame
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.loading import FilmWindow
 from pipeline.scenes.options import PixelOptions
 from pipeline.scenes.places import LEAST_CURVATURE, dot, tilted, unit
-
-Floats = npt.NDArray[np.float64]
 
 EYE: Final = (0.0, -1.5, 1.6)
 """Place of the camera."""
@@ -38,12 +36,12 @@ HALF_BOARD: Final = 20.0
 _STEPS = 8  # of Newton's method: the slope is at most .32
 
 
-def height(y: Floats) -> Floats:
+def height(y: Float64) -> Float64:
     """Return the height of the cloth above the board."""
     return np.asarray(0.01 + 0.05 * (1.0 + np.cos(2.0 * np.pi * y)))
 
 
-def _slope(y: Floats) -> Floats:
+def _slope(y: Float64) -> Float64:
     return np.asarray(-0.1 * np.pi * np.sin(2.0 * np.pi * y))
 
 
@@ -88,14 +86,8 @@ class Swatch(NamedTuple):
         return SceneFrame({"swatch": gbuffer}, *planes)
 
     def _gbuffer(
-        self,
-        mask: npt.NDArray[np.bool_],
-        pixels: npt.NDArray[np.int64],
-        position: Floats,
-        ray: Floats,
-        right: Floats,
-        down: Floats,
-    ) -> tuple[GBuffer, Floats]:
+        self, mask: Mask, pixels: Index, position: Float64, ray: Float64, right: Float64, down: Float64
+    ) -> tuple[GBuffer, Float64]:
         """Return the G-buffer and the normals of the places of the cloth."""
         y = position[:, 1]
         slope, bend = _slope(y), -0.2 * np.pi**2 * np.cos(2.0 * np.pi * y)
@@ -131,7 +123,7 @@ class Swatch(NamedTuple):
         return GBuffer(mask, pixels, *footprint, wo, place, wi, irradiance), normal
 
 
-def _met(start: Floats, ray: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _met(start: Float64, ray: Float64) -> tuple[Float64, Mask]:
     """Return how far along each of N rays the fold is, in their lengths, and whether the cloth is there."""
     with np.errstate(all="ignore"):
         distance = (0.06 - start[:, 2]) / ray[:, 2]

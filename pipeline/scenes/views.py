@@ -18,13 +18,11 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.compiled.arrays import Float64, Mask
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import View, ViewOptions
 from pipeline.scenes.places import unit
-
-Floats = npt.NDArray[np.float64]
 
 HEADING: Final = 37.0
 """Direction in which the cloth slides from frame to frame, as an angle from the weft, in degrees."""
@@ -39,15 +37,15 @@ _SPHERE_FILL = 0.94  # share of the picture's shorter side that the sphere takes
 class _Surface(NamedTuple):
     """Where the rays of a view meet its surface; M rays."""
 
-    hit: npt.NDArray[np.bool_]
+    hit: Mask
     """Rays that do, (H, W); M of them."""
-    distance: Floats
+    distance: Float64
     """Ray parameter of the hits, in lengths of the unnormalised ray, (M,)."""
-    uv: Floats
+    uv: Float64
     """Coordinates in yarn spacings, (M, 2)."""
-    frame: Floats
+    frame: Float64
     """Rows: unit vectors along the weft, along the warp, and the normal, (M, 3, 3)."""
-    spacing: Floats
+    spacing: Float64
     """Length of a yarn spacing in the world, (M,)."""
 
 
@@ -80,7 +78,7 @@ def _sphere(width: int, height: int, shift: float, options: ViewOptions) -> GBuf
     uv, weft, warp = _turned(np.stack([x, y], -1) / spacing, along_x, along_y, options.turn)
     surface = _Surface(hit, distance, uv, np.stack([unit(weft), unit(warp), normal], axis=1), spacing * scale)
     light = _direction(options.sphere_light)
-    return _gbuffer(surface, rays, focal, light, shift / _SPHERE_PIXELS, options)
+    return _gbuffer(surface, rays, light, shift / _SPHERE_PIXELS, options)
 
 
 def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuffer:
@@ -104,12 +102,10 @@ def _plane(width: int, height: int, shift: float, options: ViewOptions) -> GBuff
     uv, weft, warp = _turned(position[:, :2], east, north, options.turn)
     surface = _Surface(hit, distance, uv, np.stack([weft, warp, up], axis=1), ones)
     light = _direction(_PLANE_LIGHT)
-    return _gbuffer(surface, rays, focal, light, shift / options.plane_pixels_per_yarn, options)
+    return _gbuffer(surface, rays, light, shift / options.plane_pixels_per_yarn, options)
 
 
-def _gbuffer(
-    surface: _Surface, rays: Floats, focal: float, light: Floats, slide: float, options: ViewOptions
-) -> GBuffer:
+def _gbuffer(surface: _Surface, rays: Float64, light: Float64, slide: float, options: ViewOptions) -> GBuffer:
     """Bring directions and footprints into the local frames; `slide` in yarn spacings."""
     wo = -unit(np.einsum("mij,mj->mi", surface.frame, rays[surface.hit]))
     wi = surface.frame @ light
@@ -121,24 +117,19 @@ def _gbuffer(
     # The cloth slides along `HEADING`: the same pixel then shows a patch further back.
     heading = math.radians(HEADING)
     uv = surface.uv - slide * np.array([math.cos(heading), math.sin(heading)])
-    sigma = _footprint(surface, rays, focal, options)[above]
-    flat, places = np.zeros_like(sigma), np.arange(len(sigma))
-    irradiance = np.full((len(sigma), 3), options.irradiance)
-    u, v = uv[above].T
-    queries = places, wi[above], irradiance
+    sigma = _footprint(surface, rays, options)[above]
+    flat, (u, v) = np.zeros_like(sigma), uv[above].T
+    queries = np.arange(len(sigma)), wi[above], np.full((len(sigma), 3), options.irradiance)
     return GBuffer(mask, np.flatnonzero(lit), u, v, sigma, sigma, flat, flat, wo[above], *queries)
 
 
-def _footprint(surface: _Surface, rays: Floats, focal: float, options: ViewOptions) -> Floats:
+def _footprint(surface: _Surface, rays: Float64, options: ViewOptions) -> Float64:
     """Return the round footprint of every hit pixel, in yarn spacings.
 
     With the hit p = o + t d, moving the ray by e keeps p on the tangent plane when dp = t (e - d (n.e)/(n.d)).
     """
-    step_right, step_up = (rays[0, 1] - rays[0, 0]), (rays[0, 0] - rays[1, 0])
-    ray = rays[surface.hit]
-    normal = surface.frame[:, 2]
-    columns = []
-    for step in (step_right, step_up):
+    ray, normal, columns = rays[surface.hit], surface.frame[:, 2], []
+    for step in (rays[0, 1] - rays[0, 0], rays[0, 0] - rays[1, 0]):  # to the right, and up
         slope = (normal @ step) / np.einsum("mi,mi->m", normal, ray)
         moved = surface.distance[:, None] * (step - ray * slope[:, None])
         columns.append(np.einsum("mij,mj->mi", surface.frame[:, :2], moved) / surface.spacing[:, None])
@@ -153,23 +144,21 @@ def _footprint(surface: _Surface, rays: Floats, focal: float, options: ViewOptio
     return np.asarray(np.minimum(options.pixel_sigma * axis, options.largest_sigma))
 
 
-def _rays(width: int, height: int, focal: float) -> Floats:
+def _rays(width: int, height: int, focal: float) -> Float64:
     """Return screen coordinates of the pixel centres over the focal length, x right and y up, (H, W, 3); z is 0."""
     x = (np.arange(width) + 0.5 - 0.5 * width) / focal
     y = (0.5 * height - np.arange(height) - 0.5) / focal
-    rays = np.zeros((height, width, 3))
-    rays[..., 0], rays[..., 1] = x[None, :], y[:, None]
-    return rays
+    return np.stack(np.broadcast_arrays(x[None, :], y[:, None], 0.0), axis=-1)
 
 
-def _turned(position: Floats, along_x: Floats, along_y: Floats, turn: float) -> tuple[Floats, Floats, Floats]:
+def _turned(position: Float64, along_x: Float64, along_y: Float64, turn: float) -> tuple[Float64, Float64, Float64]:
     """Turn coordinates and axes counter-clockwise by `turn` degrees."""
     cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
     uv = position @ np.array([[cosine, -sine], [sine, cosine]])
     return uv, cosine * along_x + sine * along_y, cosine * along_y - sine * along_x
 
 
-def _direction(angles: tuple[float, float]) -> Floats:
+def _direction(angles: tuple[float, float]) -> Float64:
     """Return the unit vector at (angle from z, azimuth from x) in degrees."""
     polar, azimuth = (math.radians(angle) for angle in angles)
     return np.array([math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)])

@@ -24,15 +24,12 @@ GROUP: Final = "twillight.methods"
 Kind = Literal["behind", "stretch", "curvature"]
 """Kind of queries beyond flat cloth, round footprints and light from the front."""
 
-Limit = Annotated[float, Field(gt=0, le=86_400)]
-"""Seconds."""
-
 
 class CallLimits(Frozen):
     """Limits of code from outside; no part of an identity."""
 
-    limit: Limit = 600.0
-    """Longest time of one call."""
+    limit: Annotated[float, Field(gt=0, le=86_400)] = 600.0
+    """Longest time of one call, in seconds."""
     memory: Annotated[float, Field(gt=0, le=1024)] = 4.0
     """Most memory of each of its processes, in GiB: of data that is its own, not of mapped files."""
 
@@ -122,7 +119,7 @@ class AddedMethod(AddedCode, Options):
         return self.has_one_fabric
 
     @property
-    def kinds(self) -> frozenset[str]:
+    def kinds(self) -> frozenset[str]:  # type: ignore[override]
         """Kinds of queries that it evaluates."""
         return frozenset(self.answers)
 

@@ -15,26 +15,17 @@ from pipeline.models.added.source import ADD, locate
 from weaves.errors import BadInput, brief, nearest
 from weaves.validation import validated
 
-LOADING: Final = 60.0
-"""Seconds that importing a method's code, and making the method, may take."""
+_LOADING: Final = 60.0  # seconds that importing a method's code, and making the method, may take
+_FUNCTIONS: Final = ("covers", "prepare", "predict", "bytes_stored")  # of `pipeline.models.method.Method`
+_TRAINED: Final = ("network", "load")  # functions of methods whose network is trained
+_STATED: Final = ("name", "setting", "version")  # attributes that every method has
+_MAY_STATE: Final = ("kinds", "of_one_material")  # attributes that may be missing
 
-_FUNCTIONS: Final = ("covers", "prepare", "predict", "bytes_stored")
-"""Functions of `pipeline.models.method.Method`."""
+# The cloth, N queries about it, the method's answers, the truth's and their errors, (N, 4).
+_METRIC_PARAMETERS: Final = ("fabric", "queries", "answers", "truth", "standard_error")
 
-_TRAINED: Final = ("network", "load")
-"""Functions of methods whose network is trained (`pipeline.models.added.network`)."""
-
-_STATED: Final = ("name", "setting", "version")
-"""Attributes that every method has."""
-
-_MAY_STATE: Final = ("kinds", "of_one_material")
-"""Attributes that may be missing."""
-
-METRIC_PARAMETERS: Final = ("fabric", "queries", "answers", "truth", "standard_error")
-"""Parameters of a metric: the cloth, N queries about it, the method's answers, the truth's and their errors, (N, 4)."""
-
+# Attributes that a metric may have, with their defaults.
 _OF_METRICS: Final = {"title": "", "unit": "1", "better": "lower", "format": "significant"}
-"""Attributes that a metric may have, with their defaults."""
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _SETTING: Final = re.compile(r"[\w .,=+%()-]{0,40}")  # it becomes part of file names and of tables in Markdown
@@ -64,7 +55,7 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
     """Return the fields of the options; runs in a process of its own."""
     source = locate(text)
     sha256 = source.sha256()
-    with faults_of(source.name, "import", LOADING, source.root):
+    with faults_of(source.name, "import", _LOADING, source.root):
         module = source.imported()
     make = source.of(module)
     code = {"source": source.text, "folder": source.folder, "sha256": sha256, "distribution": source.distribution()}
@@ -73,9 +64,9 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
     if not callable(make):
         raise BadInput(ADD, "", text, "is no class of a method and no function of a metric")
     _check_options(make, own, text)
-    with faults_of(source.name, "__init__", LOADING, source.root):
+    with faults_of(source.name, "__init__", _LOADING, source.root):
         method = make(**own)
-    with faults_of(source.name, "its attributes", LOADING, source.root):
+    with faults_of(source.name, "its attributes", _LOADING, source.root):
         names = (*_STATED, *_MAY_STATE, *_FUNCTIONS, *_TRAINED)
         has = {name: getattr(method, name) for name in names if hasattr(method, name)}
         if not isinstance(has.get("kinds", ""), str):
@@ -85,18 +76,15 @@ def _described(text: str, own: dict[str, Any], progress: Callable[[float], None]
 
 def _stated_by_function(function: Callable[..., Any], text: str) -> dict[str, Any]:
     """Return what a metric says of itself: its name, its docstring, and its attributes."""
-    if len(inspect.signature(function).parameters) != len(METRIC_PARAMETERS):
-        raise BadInput(ADD, "", text, f"a metric is a function of {', '.join(METRIC_PARAMETERS)}")
+    if len(inspect.signature(function).parameters) != len(_METRIC_PARAMETERS):
+        raise BadInput(ADD, "", text, f"a metric is a function of {', '.join(_METRIC_PARAMETERS)}")
     definition = " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split())
     if not definition:
         raise BadInput(ADD, "", text, "lacks a docstring, which defines the metric on the page")
     stated = {key: getattr(function, key, default) for key, default in _OF_METRICS.items()}
-    name = function.__name__
-    words = name.replace("_", " ")
-    return {**stated, "title": stated["title"] or words, "stated": str(getattr(function, "version", 1))} | {
-        "name": name,
-        "definition": definition,
-    }
+    name, version = function.__name__, str(getattr(function, "version", 1))
+    stated["title"] = stated["title"] or name.replace("_", " ")
+    return {**stated, "stated": version, "name": name, "definition": definition}
 
 
 def _check_options(make: Callable[..., Any], own: Mapping[str, Any], text: str) -> None:

@@ -142,32 +142,38 @@ class Guarded:
 
     Its name in tables is that of its options; `root` is its file, or the folder of its package. Answers that are
     negative or not finite are refused if `values`; else only their form is checked. Without the `domain` of its
-    training it takes any query.
+    training it takes any query. If methods know one fabric each, `of` returns that of a fabric, None if there is none.
     """
 
     def __init__(
-        self, method: Method, options: AddedMethod, root: Path, values: bool = True, domain: Domain | None = None
+        self,
+        method: Method,
+        options: AddedMethod,
+        root: Path,
+        values: bool = True,
+        domain: Domain | None = None,
+        of: Callable[[Fabric], Any] | None = None,
     ) -> None:
         self.name, self.setting = options.name, options.setting
         self.method, self.options, self.root, self._values = method, options, root, values
-        self._first = True
-        self.domain = domain
+        self.domain, self.of, self._first = domain, of or (lambda fabric: method), True
 
     def covers(self, fabric: Fabric) -> bool:
         """Return whether the method covers a fabric."""
         with self._call("covers"):
-            return bool(self.method.covers(fabric))
+            own = self.of(fabric)
+            return own is not None and bool(own.covers(fabric))
 
     def prepare(self, fabric: Fabric) -> None:
         """Prepare a fabric."""
         with self._call("prepare"):
-            self.method.prepare(fabric)
+            self.of(fabric).prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return the components of N queries, float32 (N, 4), finite and >= 0; MethodFailed if they are not."""
         before = [column.copy() for column in queries] if self._first else None
         with self._call("predict"):
-            answers = self.method.predict(fabric, queries, seed)
+            answers: Float32 = self.of(fabric).predict(fabric, queries, seed)
         if fault := self._fault(answers, len(queries.u)):
             raise MethodFailed(self.name, f"predict returned {fault}, for the fabric {fabric.name}")
         if before is not None:
@@ -179,7 +185,7 @@ class Guarded:
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes that a renderer stores for a fabric; MethodFailed unless it is an integer >= 0."""
         with self._call("bytes_stored"):
-            found: object = self.method.bytes_stored(fabric)
+            found: object = self.of(fabric).bytes_stored(fabric)
         if isinstance(found, bool) or not isinstance(found, int | np.integer) or not 0 <= found < 2**63:
             allowed = "an integer from 0 to 2^63 - 1 is needed"
             raise MethodFailed(self.name, f"bytes_stored returned {brief(found)}; {allowed}")
@@ -208,7 +214,7 @@ def unchecked(method: Method) -> Method:
     """Return a method whose answers may have any value: one from outside without that check, others as they are."""
     if not isinstance(method, Guarded):
         return method
-    return Guarded(method.method, method.options, method.root, values=False, domain=method.domain)
+    return Guarded(method.method, method.options, method.root, False, method.domain, method.of)
 
 
 def load_function(options: AddedFunction) -> Callable[..., float]:

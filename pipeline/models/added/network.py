@@ -17,15 +17,12 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from pipeline.compiled.arrays import Float32
 from pipeline.fingerprint import fingerprint
 from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.guarded import Guarded, MethodFailed, faults_of, imported, new
 from pipeline.models.domain import domain_of
-from pipeline.models.method import Method
 from pipeline.models.network import Batch, Trainable, Trained
 from pipeline.per_fabric import PerFabric
-from pipeline.truth.query import Queries
 from weaves.draft import Matrix
 from weaves.fabric import Fabric
 
@@ -84,39 +81,12 @@ class GuardedNetwork(Trainable):
         with self.call("architecture"):
             own = dict(own)
             json.dumps(own, allow_nan=False)
-        fabrics = [{"name": fabric.name, **fabric.optics()} for fabric in self.fabrics]
-        return {**counted, "layers": layers, **own, "fabrics": fabrics}
+        return {**counted, "layers": layers, **own, "fabrics": [_about(fabric) for fabric in self.fabrics]}
 
     def _own(self, function: str, default: Callable[..., Any], *given: Any) -> Any:
         """Call a function of the network, or its default."""
         with self.call(function):
             return getattr(self.network, function, default)(*given)
-
-
-class PerFabricMethod:
-    """Methods from outside that know one fabric each, by the fingerprint of its optics, as one method."""
-
-    name = setting = ""
-
-    def __init__(self, methods: Mapping[str, Method]) -> None:
-        self._methods = methods
-        self._known = PerFabric(lambda fabric: methods[fingerprint(fabric.optics())])
-
-    def covers(self, fabric: Fabric) -> bool:
-        """Return whether a network learnt the fabric, and its method covers it."""
-        return fingerprint(fabric.optics()) in self._methods and self._known.of(fabric).covers(fabric)
-
-    def prepare(self, fabric: Fabric) -> None:
-        """Prepare the method of the fabric."""
-        self._known.of(fabric).prepare(fabric)
-
-    def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
-        """Return the components of N queries, float32 (N, 4)."""
-        return self._known.of(fabric).predict(fabric, queries, seed)
-
-    def bytes_stored(self, fabric: Fabric) -> int:
-        """Return the bytes that a renderer stores for the fabric."""
-        return self._known.of(fabric).bytes_stored(fabric)
 
 
 def build_added(options: AddedMethod, fabrics: Sequence[Fabric]) -> GuardedNetwork:
@@ -126,9 +96,7 @@ def build_added(options: AddedMethod, fabrics: Sequence[Fabric]) -> GuardedNetwo
     can be trained.
     """
     make, root = imported(options)
-    return _built(
-        new(make, options, root), options, root, [_uncoloured(fabric.name, fabric.optics()) for fabric in fabrics]
-    )
+    return _built(new(make, options, root), options, root, [_about(fabric) for fabric in fabrics])
 
 
 def restore_added(options: AddedMethod, trained: Trained) -> Guarded:
@@ -140,39 +108,42 @@ def restore_added(options: AddedMethod, trained: Trained) -> Guarded:
     methods = {}
     for card, weights in trained:
         method: Any = new(make, options, root)
-        fabrics = [
-            _uncoloured(about["name"], {key: value for key, value in about.items() if key != "name"})
-            for about in card["architecture"]["fabrics"]
-        ]
-        network = _built(method, options, root, fabrics)
+        network = _built(method, options, root, card["architecture"]["fabrics"])
         with network.call("network"):
             network.load_state_dict(weights)
         with network.call("load"):
             method.load(network.network.eval())
-        methods[fingerprint(fabrics[0].optics())] = method
-    domain = domain_of([card for card, _ in trained])
+        methods[fingerprint(network.fabrics[0].optics())] = method
     (*_, last) = methods.values()
-    return Guarded(PerFabricMethod(methods) if options.of_one_material else last, options, root, domain=domain)
+    domain = domain_of([card for card, _ in trained])
+    known = PerFabric(lambda fabric: methods.get(fingerprint(fabric.optics())))
+    return Guarded(last, options, root, domain=domain, of=known.of if options.of_one_material else None)
 
 
-def _built(method: Any, options: AddedMethod, root: Path, fabrics: Sequence[Fabric]) -> GuardedNetwork:
-    """Return the network of a method; MethodFailed if it cannot be trained."""
+def _about(fabric: Fabric) -> dict[str, Any]:
+    return {"name": fabric.name, **fabric.optics()}
+
+
+def _built(method: Any, options: AddedMethod, root: Path, about: Sequence[Mapping[str, Any]]) -> GuardedNetwork:
+    """Return the network of a method for fabrics of these `_about`; MethodFailed if it cannot be trained."""
+    fabrics = [_uncoloured(each) for each in about]
 
     def call(function: str) -> AbstractContextManager[None]:
         return faults_of(options.name, function, options.limit, root)
 
     with call("network"):
         network = method.network(list(fabrics))
+    returned = f"network returned {type(network).__name__}"
     if not isinstance(network, nn.Module):
-        raise MethodFailed(options.name, f"network returned {type(network).__name__}; a torch.nn.Module is needed")
+        raise MethodFailed(options.name, f"{returned}; a torch.nn.Module is needed")
     if not callable(getattr(network, "loss", None)):
-        raise MethodFailed(options.name, f"network returned {type(network).__name__}, which lacks the function 'loss'")
+        raise MethodFailed(options.name, f"{returned}, which lacks the function 'loss'")
     if not any(weight.requires_grad for weight in network.parameters()):
-        raise MethodFailed(options.name, f"network returned {type(network).__name__}, which has nothing to train")
+        raise MethodFailed(options.name, f"{returned}, which has nothing to train")
     return GuardedNetwork(network, options.name, fabrics, call)
 
 
-def _uncoloured(name: str, optics: Mapping[str, Any]) -> Fabric:
-    """Return the fabric of a name and of these optics, its diffuse colours black: legal at any optical thickness."""
-    yarns = {key: optics[key] | {"diffuse": (0.0, 0.0, 0.0)} for key in ("warp", "weft")}
-    return Fabric.model_validate({**optics, **yarns, "name": name, "draft": Matrix(rows=tuple(optics["draft"]))})
+def _uncoloured(about: Mapping[str, Any]) -> Fabric:
+    """Return the fabric of `_about`, its diffuse colours black: legal at any optical thickness."""
+    yarns = {key: about[key] | {"diffuse": (0.0, 0.0, 0.0)} for key in ("warp", "weft")}
+    return Fabric.model_validate({**about, **yarns, "draft": Matrix(rows=tuple(about["draft"]))})

@@ -21,12 +21,8 @@ from weaves.errors import BadInput, WorkFailed, nearest
 
 ADD: Final = "--add"
 
-MOST_BYTES: Final = 512 * 2**20
-"""Largest package."""
-
-MOST_FILE: Final = 16 * 2**20
-"""Largest file of code."""
-
+_MOST_BYTES: Final = 512 * 2**20  # of a package
+_MOST_FILE: Final = 16 * 2**20  # bytes of a file of code
 _OURS: Final = ("weaves", "pipeline", "reports", "jobs", "twillight")
 
 
@@ -55,16 +51,16 @@ class CodeSource(NamedTuple):
     def sha256(self) -> str:
         """Return the hash of the file, or of all files of the package and their names; BadInput if it is too large."""
         if self.root.is_file():
-            if self.root.stat().st_size > MOST_FILE:
-                raise BadInput(ADD, "", self.text, f"the file {self.root.name} has more than {MOST_FILE:,} bytes")
+            if self.root.stat().st_size > _MOST_FILE:
+                raise BadInput(ADD, "", self.text, f"the file {self.root.name} has more than {_MOST_FILE:,} bytes")
             return file_sha256(self.root)
         found, total = hashlib.sha256(), 0
         for path in sorted(self.root.rglob("*")):
             if not path.is_file() or "__pycache__" in path.parts:
                 continue
             total += path.stat().st_size
-            if total > MOST_BYTES:
-                raise BadInput(ADD, "", self.text, f"the package {self.root.name} has more than {MOST_BYTES:,} bytes")
+            if total > _MOST_BYTES:
+                raise BadInput(ADD, "", self.text, f"the package {self.root.name} has more than {_MOST_BYTES:,} bytes")
             found.update(f"{path.relative_to(self.root).as_posix()}\0{file_sha256(path)}\0".encode())
         return found.hexdigest()
 

@@ -33,6 +33,8 @@ class MapMaterialOptions(AnalyticOptions):
 
     seconds: ClassVar[tuple[float, float]] = (0.0, 4e-7)
     prepare_seconds: ClassVar[float] = 1.8
+    kinds: ClassVar[frozenset[str]] = frozenset({"behind", "stretch"})
+    """Light from behind, and footprints of any shape by taps along their longer axis."""
 
     model: Literal["map_material"] = "map_material"
     size: Annotated[int, AfterValidator(_power_of_two)] = Field(default=512, ge=64, le=4096)
@@ -42,25 +44,15 @@ class MapMaterialOptions(AnalyticOptions):
     sheen: bool = True
     """True for a material with a sheen, as that of glTF."""
 
-    @property
-    def kinds(self) -> frozenset[str]:
-        """Light from behind, and footprints of any shape by taps along their longer axis."""
-        return frozenset({"behind", "stretch"})
-
     def methods(self) -> list[Analytic[MaterialMaps]]:
         """Return the one method; its bytes are those of all levels at 8 bits a number, as programs store them."""
         from pipeline.materials.lookup import TEXEL_CHANNELS, answer
 
+        def stored(tables: MaterialMaps) -> int:
+            return len(tables.maps.texels) * (TEXEL_CHANNELS + self.parallax)
+
         tables = PerFabric(lambda fabric: _tables(fabric, self))
-        return [
-            Analytic(
-                self,
-                None,
-                tables,
-                lambda tables, queries, _: answer(tables, queries),
-                lambda tables: len(tables.maps.texels) * (TEXEL_CHANNELS + self.parallax),
-            )
-        ]
+        return [Analytic(self, None, tables, lambda tables, queries, _: answer(tables, queries), stored)]
 
 
 def _tables(fabric: Fabric, options: MapMaterialOptions) -> MaterialMaps:

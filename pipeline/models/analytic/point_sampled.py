@@ -24,8 +24,7 @@ from weaves.fabric import Fabric
 if TYPE_CHECKING:
     from pipeline.truth.cloth import ClothSide  # noqa: F401 - read by the type checker in a base class
 
-Count = Annotated[int, Field(ge=1, le=4096)]
-"""A number of random points per query."""
+_Count = Annotated[int, Field(ge=1, le=4096)]  # of points
 
 
 class PointSampledOptions(AnalyticOptions):
@@ -33,9 +32,10 @@ class PointSampledOptions(AnalyticOptions):
 
     parameter: ClassVar[str] = "counts"
     seconds: ClassVar[tuple[float, float]] = (0.0, 4e-7)
+    kinds: ClassVar[frozenset[str]] = frozenset({"behind", "stretch", "curvature"})
 
     model: Literal["point_sampled"] = "point_sampled"
-    counts: list[Count] = Field(default=[1, 2, 3, 4, 8, 16, 64], min_length=1, max_length=16)
+    counts: list[_Count] = Field(default=[1, 2, 3, 4, 8, 16, 64], min_length=1, max_length=16)
     """Numbers k of points a query; each is a row of the tables."""
     footprint: Literal["gaussian", "box"] = "gaussian"  # type: ignore[assignment]
     """Kernel the points are drawn from; must be the kernel of the truth."""
@@ -48,11 +48,6 @@ class PointSampledOptions(AnalyticOptions):
     @classmethod
     def _usual_walls(cls, options: Any) -> Any:
         return with_usual_walls(options)
-
-    @property
-    def kinds(self) -> frozenset[str]:
-        """All."""
-        return frozenset({"behind", "stretch", "curvature"})
 
     def methods(self) -> Sequence[Method]:
         """Return one method for each number of points."""

@@ -33,14 +33,9 @@ class PrefilteredOptions(AnalyticOptions):
         """Return the one method."""
         from pipeline.analytic.prefiltered import WIDENINGS, answer, tabulate
 
+        def stored(tables: PrefilteredMaps) -> int:
+            return tables.maps.texels.nbytes + self.parallax * tables.heights.maps.texels.nbytes
+
         widening = WIDENINGS[self.widening]
         tables = PerFabric(lambda fabric: tabulate(fabric, self.texels_per_yarn, self.parallax))
-        return [
-            Analytic(
-                self,
-                None,
-                tables,
-                lambda tables, queries, _: answer(tables, queries, widening),
-                lambda tables: tables.maps.texels.nbytes + self.parallax * tables.heights.maps.texels.nbytes,
-            )
-        ]
+        return [Analytic(self, None, tables, lambda tables, queries, _: answer(tables, queries, widening), stored)]

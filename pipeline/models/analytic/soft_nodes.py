@@ -43,6 +43,7 @@ class SoftNodesOptions(AnalyticOptions):
     """Sums over soft nodes; nothing is trained."""
 
     turns: ClassVar[bool] = True
+    kinds: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
     parameter: ClassVar[str] = "levels"
     seconds: ClassVar[tuple[float, float]] = (0.0, 1e-6)
     prepare_seconds: ClassVar[float] = 1.2
@@ -54,11 +55,6 @@ class SoftNodesOptions(AnalyticOptions):
     """Footprints are patches of view rays."""
     walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
-
-    @property
-    def kinds(self) -> frozenset[str]:
-        """Footprints of any shape, light from behind, and curved cloth."""
-        return frozenset({"stretch", "behind", "curvature"})
 
     def methods(self) -> list[SoftNodes]:
         """Return one method for each level."""

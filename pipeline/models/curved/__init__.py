@@ -17,6 +17,7 @@ class CurvedOptions(TextureOptions):
     fixed: ClassVar[tuple[str, ...]] = (*TextureOptions.fixed, "silhouette_anywhere", "silhouette_weight")
     any_physics: ClassVar[bool] = True
     seconds: ClassVar[tuple[float, float]] = (2.5e-5, 2e-6)
+    kinds: ClassVar[frozenset[str]] = frozenset({"behind", "curvature"})
 
     model: Literal["curved"] = "curved"
     hidden: int = Field(default=24, ge=4, le=256)
@@ -62,13 +63,9 @@ class CurvedOptions(TextureOptions):
         """The queries about the silhouette."""
         return SilhouetteRows(
             kind="opacity" if self.silhouette == "opacity" else "grazing_cosine",
-            rows=self.silhouette_rows,
-            points=self.silhouette_points,
-            sigma=self.silhouette_sigma,
             largest_curvature=self.largest_curvature,
-            anywhere=self.silhouette_anywhere,
             footprint=self.footprint,
-            seed=self.silhouette_seed,
+            **{name: getattr(self, f"silhouette_{name}") for name in ("rows", "points", "sigma", "anywhere", "seed")},
         )
 
     @property
@@ -87,8 +84,3 @@ class CurvedOptions(TextureOptions):
             "full opacity where it is certain": self.certain,
         }
         return ("four components in place of RGB", *(change for change, made in changes.items() if made))
-
-    @property
-    def kinds(self) -> frozenset[str]:
-        """Curved cloth lit from all around."""
-        return frozenset({"behind", "curvature"})

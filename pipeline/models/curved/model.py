@@ -33,7 +33,7 @@ from torch.nn import functional
 from pipeline.compiled.arrays import Float32
 from pipeline.models.curved import CurvedOptions
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import component_error, perceptron, to_components, to_network
+from pipeline.models.networks.layers import component_error, perceptron, to_components
 from pipeline.models.networks.texture import LAYERS, TextureNetwork, level_shapes, random_pyramid
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import has_gaps
@@ -153,9 +153,7 @@ class CurvedNetwork(TextureNetwork):
         ends, picks = self.repeat
         columns = (batch.u / ends, batch.v / picks, batch.sigma, batch.wo, batch.curvature)
         view = View(*(column.flatten(0, 1) for column in columns))
-        target = to_network(batch.target.flatten(0, 1), options.log_k)
-        output = self(view, batch.wi.flatten(0, 1))
-        error = component_error(output, target, options)
+        error = component_error(self(view, batch.wi.flatten(0, 1)), batch.target.flatten(0, 1), options)
         if self.silhouettes is None:
             return error
         return error + options.silhouette_weight * self._edge_loss(*self.silhouettes.draw(len(view.u), random))

@@ -10,12 +10,11 @@ from __future__ import annotations
 import itertools
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from pipeline.compiled.arrays import Float32
 from pipeline.models.network import QueryNetwork
 from pipeline.models.options import ComponentLossOptions
 
@@ -29,8 +28,8 @@ SLOPE = 0.01
 class LinearLayer(NamedTuple):
     """A layer for programs without torch: float32 weights (inputs, outputs) and biases (outputs,)."""
 
-    weights: npt.NDArray[np.float32]
-    biases: npt.NDArray[np.float32]
+    weights: Float32
+    biases: Float32
 
 
 def perceptron(inputs: int, hidden: int, layers: int, outputs: int) -> nn.Sequential:
@@ -48,10 +47,8 @@ def perceptron(inputs: int, hidden: int, layers: int, outputs: int) -> nn.Sequen
 
 def layers_of(network: nn.Sequential) -> list[LinearLayer]:
     """Return copies of the layers of a perceptron."""
-    linear = (layer for layer in network if isinstance(layer, nn.Linear))
-    return [
-        LinearLayer(layer.weight.t().numpy(force=True).copy(), layer.bias.numpy(force=True).copy()) for layer in linear
-    ]
+    linear = [(layer.weight.t(), layer.bias) for layer in network if isinstance(layer, nn.Linear)]
+    return [LinearLayer(*(values.numpy(force=True).copy() for values in layer)) for layer in linear]
 
 
 def activate(x: Tensor) -> Tensor:
@@ -103,11 +100,10 @@ def to_components(output: Tensor, log_k: float) -> Tensor:
 
 
 def component_error(output: Tensor, target: Tensor, options: ComponentLossOptions) -> Tensor:
-    """Return the weighted mean squared error of outputs (..., 4), both in network space."""
-    squared = (output - target).square()
-    return (
-        options.specular_weight * squared[..., SPECULAR].mean() + options.diffuse_weight * squared[..., DIFFUSE].mean()
-    )
+    """Return the weighted mean squared error of outputs (..., 4), in network space, from target components (..., 4)."""
+    squared = (output - to_network(target, options.log_k)).square()
+    specular, diffuse = squared[..., SPECULAR].mean(), squared[..., DIFFUSE].mean()
+    return options.specular_weight * specular + options.diffuse_weight * diffuse
 
 
 def start_at_mean(last: nn.Linear, target: Tensor, log_k: float) -> None:

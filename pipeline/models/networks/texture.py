@@ -71,10 +71,8 @@ def blurred(texture: Tensor, deviation: float) -> Tensor:
         return texture
     rows, columns = texture.shape[-2:]
     spectrum = torch.fft.rfft2(texture)
-    frequency = (
-        torch.fft.fftfreq(rows, device=texture.device).square().unsqueeze(-1)
-        + torch.fft.rfftfreq(columns, device=texture.device).square()
-    )
+    along = torch.fft.fftfreq(rows, device=texture.device).square().unsqueeze(-1)
+    frequency = along + torch.fft.rfftfreq(columns, device=texture.device).square()
     decay = torch.exp(-2.0 * math.pi**2 * deviation**2 * frequency)
     smooth: Tensor = torch.fft.irfft2(spectrum * decay, s=(rows, columns))
     return smooth
@@ -146,9 +144,9 @@ class TextureNetwork(QueryNetwork):
     decoder: nn.Sequential
     """Puts out the four components in network space."""
     depth: nn.Parameter | None
-    """The offset texture, nn.Parameter or None."""
+    """The offset texture."""
     offset: nn.Sequential | None
-    """Perceptron from the offset texture and the view to the depth, nn.Sequential or None."""
+    """Perceptron from the offset texture and the view to the depth."""
 
     def __init__(self, options: TextureOptions, repeat: tuple[int, int]) -> None:
         super().__init__()
@@ -161,8 +159,7 @@ class TextureNetwork(QueryNetwork):
         shapes = level_shapes(options.texels_per_yarn, options.levels, self.repeat)
         self.levels = random_pyramid(channels, shapes)
         self.decoder = perceptron(channels + view + light, options.hidden, LAYERS, 4)
-        self.depth = None
-        self.offset = None
+        self.depth = self.offset = None
         if options.offset:
             self.depth = nn.Parameter(torch.zeros(channels, *shapes[0]))
             self.offset = perceptron(channels + view, options.hidden, LAYERS, 1)

@@ -25,6 +25,6 @@ class NeumipOptions(TextureOptions):
         return ("four components in place of RGB", *(change for change, made in changes.items() if made))
 
     @property
-    def kinds(self) -> frozenset[str]:
+    def kinds(self) -> frozenset[str]:  # type: ignore[override]
         """Curved cloth lit from all around, answered as if it were flat, with `ignore_curvature`."""
         return frozenset({"behind", "curvature"} if self.ignore_curvature else ())

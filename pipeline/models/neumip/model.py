@@ -24,7 +24,7 @@ import torch
 from torch import Tensor
 
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import component_error, to_components, to_network
+from pipeline.models.networks.layers import component_error, to_components
 from pipeline.models.networks.texture import TextureNetwork
 from pipeline.models.neumip import NeumipOptions
 from weaves.fabric import Fabric
@@ -57,7 +57,7 @@ class NeumipNetwork(TextureNetwork):
         options = self.options
         ends, picks = self.repeat
         flat = [column.flatten(0, 1) for column in (batch.u / ends, batch.v / picks, batch.sigma, batch.wi, batch.wo)]
-        target = to_network(batch.target.flatten(0, 1), options.log_k)
+        target = batch.target.flatten(0, 1)
         if options.ignore_curvature:
             # A mean over the rows lit from the front; the others weigh nothing.
             front = (batch.wi.flatten(0, 1)[:, 2:] > 0.0).to(target.dtype)

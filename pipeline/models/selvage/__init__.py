@@ -7,38 +7,32 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from pipeline.models.analytic.adapter import AnalyticOptions
-from pipeline.models.selvage.wish import USUAL_ERROR, text_of
 from pipeline.truth.options import Walls
 
 if TYPE_CHECKING:
     from pipeline.models.selvage.model import Selvage
 
-WishedError = Annotated[float, Field(gt=0, lt=1)]
-"""A relative error of the colour."""
+_WishedError = Annotated[float, Field(gt=0, lt=1)]
 
 
 class SelvageOptions(AnalyticOptions):
     """Soft nodes of the level that each query needs for a wished error, or the fallback; nothing is trained."""
 
     parameter: ClassVar[str] = "errors"
-    usual_setting: ClassVar[float] = USUAL_ERROR
+    usual_setting: ClassVar[float] = 0.02
     settings_allowed: ClassVar[str] = "a relative error above 0 and below 1 after the colon is needed, such as :.02"
     turns: ClassVar[bool] = True
+    kinds: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
     seconds: ClassVar[tuple[float, float]] = (0.0, 1e-6)
     prepare_seconds: ClassVar[float] = 4.0
 
     model: Literal["selvage"] = "selvage"
-    errors: list[WishedError] = Field(default=[0.1, 0.05, 0.02, 0.01], min_length=1, max_length=16)
+    errors: list[_WishedError] = Field(default=[0.1, 0.05, 0.02, 0.01], min_length=1, max_length=16)
     """Wished relative errors of a grey cloth's colour; each is a row of the tables."""
     parallax: Literal[True] = True
     """Footprints are patches of view rays."""
     walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
-
-    @property
-    def kinds(self) -> frozenset[str]:
-        """Footprints of any shape, light from behind, and curved cloth."""
-        return frozenset({"stretch", "behind", "curvature"})
 
     @property
     def work(self) -> float:
@@ -55,7 +49,7 @@ class SelvageOptions(AnalyticOptions):
     @classmethod
     def setting_of(cls, setting: float) -> str:
         """Return the text of a wished error."""
-        return text_of(setting)
+        return f"error {100 * setting:g} %"
 
     def methods(self) -> list[Selvage]:
         """Return one method for each wished error."""

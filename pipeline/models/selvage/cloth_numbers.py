@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -21,9 +21,6 @@ FLOOR: Final = 0.05
 
 GREY: Final = np.array([0.3, 0.3, 0.5, 0.5])
 """Weights of the four components in a grey cloth's colour."""
-
-Directions = Literal["projected_disc", "hemisphere"]
-"""A distribution of directions, as in `QueryOptions`."""
 
 NUMBERS: Final = 5
 """Numbers of a cloth, the first of them 1."""
@@ -48,18 +45,16 @@ def probes(
     curved: bool,
     rows: int = _ROWS,
     seed: int = _SEED,
-    directions: tuple[Directions, ...] = ("projected_disc", "hemisphere"),
+    directions: tuple[str, ...] = ("projected_disc", "hemisphere"),
 ) -> Queries:
     """Return random queries of one case, footprints of all sizes and shapes, in equal parts with each distribution."""
     shape = QueryOptions(behind=float(behind), stretch=8.0)
     if curved:
         shape = QueryOptions(behind=float(behind), stretch=4.0, curvature=(0.01, 0.5))
-    parts = [
-        draw_queries(
-            shape.model_copy(update={"directions": name}), fabric.weave.repeat, seed + index, 0, rows // len(directions)
-        )
-        for index, name in enumerate(directions)
-    ]
+    parts, each = [], rows // len(directions)
+    for index, name in enumerate(directions):
+        options = shape.model_copy(update={"directions": name})
+        parts.append(draw_queries(options, fabric.weave.repeat, seed + index, 0, each))
     return Queries(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 

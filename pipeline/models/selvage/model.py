@@ -10,9 +10,10 @@ of walls is answered by soft nodes alone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
-from typing import ClassVar, Final
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,18 +21,15 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import refuse_other
-from pipeline.models.selvage.choice import Chosen, choose_at, error_curve, price_of, within_time
+from pipeline.models.selvage import SelvageOptions, choice
 from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
-from pipeline.models.selvage.costs import USUAL_SECONDS, kinds_of, seconds_of
 from pipeline.models.selvage.errors import CASES, CURVED, coefficients_of, squared_errors
-from pipeline.models.selvage.wish import USUAL_ERROR, refuse_wishes, text_of
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import Walls
 from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-_KINDS: Final = ("stretch", "behind", "curvature")
 _ANY = Queries.round(u=[0.5], v=[0.5], sigma=[1.0], wi=[[0.6, 0.0, 0.8]], wo=[[0.0, 0.0, 1.0]])
 
 
@@ -45,13 +43,16 @@ class Selvage:
     turns: ClassVar[bool] = True
     takes_wishes: ClassVar[bool] = True
 
-    def __init__(self, error: float = USUAL_ERROR, name: str = "selvage", walls: Walls = "rim") -> None:
-        self.name, self.setting, self.error = name, text_of(error), error
+    def __init__(
+        self, error: float = SelvageOptions.usual_setting, name: str = "selvage", walls: Walls = "rim"
+    ) -> None:
+        self.name, self.setting, self.error = name, SelvageOptions.setting_of(error), error
         self._curves = {behind: PerFabric(partial(self._error_curves, behind=behind)) for behind in (False, True)}
         self._nodes = [SoftNodes(level, name, walls) for level in NODE_LEVELS]
         self._answers: list[Callable[[Fabric, Queries, int], Float32]] = [node.predict for node in self._nodes]
         if walls == "rim":
             self._answers.append(fallback_answers)
+        self._seconds = choice.USUAL_SECONDS[:, : len(self._answers)]
 
     def covers(self, fabric: Fabric) -> bool:
         """Return True: any fabric can be tabulated."""
@@ -66,25 +67,11 @@ class Selvage:
     def predict(
         self, fabric: Fabric, queries: Queries, seed: int = 0, error: float | None = None, time: float | None = None
     ) -> Float32:
-        """Answer N queries, float32 (N, 4).
+        """Answer N queries from a viewer in front, float32 (N, 4); `seed` is that of the fallback's random points.
 
-        Parameters
-        ----------
-        fabric : Fabric
-            The cloth.
-        queries : Queries
-            N queries from a viewer in front.
-        seed : int
-            Seed of the fallback's random points.
-        error : float, optional
-            Wished relative error of the colour, root mean square, above 0 and below 1.
-        time : float, optional
-            Wished mean seconds of a query on one thread of this machine. What is chosen then depends on the machine.
-
-        Raises
-        ------
-        BadInput
-            If viewers are behind the cloth, both are wished, or a wish is out of its range.
+        `error` is the wished relative error of the colour, root mean square, above 0 and below 1; `time` the wished
+        mean seconds of a query on one thread of this machine, on which the choice then depends. BadInput if viewers are
+        behind the cloth, both are wished, or a wish is out of its range.
         """
         chosen, result = self.choose(fabric, queries, error, time), np.empty((len(queries.u), 4), np.float32)
         for index, answer in enumerate(self._answers):
@@ -93,23 +80,31 @@ class Selvage:
                 result[rows] = answer(fabric, queries.take(rows), seed)
         return result
 
-    def choose(self, fabric: Fabric, queries: Queries, error: float | None = None, time: float | None = None) -> Chosen:
+    def choose(
+        self, fabric: Fabric, queries: Queries, error: float | None = None, time: float | None = None
+    ) -> choice.Chosen:
         """Return which answer each of N queries gets, (N,): a level of soft nodes by its place, 4 the fallback."""
-        refuse_other(queries, f"the method {self.name} answers", _KINDS)
-        refuse_wishes(self.name, error, time)
-        kinds = kinds_of(queries)
+        refuse_other(queries, f"the method {self.name} answers", SelvageOptions.kinds)
+        if error is not None and time is not None:
+            raise BadInput(self.name, "time", time, "leave out time or error: only one of them can be wished")
+        if error is not None and not 0.0 < error < 1.0:
+            raise BadInput(self.name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
+        if time is not None and not 0.0 < time < math.inf:
+            raise BadInput(self.name, "time", time, "seconds a query above 0 are needed, such as 5e-6")
+        kinds = choice.kinds_of(queries)
         squares = squared_errors(queries, self._coefficients(fabric, queries))
         if time is None:
-            prices = self._prices(fabric, queries, self.error if error is None else error)
+            curves, wish = self._curves[_behind(queries)].of(fabric), self.error if error is None else error
+            prices = np.repeat([choice.price_of(curve, wish) for curve in curves], len(choice.USUAL_SECONDS) // CASES)
             chosen = np.empty(len(kinds), np.uint8)
-            choose_at(squares, kinds, prices[:, None] * USUAL_SECONDS[:, : len(self._answers)], chosen)
+            choice.choose_at(squares, kinds, prices[:, None] * self._seconds, chosen)
             return chosen
-        seconds = seconds_of(kinds, self._answers, fabric)
+        seconds = choice.seconds_of(kinds, self._answers, fabric)
         least = float(seconds[kinds].min(axis=1).mean()) if len(kinds) else 0.0
         if time < least:
             allowed = f"these queries take at least {least:.2g} seconds each on this machine"
             raise BadInput(self.name, "time", time, allowed)
-        return within_time(squares, kinds, seconds, time)
+        return choice.within_time(squares, kinds, seconds, time)
 
     def expected_errors(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the expected relative errors of all answers to N queries, root mean squares, (N, answers)."""
@@ -131,11 +126,6 @@ class Selvage:
         """Return the coefficients of the answers at hand, as `coefficients_of`."""
         return coefficients_of(fabric, _behind(queries))[:, : len(self._answers)]
 
-    def _prices(self, fabric: Fabric, queries: Queries, error: float) -> Float64:
-        """Return the prices of all kinds of queries for a wished error, (kinds,)."""
-        curves = self._curves[_behind(queries)].of(fabric)
-        return np.repeat([price_of(curve, error) for curve in curves], len(USUAL_SECONDS) // CASES)
-
     def _error_curves(self, fabric: Fabric, behind: bool) -> list[Float64]:
         """Return the curve of errors over prices of each case; those of light from behind only if it is wanted."""
         coefficients = coefficients_of(fabric, behind)[:, : len(self._answers)]
@@ -143,7 +133,7 @@ class Selvage:
         for case in range(CASES):
             queries = probes(fabric, bool(case % 2) and behind, case >= CURVED, directions=("projected_disc",))
             squares = squared_errors(queries, coefficients)
-            curves.append(error_curve(squares, kinds_of(queries), USUAL_SECONDS[:, : len(self._answers)]))
+            curves.append(choice.error_curve(squares, choice.kinds_of(queries), self._seconds))
         return curves
 
 

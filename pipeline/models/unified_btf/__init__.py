@@ -1,4 +1,4 @@
-"""`unified_btf`: one encoding of bidirectional textures [Rainer2020Unified]; its options."""
+"""`unified_btf` [Rainer2020Unified] and its predecessor `btf_autoencoder` [Rainer2019Neural]; their options."""
 
 from __future__ import annotations
 
@@ -80,3 +80,22 @@ class UnifiedBtfOptions(BtfOptions):
     def departures(self) -> tuple[str, ...]:
         """Deviations from the published method, for the page."""
         return ("four components in place of RGB, in samples and answers",)
+
+
+class BtfAutoencoderOptions(BtfOptions):
+    """One autoencoder of angular samples for each fabric [Rainer2019Neural]: `unified_btf` with a latent of 8.
+
+    With 3 outputs the decoder has the published 35,725 weights. ADAPTED: the encoder is that of 2020, which reads any
+    number of samples, and so are values and loss.
+    """
+
+    of_one_material: ClassVar[bool] = True
+    seconds: ClassVar[tuple[float, float]] = (1.5e-5, 1.5e-6)
+
+    model: Literal["btf_autoencoder"] = "btf_autoencoder"
+    latent: int = Field(default=8, ge=1, le=512)
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """Deviations from the published method, for the page."""
+        return ("four components in place of RGB, in samples and answers", "the encoder of 2020")

@@ -74,6 +74,6 @@ class WovenOptions(ComponentLossOptions):
         return tuple(change for change, made in changes.items() if made)
 
     @property
-    def kinds(self) -> frozenset[str]:
+    def kinds(self) -> frozenset[str]:  # type: ignore[override]
         """Light from behind, with `transmission`."""
         return frozenset({"behind"} if self.transmission else ())

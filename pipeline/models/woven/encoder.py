@@ -15,11 +15,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from pipeline.compiled.arrays import Float64
 from pipeline.models.networks.layers import SLOPE, Residual, activate
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.standard_position import SYMMETRIES, Placement, begun_at, moved, placement, standard
@@ -40,19 +40,16 @@ class WovenInputs(NamedTuple):
 
     def take(self, index: Tensor) -> WovenInputs:
         """Return the fabrics at `index`."""
-        return WovenInputs(
-            self.maps[index], self.parameters[index], Placement(*(part[index] for part in self.placement))
-        )
+        placement = Placement(*(part[index] for part in self.placement))
+        return WovenInputs(self.maps[index], self.parameters[index], placement)
 
-    def begun(self, shares: npt.NDArray[np.float64]) -> WovenInputs:
+    def begun(self, shares: Float64) -> WovenInputs:
         """Return the same cloth, each repeat begun elsewhere: `shares` (F, 2) of it to the left and downwards.
 
         Queries follow exactly, maps to the nearest texel.
         """
-        texels = np.rint(shares * self.maps.shape[-1]).astype(np.int64).tolist()
-        maps = [
-            torch.roll(one, (down, right), dims=(1, 2)) for one, (right, down) in zip(self.maps, texels, strict=True)
-        ]
+        moves = zip(self.maps, np.rint(shares * self.maps.shape[-1]).astype(np.int64).tolist(), strict=True)
+        maps = [torch.roll(own, (down, right), dims=(1, 2)) for own, (right, down) in moves]
         start = self.placement.start - torch.from_numpy(shares.astype(np.float32)).to(self.maps.device)
         return WovenInputs(torch.stack(maps), self.parameters, self.placement._replace(start=start))
 

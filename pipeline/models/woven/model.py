@@ -29,14 +29,7 @@ from torch import Tensor, nn
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import (
-    SLOPE,
-    EncoderDecoder,
-    component_error,
-    start_at_mean,
-    to_components,
-    to_network,
-)
+from pipeline.models.networks.layers import SLOPE, EncoderDecoder, component_error, start_at_mean, to_components
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.decoder import Decoder, encode_patch
 from pipeline.models.woven.encoder import Encoder, WovenInputs, read_cloth
@@ -111,8 +104,7 @@ class WovenNetwork(EncoderDecoder):
         own = cloth.placement.own_repeat()
         u, v = batch.u / own[:, :1], batch.v / own[:, 1:]
         output = self.decode(self.encode(cloth), cloth.placement, u, v, batch.sigma, batch.wi, batch.wo)
-        target = to_network(cloth.placement.swap(batch.target), options.log_k)
-        error = component_error(output[..., :4], target, options)
+        error = component_error(output[..., :4], cloth.placement.swap(batch.target), options)
         if options.transmission:
             error = error + options.transparency_weight * (output[..., 4] - batch.transparency).square().mean()
         return error

@@ -57,14 +57,11 @@ class Placement(NamedTuple):
         u and v (F, n) are shares of each fabric's own repeat; the results are shares of the standard one, in [0, 1).
         """
         sign = torch.cat([1.0 - 2.0 * self.mirror, torch.ones_like(self.start[:, :1])], dim=-1).unsqueeze(1)
-        u, v = u * sign[..., 0], v * sign[..., 1]
-        u, v = (
-            torch.where(self.exchange, v, u) - self.start[:, :1],
-            torch.where(self.exchange, u, v) - self.start[:, 1:],
-        )
+        u, v, wi, wo = u * sign[..., 0], v * sign[..., 1], wi * sign, wo * sign
+        x = torch.where(self.exchange, v, u) - self.start[:, :1]
+        y = torch.where(self.exchange, u, v) - self.start[:, 1:]
         order, swap = [1, 0, 2], self.exchange.unsqueeze(-1)
-        wi, wo = wi * sign, wo * sign
-        return _share(u), _share(v), torch.where(swap, wi[..., order], wi), torch.where(swap, wo[..., order], wo)
+        return _share(x), _share(y), torch.where(swap, wi[..., order], wi), torch.where(swap, wo[..., order], wo)
 
     def swap(self, components: Tensor) -> Tensor:
         """Take components (F, n, 4) from a fabric to its standard position, or back."""

@@ -6,12 +6,11 @@ import torch
 from pipeline.fingerprint import fingerprint
 from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.source import locate
-from pipeline.models.btf_autoencoder import BtfAutoencoderOptions
 from pipeline.models.curved import CurvedOptions
 from pipeline.models.network import Batch
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.registry import build_network
-from pipeline.models.unified_btf import UnifiedBtfOptions
+from pipeline.models.unified_btf import BtfAutoencoderOptions, UnifiedBtfOptions
 from pipeline.models.woven import WovenOptions
 
 _BTF = {"texels_per_yarn": 2, "samples": 8, "fewest_samples": 4, "encoder_hidden": 16, "weights": 8, "hidden": 16}

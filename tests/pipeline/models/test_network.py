@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
 from pipeline.fingerprint import fingerprint
 from pipeline.models.domain import Domain
-from pipeline.models.network import NetworkMethod, evaluated, restored
+from pipeline.models.network import NetworkMethod, PerQuery, restored
 from pipeline.models.neumip.model import NeumipNetwork
 from pipeline.models.registry import restore_methods
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -62,8 +63,9 @@ def test_chunks_keep_the_order_of_rows_and_columns(chunk, monkeypatch):
     """Answers are as wide as asked even of no rows."""
     monkeypatch.setattr("pipeline.models.method.CHUNK_ROWS", chunk)
     queries = draw_queries(QueryOptions(), (4, 4), 0, 0, 37)
-    found = evaluated(queries, lambda q: (q.wo, q.u), lambda wo, u: torch.cat([u[:, None], wo], dim=-1))
+    part = PerQuery(lambda queries: None, lambda q: (q.wo, q.u), nn.Identity())
+    found = part.answered(queries, lambda wo, u: torch.cat([u[:, None], wo], dim=-1))
     np.testing.assert_array_equal(found, np.concatenate([queries.u[:, None], queries.wo], axis=1))
     for rows in (37, 0):
-        answers = evaluated(queries.take(slice(0, rows)), lambda q: (q.u,), lambda u: u[:, None], 1)
+        answers = part.answered(queries.take(slice(0, rows)), lambda wo, u: u[:, None], 1)
         assert answers.shape == (rows, 1) and answers.dtype == np.float32

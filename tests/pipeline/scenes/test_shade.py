@@ -61,7 +61,6 @@ def test_queries_repeat_their_places(gbuffer):
     assert queries.curvature == pytest.approx([0, 0.05, 0])
     assert queries.wo == pytest.approx(np.array([UP, SIDE, UP]))
     assert queries.wi == pytest.approx(np.array([SIDE, UP, DOWN]))
-    assert gbuffer.transmitted.tolist() == [False, False, True]
     assert gbuffer.lit.tolist() == [[True, False, True], [False, False, False]]
     looks = gbuffer.looks((4, 4))
     assert looks.u.tolist() == [3.0, 0.0, 1.0] and (looks.wi == looks.wo).all()
