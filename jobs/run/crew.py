@@ -1,4 +1,4 @@
-"""Crew: the workers of a scheduler, their software, and the tasks that are with them.
+"""Crew: the workers of a scheduler, their software, and the tasks that are with them; or this process alone.
 
 Workers may come and go while a run is under way, as those of a cluster that adapts do. One whose software is not the
 driver's is refused: each new worker is checked before it counts, and a task that dask hands to one before that is not
@@ -18,11 +18,12 @@ from http.client import HTTPException
 from importlib import metadata
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 from urllib.request import ProxyHandler, build_opener
 
 from jobs.plan.task import Task
 from jobs.run.compiling import KernelGroup
+from jobs.run.ledger import Ledger
 from jobs.run.outcome import Outcome, work
 from jobs.run.receipt import Product
 from pipeline import patience
@@ -201,6 +202,50 @@ class Crew:
 
     def _refusal(self, address: str) -> str:
         return f"worker {address} gets no task: {self._checked[address]}; install the same version there"
+
+
+class Serial:
+    """Tasks one after the other in this process, with the interface of `Crew`: no scheduler and no port.
+
+    Other processes may be at work in the output folder: a task that one of them is at is waited for, and taken from it.
+    Tasks that measure time and code from outside have processes of their own, as always (`jobs.run.outcome`).
+    """
+
+    slots: ClassVar[int] = 1
+    dashboard: ClassVar[str | None] = None
+
+    def __init__(self, ledger: Ledger, hear: Callable[[Mapping[str, Any]], None]) -> None:
+        self._ledger, self._hear = ledger, hear
+        self._next: list[tuple[Task, Mapping[str, str]]] = []
+        self.accepted = ["this process"]
+
+    def look(self) -> None:
+        """Do nothing: no worker comes or goes."""
+
+    def recheck(self, address: str) -> None:
+        """Do nothing: its software is the driver's."""
+
+    def compile(self, groups: Sequence[KernelGroup], show: Callable[[int, Iterable[str]], None]) -> None:
+        """Compile groups of kernels; a failure here occurs again in the task that needs the kernel."""
+        for done, group in enumerate(groups):
+            show(done, [group.name])
+            with suppress(Exception):
+                group.compile(lambda kernel: self._hear({"kernel": kernel}))
+        if groups:
+            show(len(groups), ())
+
+    def start(self, task: Task, out: str, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
+        """Take a task that `ended` does; arguments as for a crew, and the folder is that of the ledger."""
+        self._next.append((task, inputs))
+
+    def ended(self, seconds: float) -> list[tuple[Task, Outcome]]:
+        """Do the task that was started, and return it with its outcome."""
+        task, inputs = self._next.pop()
+        with self._ledger.store.claimed(task.id):
+            if receipt := self._ledger.done(task):
+                return [(task, Outcome(receipt.files, receipt.seconds))]
+            hear = self._hear
+            return [(task, work(task, self._ledger.out, lambda share: hear({"task": task.id, "share": share}), inputs))]
 
 
 def _difference(there: Mapping[str, str] | BaseException) -> str:

@@ -25,14 +25,13 @@ from jobs.plan.schedule import Estimate
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected
 from jobs.run.compiling import kernel_groups
-from jobs.run.crew import Crew
+from jobs.run.crew import Crew, Serial
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.run.outcome import Outcome
 from jobs.run.progress import Board
 from jobs.run.progress_forms import ProgressForm, form_of
 from jobs.run.receipt import Product
-from jobs.run.serial import Serial
 from jobs.terminal import Terminal
 from pipeline import patience
 from pipeline.cores import cores

@@ -14,9 +14,8 @@ from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.page import Page
 from jobs.plan.task import Stage, Task
 from jobs.recipe.recipe import Recipe
-from jobs.run.ledger import Ledger
+from jobs.run.ledger import CHANGED, NEVER_MADE, Ledger, reasons
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.reasons import CHANGED, NEVER_MADE, reasons
 from jobs.run.receipt import Product, Receipt
 from pipeline.cores import cores
 from pipeline.fingerprint import file_sha256

@@ -13,8 +13,7 @@ from jobs.plan.ready import chains
 from jobs.plan.schedule import LEAST_GAIN, Estimate, Schedule, doublings
 from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
-from jobs.run.ledger import Ledger
-from jobs.run.reasons import ELSEWHERE, reasons
+from jobs.run.ledger import ELSEWHERE, Ledger, reasons
 from jobs.terminal import duration, print_lines, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName, Whole
 from pipeline.cores import cores
