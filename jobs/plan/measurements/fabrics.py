@@ -119,8 +119,7 @@ class OnFabric(_OnHeldOut):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        width, height = self.frame_options.frame_size
-        queries = self.frame_options.frames * width * height + self.errors.rows
+        queries = self.frame_options.frames * math.prod(self.frame_options.frame_size) + self.errors.rows
         pixels = sum(math.prod(self.picture_options.size(view)) for view in self.views)
         return 0.3 + self.model.seconds(queries + pixels, 1.0, self.ways)
 
@@ -203,7 +202,6 @@ class ErrorsBySize(Measurement):
 
     kind: Literal["errors by size"] = "errors by size"
     model: Trained
-    """The model with the networks of all fabrics."""
     dataset: HeldOutRows
     """The held-out queries of all fabrics."""
     seed: int

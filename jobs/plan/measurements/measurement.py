@@ -115,9 +115,8 @@ class Measurement(Task):
 
     def versions(self) -> dict[str, int]:
         """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
-        code, ways = {*self.code}, list(held(self, RunOptions))
-        code |= {"bound"} if any(way.bounds for way in ways) else set()
-        options = [model.options for model in held(self, Trained)]
+        code, options = {*self.code}, [model.options for model in held(self, Trained)]
+        code |= {"bound"} if any(way.bounds for way in held(self, RunOptions)) else set()
         code |= {"fallback"} if any(model.model == "selvage" for model in options) else set()
         models = {model.name: model.version for model in options}
         numbers = {**vars(versions), "BENCH": catalogue.BENCH}

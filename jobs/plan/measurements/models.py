@@ -34,17 +34,14 @@ class AtExtremes(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a model and seed, on the first fabric of each role that it answers for."""
         physics = {name: getattr(subjects.recipe.dataset.truth, name) for name in PHYSICS}
+        truth = EXTREME_TRUTH.model_copy(update=physics)
         for model in subjects.models:
             known: dict[Role, Fabric] = {}
             for fabric, role in subjects.fabrics:
                 if model.on([fabric.name]):
                     known.setdefault(role, fabric)
             if trained := model.on([fabric.name for fabric in known.values()]) if known else None:
-                yield cls(
-                    model=trained,
-                    fabrics=tuple((fabric, role) for role, fabric in known.items()),
-                    truth=EXTREME_TRUTH.model_copy(update=physics),
-                )
+                yield cls(model=trained, fabrics=tuple((fabric, role) for role, fabric in known.items()), truth=truth)
 
     @property
     def cost(self) -> float:
@@ -76,7 +73,6 @@ class Latents(Measurement):
     presets: tuple[Uncoloured, ...]
     """Presets of the pairs."""
     queries: QueryOptions
-    """Distribution of the queries."""
     truth: TruthOptions
 
     @classmethod
@@ -86,12 +82,8 @@ class Latents(Measurement):
         dataset = subjects.recipe.dataset
         for model in subjects.first_models:
             if subjects.recipe.bench.latents and model.recipe.options.blends:
-                yield cls(
-                    model=model.whole,
-                    presets=tuple(load_fabric(name) for name in names),
-                    queries=dataset.queries,
-                    truth=dataset.truth,
-                )
+                presets = tuple(map(load_fabric, names))
+                yield cls(model=model.whole, presets=presets, queries=dataset.queries, truth=dataset.truth)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure edits, then one pair after the other."""

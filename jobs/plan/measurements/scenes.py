@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
@@ -52,7 +53,6 @@ class _Shot(Measurement):
     step: tuple[float, float, float]
     """Step of the camera from frame to frame."""
     options: ShotOptions
-    """Options of the frames and of the truth."""
 
     @classmethod
     def of(cls, name: str, options: ShotOptions) -> Self:
@@ -62,14 +62,8 @@ class _Shot(Measurement):
         for key, fabric in worn(scene).items():
             cloth = scene.cloths.get(key, Cloth())
             cloths[key] = SceneCloth(fabric=load_fabric(fabric), yarns=cloth.yarns, turn=cloth.turn)
-        return cls(
-            scene=scene.name,
-            found=name,
-            files=tuple(file_sha256(path) for path in files(scene)),
-            cloths=cloths,
-            step=scene.step,
-            options=options,
-        )
+        hashes = tuple(map(file_sha256, files(scene)))
+        return cls(scene=scene.name, found=name, files=hashes, cloths=cloths, step=scene.step, options=options)
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -96,11 +90,9 @@ class _Shot(Measurement):
         """Estimated seconds on one core."""
         options = self.options
         fabrics = [cloth.fabric for cloth in self.cloths.values()]
-        first = [TruthCost(options.truth, fabric) for fabric in fabrics]
-        rows = sum(answer.row(flat=False) for answer in first) / len(first)
-        further = sum(TruthCost(options.frame_truth, fabric).row(flat=False) for fabric in fabrics) / len(first)
-        pixels = options.size[0] * options.size[1]
-        answers = pixels * _QUERIES_A_PIXEL * (rows + (options.frames - 1) * further)
+        first, further = ([TruthCost(t, f) for f in fabrics] for t in (options.truth, options.frame_truth))
+        row, next_row = (sum(answer.row(flat=False) for answer in each) / len(each) for each in (first, further))
+        answers = math.prod(options.size) * _QUERIES_A_PIXEL * (row + (options.frames - 1) * next_row)
         return 5.0 + sum(answer.bounces for answer in first) + answers
 
     def run(self, out: Path, progress: Progress) -> None:
@@ -133,10 +125,8 @@ class LargerShot(_Shot):
     @classmethod
     def all(cls, options: SceneBenchOptions) -> list[Self]:
         """Return the shots of a recipe's scenes, in its order; none if it wants no larger pictures."""
-        if options.picture_size is None:
-            return []
-        first = {"size": options.picture_size, "frames": 1}
-        return [cls.of(name, select(ShotOptions, options).model_copy(update=first)) for name in options.names]
+        larger = select(ShotOptions, options).model_copy(update={"size": options.picture_size, "frames": 1})
+        return [cls.of(name, larger) for name in options.names] if options.picture_size else []
 
 
 class _OnShot(Measurement):
@@ -148,14 +138,12 @@ class _OnShot(Measurement):
     shot: Made
     """Frames of the scene with the truth's answers."""
     model: Trained
-    """The model with one setting."""
     options: SceneErrorOptions
     shown: tuple[str, ...]
     """Settings that pictures are made of."""
     extent: tuple[int, int]
     """Width and height of a frame in pixels."""
     frames: int
-    """Number of frames."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -191,7 +179,7 @@ class _OnShot(Measurement):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        queries = self.extent[0] * self.extent[1] * _QUERIES_A_PIXEL * self.frames
+        queries = math.prod(self.extent) * _QUERIES_A_PIXEL * self.frames
         unknown = queries if {"behind", "curvature"} - self.model.options.kinds else 0.0
         # Tables know light from behind and curved cloth.
         return 0.5 + self.model.seconds(queries, fabrics=3.0) + _FALLBACK * unknown
@@ -236,7 +224,6 @@ class FrameTime(Measurement):
     footprint: RoundFootprint
     """Round footprint that replaces an ellipse where a method answers round footprints only."""
     options: RepeatOptions
-    """Repeats."""
     seed: int
     """Seed of the order of the queries."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar, Literal, Self
@@ -49,7 +50,6 @@ class TruthPicture(_OfFabric):
     extent: tuple[int, int]
     """Width and height in pixels."""
     view: ViewOptions
-    """Camera, light and scale."""
     truth: TruthOptions
     seed: int
     """Seed of the truth's points."""
@@ -70,7 +70,7 @@ class TruthPicture(_OfFabric):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         answers = TruthCost(self.truth, self.fabric)
-        return _START + answers.bounces + answers.table + self.extent[0] * self.extent[1] * answers.row()
+        return _START + answers.bounces + answers.table + math.prod(self.extent) * answers.row()
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render it."""
@@ -92,7 +92,6 @@ class TruthFrames(_OfFabric):
 
     kind: Literal["truth frames"] = "truth frames"
     options: FrameOptions
-    """Options of the frames and of the truth."""
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
@@ -102,9 +101,8 @@ class TruthFrames(_OfFabric):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        width, height = self.options.frame_size
         answers = TruthCost(self.options.frame_truth, self.fabric)
-        return _START + answers.table + width * height * self.options.frames * answers.row()
+        return _START + answers.table + math.prod(self.options.frame_size) * self.options.frames * answers.row()
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render them."""
@@ -118,7 +116,6 @@ class TruthEdge(_OfFabric):
 
     kind: Literal["truth edge"] = "truth edge"
     options: EdgeOptions
-    """Cylinder, camera, light and truth."""
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
@@ -159,8 +156,7 @@ class LivePage(_OfFabric):
 
     def versions(self) -> dict[str, int]:
         """Return the versions of the truth, of the models that it shows, and of the page."""
-        shown = ("soft_nodes", "map_material")
-        models = {name: versions.MODELS.get(name, 1) for name in shown}
+        models = {name: versions.MODELS.get(name, 1) for name in ("soft_nodes", "map_material")}
         return {"truth": versions.TRUTH, "viewer": versions.VIEWER} | models
 
     def run(self, out: Path, progress: Progress) -> None:
