@@ -34,12 +34,10 @@ class _OnHeldOut(Measurement):
 
     @classmethod
     def of(cls, subjects: Subjects, fabric: Fabric, role: Role, **more: Any) -> Self:
-        """Return the measurement of a fabric; `more` are the other fields."""
         rows, errors = subjects.held_out(fabric), select(ErrorOptions, subjects.recipe.bench)
         return cls(fabric=fabric, role=role, dataset=rows, errors=errors, **more)
 
     def held_out(self, out: Path) -> HeldOutFabric:
-        """Read the queries."""
         (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
         return rows
 

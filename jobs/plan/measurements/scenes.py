@@ -56,7 +56,6 @@ class _Shot(Measurement):
 
     @classmethod
     def of(cls, name: str, options: ShotOptions) -> Self:
-        """Return the shot of a scene."""
         scene = load_scene(name)
         cloths = {}
         for key, fabric in worn(scene).items():
@@ -67,7 +66,6 @@ class _Shot(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a scene."""
         yield from cls.all(subjects.recipe.bench.scenes)
 
     @classmethod
@@ -77,17 +75,14 @@ class _Shot(Measurement):
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
-        """The truth's frames."""
         return (PictureFile("", self.scene, "truth", "", Path(self.products[1]), self.larger),)
 
     @property
     def fabrics(self) -> list[str]:
-        """Names of its fabrics, sorted."""
         return sorted({cloth.fabric.name for cloth in self.cloths.values()})
 
     @property
     def cost(self) -> float:
-        """Estimated seconds on one core."""
         options = self.options
         fabrics = [cloth.fabric for cloth in self.cloths.values()]
         first, further = ([TruthCost(t, f) for f in fabrics] for t in (options.truth, options.frame_truth))
@@ -96,7 +91,6 @@ class _Shot(Measurement):
         return 5.0 + sum(answer.bounces for answer in first) + answers
 
     def run(self, out: Path, progress: Progress) -> None:
-        """Render the queries and answer them."""
         from reports.measure.scene.scene_errors import write_truth
         from reports.measure.scene.shot import read_shot, shoot
 
@@ -167,32 +161,28 @@ class _OnShot(Measurement):
 
     @property
     def subjects(self) -> tuple[str, ...]:
-        """Model, scene and setting."""
         return (*super().subjects, *map(self.model.options.setting_of, self.model.options.settings))
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
-        """The frames of every setting shown."""
         subject, larger = ("", self.scene, self.model.options.name), self.shots.larger
         return tuple(PictureFile(*subject, setting, self.picture(setting), larger) for setting in self.shown)
 
     @property
     def cost(self) -> float:
-        """Estimated seconds on one core."""
         queries = math.prod(self.extent) * _QUERIES_A_PIXEL * self.frames
         unknown = queries if {"behind", "curvature"} - self.model.options.kinds else 0.0
         # Tables know light from behind and curved cloth.
         return 0.5 + self.model.seconds(queries, fabrics=3.0) + _FALLBACK * unknown
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
-        """Measure it; of a larger picture there are no Records."""
         from reports.measure.scene.scene_errors import measure_scene
         from reports.measure.scene.shot import read_shot
 
         methods = self.model.with_fallback(out, self.options.footprint)
         pictures = {setting: out / self.picture(setting) for setting in self.shown}
         records = measure_scene(methods, read_shot(out / self.shot.path), self.options, pictures)
-        return [] if self.shots.larger else records
+        return [] if self.shots.larger else records  # of a larger picture there are none
 
 
 class OnScene(_OnShot):

@@ -32,7 +32,6 @@ class _OfFabric(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield the images of all named fabrics."""
         for fabric, _ in subjects.fabrics:
             yield from cls.of(fabric, subjects.recipe)
 
