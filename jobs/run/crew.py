@@ -30,12 +30,9 @@ from pipeline import patience
 from pipeline.storage import place
 from weaves.errors import WorkFailed
 
-_PACKAGES: Final = ("weaves", "pipeline", "reports", "jobs")
-_LIBRARIES: Final = ("numba", "numpy", "torch")
 _SECONDS_BETWEEN_LOOKS: Final = 1.0
 _SECONDS_BETWEEN_SIGNS: Final = 0.2
-_SECONDS_FOR_AN_ERROR: Final = 5.0
-_SECONDS_FOR_A_PAGE: Final = 5.0
+_SECONDS_FOR_AN_ANSWER: Final = 5.0
 _SECONDS_OF_SILENCE: Final = 5.0  # between two looks while kernels are compiled
 
 
@@ -99,7 +96,7 @@ class Crew:
         try:
             address = str(self._client.dashboard_link)
             # A scheduler names an address also without a dashboard, and then has no page there.
-            build_opener(ProxyHandler({})).open(address, timeout=_SECONDS_FOR_A_PAGE).close()
+            build_opener(ProxyHandler({})).open(address, timeout=_SECONDS_FOR_AN_ANSWER).close()
         except (KeyError, OSError, ValueError, HTTPException):
             return None
         return address
@@ -175,7 +172,7 @@ class Crew:
         """
         from distributed import KilledWorker
 
-        error = future.exception(timeout=_SECONDS_FOR_AN_ERROR)
+        error = future.exception(timeout=_SECONDS_FOR_AN_ANSWER)
         if isinstance(error, KilledWorker):
             if task.id not in self._begun:
                 return Outcome(reason="its worker died before it began", refused=True)
@@ -252,14 +249,12 @@ def _difference(there: Mapping[str, str] | BaseException) -> str:
     """Return how a worker's software differs from this process's, in words; empty if it does not."""
     if isinstance(there, BaseException):
         return f"it has no twillight of this version ({type(there).__name__})"
-    here = software()
-    other = [name for name in here if there.get(name) != here[name]]
-    words = [f"{name} {there.get(name, 'missing')} (here {here[name]})" for name in other]
+    pairs = ((name, there.get(name, "missing"), here) for name, here in software().items())
+    words = [f"{name} {other} (here {here})" for name, other, here in pairs if other != here]
     return f"it has {', '.join(words)}" if words else ""
 
 
 def _compile(group: KernelGroup, topic: str) -> None:
-    """Compile a group of kernels in a worker."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -304,16 +299,11 @@ def software() -> dict[str, str]:
 
     Builds of PyTorch for different devices (``+cpu``, ``+cu126``) count as one version.
     """
+    root, sources = Path(__file__).parents[2], hashlib.sha256()
+    packages = [root / name for name in ("weaves", "pipeline", "reports", "jobs")]
+    for path in sorted(path for package in packages for path in package.rglob("*.py")):
+        sources.update(f"{path.relative_to(root).as_posix()}\0".encode())
+        sources.update(hashlib.sha256(path.read_bytes()).digest())
     python = ".".join(platform.python_version_tuple()[:2])
-    libraries = {name: metadata.version(name).partition("+")[0] for name in _LIBRARIES}
-    return {"twillight's sources": _sources(), "Python": python, **libraries}
-
-
-def _sources() -> str:
-    """Return a hash of all Python files of the packages, by their paths within them."""
-    root = Path(__file__).parents[2]
-    digest = hashlib.sha256()
-    for path in sorted(path for package in _PACKAGES for path in (root / package).rglob("*.py")):
-        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()[:8]
+    libraries = {name: metadata.version(name).partition("+")[0] for name in ("numba", "numpy", "torch")}
+    return {"twillight's sources": sources.hexdigest()[:8], "Python": python, **libraries}

@@ -87,7 +87,8 @@ def execute(
         manifest.save()
     finished = {task.id for task in summary.before}
     todo = [task for task in tasks if task.id not in finished and task.stage in stages]
-    _refuse_gaps(todo, tasks, finished)
+    planned = {task.id: task for task in tasks}
+    _refuse_gaps(todo, planned, finished)
     if not todo:
         return summary
 
@@ -101,7 +102,6 @@ def execute(
         board.workers = len(crew.accepted)
         crew.compile(groups, lambda done, under_way: board.compiling(done, len(groups), under_way))
         board.start(len(crew.accepted), crew.dashboard)
-        planned = {task.id: task for task in tasks}
         driver = _Driver(planned, Ready(todo, finished), crew, ledger, board, stages, summary, manifests)
         try:
             driver.run()
@@ -153,17 +153,15 @@ class _Driver:
     def close(self) -> None:
         """List what waits for tasks that failed; WorkFailed if products of a stage that does not run were damaged."""
         if self.lost:
-            first = self.lost[0]
-            allowed = f"run `twillight {first.stage}` first"
-            raise WorkFailed(f"{first.title}: its products were damaged and are removed; {allowed}")
+            damage = f"{self.lost[0].title}: its products were damaged and are removed"
+            raise WorkFailed(f"{damage}; run `twillight {self.lost[0].stage}` first")
         self.summary.waiting.extend(self.ready.waiting)
 
     def _start(self, alone: bool = True) -> list[Task]:
         """Start as many tasks as there are slots, and return them."""
         started = self.ready.take(self.crew.slots, alone)
         for task in started:
-            needs = self._needs(task)
-            if damaged := self.ledger.damaged(needs):
+            if damaged := self.ledger.damaged(self._needs(task)):
                 self._reopen(damaged)
                 self.ready.again(task)
                 continue
@@ -182,9 +180,8 @@ class _Driver:
             return {}
         hashes = dict[str, str]()
         for need in self._needs(task):
-            if receipt := self.ledger.receipt(need):
-                files = receipt.files
-                hashes |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}
+            files = receipt.files if (receipt := self.ledger.receipt(need)) else {}
+            hashes |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}
         return hashes
 
     def _take(self, task: Task, outcome: Outcome) -> None:
@@ -239,12 +236,9 @@ class _Driver:
                 self.ready.lose(task)
 
 
-def _refuse_gaps(todo: Sequence[Task], tasks: Sequence[Task], finished: set[str]) -> None:
+def _refuse_gaps(todo: Sequence[Task], planned: Mapping[str, Task], finished: set[str]) -> None:
     """Refuse to start if a product is missing of a stage that does not run."""
-    planned = {task.id: task for task in tasks}
-    own = {task.id for task in todo}
-    gaps = {need for task in todo for need in task.needs if need not in finished and need not in own}
-    if gaps:
+    if gaps := {need for task in todo for need in task.needs} - finished - {task.id for task in todo}:
         stage = min((planned[need].stage for need in gaps), key=STAGES.index)
         count = sum(planned[need].stage == stage for need in gaps)
         raise WorkFailed(f"{todo[0].stage}: {count} tasks that it needs are not done; run `twillight {stage}` first")
@@ -259,12 +253,12 @@ def _verified(task: Task, outcome: Outcome, ledger: Ledger) -> Outcome:
         expected = outcome.files[Path(path).name]
         try:
             # In object storage its size is enough: whoever fetches a file compares its hash.
-            as_written = Product.of(out / path) == expected if local else size_of(out / path) == expected.bytes
+            if Product.of(out / path) == expected if local else size_of(out / path) == expected.bytes:
+                continue
+            reason = f"{path} is not the file that its worker wrote: every worker must see {out}"
         except OSError as error:
             if not local and not isinstance(error, FileNotFoundError):
                 raise  # it is the storage that fails
             reason = f"{path} was written where this process does not see it: every worker must see --out, {out}"
-            return outcome._replace(reason=reason)
-        if not as_written:
-            return outcome._replace(reason=f"{path} is not the file that its worker wrote: every worker must see {out}")
+        return outcome._replace(reason=reason)
     return outcome

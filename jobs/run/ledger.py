@@ -119,8 +119,7 @@ class Ledger:
 
     def fail(self, task: Task, reason: str, traceback: str = "") -> None:
         """Note why a task failed."""
-        heading = {"task": task.id, "stage": task.stage, "title": task.title}
-        note = heading | {"reason": reason, "traceback": traceback}
+        note = {"task": task.id, "stage": task.stage, "title": task.title, "reason": reason, "traceback": traceback}
         self.store.write(_note(task), json.dumps(note, indent=1).encode() + b"\n")
 
     def adopt(self, task: Task) -> Receipt | None:
@@ -153,13 +152,14 @@ class Ledger:
 
         The task then counts as missing. Damaged copies in other data sets go too: they may be links to the same bytes.
         """
-        receipt, removed = self.receipt(task), []
-        for path in task.products if receipt else ():
-            for file in {path, *self._copies(path)}:
-                if self.store.size(file) is not None and receipt and not self._is_whole(file, receipt, verify=True):
-                    self.store.remove(file)
-                    removed.append(file)
-        return sorted(removed)
+        if (receipt := self.receipt(task)) is None:
+            return []
+        files = {file for path in task.products for file in (path, *self._copies(path))}
+        there = [file for file in sorted(files) if self.store.size(file) is not None]
+        removed = [file for file in there if not self._is_whole(file, receipt, verify=True)]
+        for file in removed:
+            self.store.remove(file)
+        return removed
 
     def damaged(self, tasks: Sequence[Task], *, anew: bool = False) -> list[Task]:
         """Return those done tasks whose products are damaged, and remove these products.
@@ -170,9 +170,8 @@ class Ledger:
         unread = [task for task in tasks if anew or (self.store.is_local and task.id not in self._sound)]
         with ThreadPoolExecutor() as pool:
             removed = list(pool.map(self.discard, unread))
-        damaged = [
-            task for task, paths in zip(unread, removed, strict=True) if not set(paths).isdisjoint(task.products)
-        ]
+        pairs = zip(unread, removed, strict=True)
+        damaged = [task for task, paths in pairs if not set(paths).isdisjoint(task.products)]
         self._sound.update(task.id for task in unread)
         self._sound.difference_update(task.id for task in damaged)
         return damaged

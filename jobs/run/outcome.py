@@ -64,10 +64,9 @@ def work(
         with _workspace(task, out, inputs) as folder:
             in_own_process(task.run, folder, progress=progress) if own else task.run(folder, progress)
             outcome = Outcome({Path(path).name: Product.of(folder / path) for path in task.products})
-    except (BadInput, WorkFailed) as error:
-        outcome = Outcome.failed(error)
     except Exception as error:
-        explained = None if storage.is_local(out) else storage.explained(error)
+        known = storage.is_local(out) or isinstance(error, BadInput | WorkFailed)
+        explained = None if known else storage.explained(error)
         outcome = Outcome(reason=str(explained), storage_failed=True) if explained else Outcome.failed(error)
     return outcome._replace(seconds=time.perf_counter() - start)
 

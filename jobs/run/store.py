@@ -30,7 +30,8 @@ LEDGER: Final = "ledger"
 LOCKS: Final = frozenset({f"{LEDGER}/lock", f"{LEDGER}/tasks.lock"})
 """Empty files by which processes keep out of each other's way; no task makes them."""
 
-_FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "entries", "report")
+FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "entries", "report")
+"""Folders of the receipts, and of the products of each stage."""
 
 
 class Store:
@@ -122,13 +123,9 @@ class Store:
             yield
 
     def _lock_file(self, name: str) -> IO[bytes]:
-        folder = self._lock_folder()
+        folder = self.out / LEDGER if self.is_local else storage.workspace(self.out)
         folder.mkdir(parents=True, exist_ok=True)
         return (folder / name).open("a+b")
-
-    def _lock_folder(self) -> Path:
-        """Return the folder of this machine with the locks."""
-        return self.out / LEDGER
 
 
 class _RemoteStore(Store):
@@ -156,7 +153,7 @@ class _RemoteStore(Store):
 
     def below(self, folders: Iterable[str]) -> Iterator[str]:
         wanted = set(folders)
-        yield from [path for path in self._sizes if any(str(parent) in wanted for parent in Path(path).parents)]
+        yield from [path for path in self._sizes if not wanted.isdisjoint(map(str, Path(path).parents))]
 
     def copy(self, path: str) -> Path:
         self._read()
@@ -187,9 +184,6 @@ class _RemoteStore(Store):
             (self.out / LEDGER / "lock").write_bytes(b"")
             yield
 
-    def _lock_folder(self) -> Path:
-        return storage.workspace(self.out)
-
     @property
     def _folder(self) -> Path:
         """Folder of the copies."""
@@ -205,7 +199,7 @@ class _RemoteStore(Store):
         with self._lock:
             if self._is_read:
                 return
-            for folder in _FOLDERS:
+            for folder in FOLDERS:
                 for name, stored in storage.listing(self.out / folder).items():
                     path = f"{folder}/{name}"
                     self._known[path] = stored.bytes

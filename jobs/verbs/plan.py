@@ -19,8 +19,7 @@ from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName, Whole
 from pipeline.cores import cores
 from weaves.errors import BadInput
 
-_MOST_WORKERS: Final = 100_000
-"""Workers of a simulated schedule, at most."""
+_MOST_WORKERS: Final = 100_000  # of a simulated schedule
 
 
 class Facts(NamedTuple):
@@ -44,8 +43,7 @@ def print_status(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT) -> N
     states = {task.id: ledger.state(task) for task in tasks}
     rows = []
     for stage in STAGES:
-        of_stage = [states[task.id] for task in tasks if task.stage == stage]
-        if of_stage:
+        if of_stage := [states[task.id] for task in tasks if task.stage == stage]:
             rows.append((stage, *(of_stage.count(state) for state in ("done", "failed", "missing"))))
     failed = [f"{task.title}: {ledger.reason(task)}" for task in tasks if states[task.id] == "failed"]
     print_table(("stage", "done", "failed", "missing"), rows, caption="\n".join(failed))

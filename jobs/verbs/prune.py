@@ -20,14 +20,11 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.faults import is_leftover, own_files
 from jobs.run.ledger import Ledger
-from jobs.run.store import LOCKS
+from jobs.run.store import FOLDERS, LOCKS
 from jobs.terminal import MOST_SENTENCES, print_lines, print_table, size
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out
 from pipeline.storage import is_local, listing, remove_all
 from weaves.errors import BadInput
-
-_FOLDERS: Final = (DATASETS, "models", "records", "entries", "report", "ledger")
-"""Folders of the products of each stage, and of the receipts."""
 
 _RECEIPT: Final = re.compile(r"ledger/([0-9a-f]{16})(\.failed)?\.json")
 
@@ -117,7 +114,7 @@ def _made(ledger: Ledger, every: Iterable[str]) -> set[str]:
     made, copied = set(), set()
     for path in every:
         name, top = Path(path).name, Path(path).parts[0]
-        if path in places or _RECEIPT.fullmatch(path) or (top in _FOLDERS and is_leftover(name)):
+        if path in places or _RECEIPT.fullmatch(path) or (top in FOLDERS and is_leftover(name)):
             made.add(path)
         elif name.endswith(".parquet"):
             copied.add(Path(path).parent)

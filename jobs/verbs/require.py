@@ -95,9 +95,8 @@ def require(
     by_fabric = [(worn[name][1], queries) for name, queries in queries_by_fabric.items()]
     every_share = {model.options.name: _fallback_share(model, by_fabric, general) for model in general.models}
     shares = {name: share for name, share in every_share.items() if share is not None}
-    fallback = _fallback_cost(by_fabric)
-    table = predictions(sizes, requirement.sizes, requirement.queries_per_frame, shares, fallback)
-    table = with_measured(table, scene_table(records), requirement.scene)
+    costs = requirement.queries_per_frame, shares, _fallback_cost(by_fabric)
+    table = with_measured(predictions(sizes, requirement.sizes, *costs), scene_table(records), requirement.scene)
     _print_requirement(requirement)
     cells = []
     for row in rows(table):
@@ -207,7 +206,6 @@ def _fallback_cost(by_fabric: Sequence[tuple[Fabric, Queries]]) -> tuple[float, 
 
 
 def _print_requirement(of: Requirement) -> None:
-    """Print the requirements of a scene."""
     low, high = of.curvature
     curved = f"{100 * of.curved:.0f} %, {low:.2g} to {high:.2g} a yarn" if of.curved else "none"
     rows = (
