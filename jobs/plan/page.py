@@ -11,7 +11,7 @@ from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.scenes import SceneShot
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.measurements.timing import TimeOfMethods
-from jobs.plan.measurements.truth_images import LivePage
+from jobs.plan.measurements.truth import LivePage
 from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe

@@ -14,10 +14,9 @@ from jobs.plan.measurements.fabrics import ErrorsBySize, OfAddedMetric, OnFabric
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.models import AtExtremes, Latents
 from jobs.plan.measurements.scenes import FrameTime, LargerPicture, LargerShot, OnScene, SceneShot
-from jobs.plan.measurements.studies import Study
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.measurements.timing import TimeOfMethods
-from jobs.plan.measurements.truth_images import LivePage, TruthEdge, TruthFrames, TruthPicture
+from jobs.plan.measurements.truth import LivePage, Study, TruthEdge, TruthFrames, TruthPicture
 from jobs.plan.page import Page
 from jobs.plan.task import Task
 from jobs.plan.training import Training

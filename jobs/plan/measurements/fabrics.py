@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
-from jobs.plan.measurements.truth_images import TruthEdge, TruthFrames, TruthPicture
+from jobs.plan.measurements.truth import TruthEdge, TruthFrames, TruthPicture
 from jobs.plan.task import Coloured, Made, Progress
 from pipeline.scenes.options import View
 from reports.catalogue import AddedMetric

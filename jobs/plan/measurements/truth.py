@@ -1,11 +1,12 @@
-"""Images of the truth of one fabric, which other measurements and the page read; all recipes and models share them."""
+"""Measurements of the truth itself: images of one fabric, which others and the page read, and studies."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Final, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects
@@ -15,16 +16,21 @@ from jobs.recipe.recipe import Recipe
 from pipeline import versions
 from pipeline.scenes.options import View, ViewOptions
 from pipeline.truth.options import TruthOptions
-from reports.options import EdgeOptions, FrameOptions, PictureOptions, select
+from reports.options import EdgeOptions, FrameOptions, PictureOptions, StudyName, select
 from reports.page.content import PictureFile
 from weaves.fabric import Fabric
 
+if TYPE_CHECKING:
+    from reports.record import Record
+
 _START = 0.3  # seconds of any image
 _LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 37.0, 512, 5
+_UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced", "measured_cloth")
+_LONG: Final[dict[StudyName, float]] = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0, "measured_cloth": 840.0}
 
 
 class _OfFabric(Measurement):
-    """Images of one measured fabric, as one file."""
+    """Images of one measured fabric, as one file; all recipes and models share them."""
 
     code: ClassVar = ("truth", "bench")
     endings: ClassVar = (".exr",)
@@ -163,3 +169,36 @@ class LivePage(_OfFabric):
         from reports.viewer.view import write_page
 
         write_page(self.fabric, out / self.products[0], self.pixels)
+
+
+class Study(Measurement):
+    """A module of `reports.truth`: all that its ``measure`` yields becomes Records; no data set is read."""
+
+    kind: Literal["study"] = "study"
+    code: ClassVar = ("truth", "bench")
+    study: StudyName
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield those that the recipe names."""
+        for name in subjects.recipe.bench.studies:
+            yield cls(study=name)
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return _LONG.get(self.study, 40.0)
+
+    @property
+    def slots(self) -> Literal["one", "all"]:
+        """All where times are among the results."""
+        return "one" if self.study in _UNTIMED else "all"
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure it.
+
+        BadInput if Mitsuba is not installed; WorkFailed if an expression of `stability` exceeds its limit.
+        """
+        module = import_module(f"reports.truth.{self.study}")
+        records: list[Record] = module.RECORDS.to_records(module.measure())
+        return records
