@@ -97,19 +97,18 @@ def write_geometry(fabric: Fabric, path: Path, texels: int) -> None:
 def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
     """Write a picture, (width, height) in pixels, of a lit swatch of 1.5 repeats or more; return its path."""
     from jobs.verbs.render import shown_at
-    from pipeline.scenes.bounces import light_between, tables_of
-    from pipeline.scenes.picture import answered, windows
+    from pipeline.scenes import bounces, picture
     from pipeline.scenes.swatch import Swatch
 
     period = max(*fabric.weave.repeat, *(len(colours.diffuse) for colours in fabric.thread_colours()))
     swatch = Swatch(min(max(_LEAST_YARNS, 1.5 * period), _MOST_YARNS), size)
     path, codes = folder / f"{fabric.name}-swatch.png", np.zeros((size[1], size[0], 3), np.uint8)
-    parts = windows(size, _QUERIES_OF_PIXEL)
+    parts = picture.windows(size, _QUERIES_OF_PIXEL)
     with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
         method = method_of(fabric)
         method.prepare(fabric)
-        between = partial(light_between, tables=tables_of(_WALKS))
-        done = answered(swatch.frame, parts, {"swatch": fabric}, method, pool, ("swatch",), between)
+        between = partial(bounces.light_between, tables=bounces.tables_of(_WALKS))
+        done = picture.answered(swatch.frame, parts, {"swatch": fabric}, method, pool, ("swatch",), between)
         for number, part in enumerate(done, 1):
             codes[shown_at(part)] = tiles.displayed(part.planes["rgb"])
             advance(number / len(parts))

@@ -59,11 +59,10 @@ class TruthNoise(_OnHeldOut):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure it."""
-        from reports.measure.frames import measure_truth_frames
-        from reports.measure.held_out import measure_truth
+        from reports.measure import frames, held_out
 
-        frames = measure_truth_frames(self.fabric, self.frame_options, out / self.frames.path)
-        return [measure_truth(self.held_out(out)), *frames]
+        motion = frames.measure_truth_frames(self.fabric, self.frame_options, out / self.frames.path)
+        return [held_out.measure_truth(self.held_out(out)), *motion]
 
 
 class OnFabric(_OnHeldOut):
@@ -123,23 +122,19 @@ class OnFabric(_OnHeldOut):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""
-        from reports.measure.frames import measure_aliasing
-        from reports.measure.furnace import measure_furnace
-        from reports.measure.held_out import measure_errors
-        from reports.measure.pictures import render_method
-        from reports.measure.silhouette import measure_silhouette
+        from reports.measure import frames, furnace, held_out, pictures, silhouette
 
         rows, methods, records = self.held_out(out), self.model.methods(out), []
         methods += self.model.variants(methods, self.ways)
         for index, method in enumerate(methods, start=1):
-            records += measure_errors(method, rows, self.errors.seed)
-            records += measure_furnace(method, self.fabric)
-            records += measure_aliasing(method, self.fabric, self.frame_options, out / self.frames.path)
+            records += held_out.measure_errors(method, rows, self.errors.seed)
+            records += furnace.measure_furnace(method, self.fabric)
+            records += frames.measure_aliasing(method, self.fabric, self.frame_options, out / self.frames.path)
             if self.edge and self.edge_options:
-                records += measure_silhouette(method, self.fabric, self.edge_options, out / self.edge.path)
+                records += silhouette.measure_silhouette(method, self.fabric, self.edge_options, out / self.edge.path)
             for view, truth in self.views.items() if method.setting in self.shown else ():
-                path = out / self.picture(method.setting, view)
-                records += render_method(method, self.fabric, view, self.picture_options, out / truth.path, path)
+                paths = out / truth.path, out / self.picture(method.setting, view)
+                records += pictures.render_method(method, self.fabric, view, self.picture_options, *paths)
             progress(index / len(methods))
         return records
 

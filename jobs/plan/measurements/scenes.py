@@ -91,12 +91,11 @@ class _Shot(Measurement):
         return 5.0 + sum(answer.bounces for answer in first) + answers
 
     def run(self, out: Path, progress: Progress) -> None:
-        from reports.measure.scene.scene_errors import write_truth
-        from reports.measure.scene.shot import read_shot, shoot
+        from reports.measure.scene import scene_errors, shot
 
-        shot, picture = (out / path for path in self.products)
-        shoot(self.found, self.options, shot, progress)
-        write_truth(read_shot(shot), picture)
+        queries, picture = (out / path for path in self.products)
+        shot.shoot(self.found, self.options, queries, progress)
+        scene_errors.write_truth(shot.read_shot(queries), picture)
 
 
 class SceneShot(_Shot):
@@ -176,12 +175,12 @@ class _OnShot(Measurement):
         return 0.5 + self.model.seconds(queries, fabrics=3.0) + _FALLBACK * unknown
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
-        from reports.measure.scene.scene_errors import measure_scene
-        from reports.measure.scene.shot import read_shot
+        from reports.measure.scene import scene_errors, shot
 
         methods = self.model.with_fallback(out, self.options.footprint)
         pictures = {setting: out / self.picture(setting) for setting in self.shown}
-        records = measure_scene(methods, read_shot(out / self.shot.path), self.options, pictures)
+        frames = shot.read_shot(out / self.shot.path)
+        records = scene_errors.measure_scene(methods, frames, self.options, pictures)
         return [] if self.shots.larger else records  # of a larger picture there are none
 
 
@@ -233,8 +232,7 @@ class FrameTime(Measurement):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Time all methods."""
-        from reports.measure.scene.scene_errors import time_scene
-        from reports.measure.scene.shot import read_shot
+        from reports.measure.scene import scene_errors, shot
 
         methods = [method for model in self.models for method in model.with_fallback(out, self.footprint)]
-        return time_scene(methods, read_shot(out / self.shot.path), self.options, self.seed)
+        return scene_errors.time_scene(methods, shot.read_shot(out / self.shot.path), self.options, self.seed)
