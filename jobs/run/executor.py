@@ -2,9 +2,7 @@
 
 A receipt is on the disk before any task that needs it starts, so a run that is stopped or killed at any moment loses
 only the tasks under way. A worker that dies is replaced and its task given to another (dask's retry).
-The inputs of a task are compared with their receipts before it starts; damaged ones are removed and made again, and a
-task that fails is tried once more if an input turns out to be damaged. Else a task that ends with an unexpected
-exception is tried again twice, elsewhere if there is a choice; bad input and work that failed are not.
+The inputs of a task are compared with their receipts before it starts; damaged ones are removed and made again.
 On this machine one task a core is handed out at a time: dask, which cannot know how long a task takes, would park short
 ones behind a training. A task that measures time starts when nothing else runs, in a process of its own
 (`jobs.run.outcome`).
@@ -39,7 +37,7 @@ from pipeline.storage import size_of
 from weaves.errors import BadInput, WorkFailed
 
 _SECONDS_BETWEEN_LOOKS: Final = 1.0  # for workers that have come
-_TRIES: Final = 3  # of a task that ends with an unexpected exception
+_TRIES: Final = 3  # of a task that ends with an unexpected exception; bad input and failed work are not tried again
 
 
 class RunSummary(NamedTuple):
@@ -128,7 +126,6 @@ class _Driver:
     failed_once: set[str] = field(default_factory=set)
 
     def run(self) -> None:
-        """Work until no task is left that can start."""
         while True:
             self.crew.look()
             self.board.workers = len(self.crew.accepted)
@@ -146,7 +143,6 @@ class _Driver:
             self.board.waiting_for(self.ready.running)
 
     def settle(self) -> None:
-        """Write what the manifests have put off."""
         for manifest in self.manifests:
             manifest.save()
 
@@ -158,7 +154,6 @@ class _Driver:
         self.summary.waiting.extend(self.ready.waiting)
 
     def _start(self, alone: bool = True) -> list[Task]:
-        """Start as many tasks as there are slots, and return them."""
         started = self.ready.take(self.crew.slots, alone)
         for task in started:
             if damaged := self.ledger.damaged(self._needs(task)):

@@ -75,8 +75,7 @@ def work(
 def _workspace(task: Task, out: Path, inputs: Mapping[str, str]) -> Iterator[Path]:
     """Yield the folder in which a task runs; afterwards its products are where they belong.
 
-    If the products are in object storage, it is a folder of this machine and user: what the task needs is fetched into
-    it and compared with the receipts; WorkFailed if its bytes are others.
+    For object storage it is a folder of this machine and user, into which what the task needs is fetched.
     """
     if storage.is_local(out):
         yield out

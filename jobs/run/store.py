@@ -2,8 +2,7 @@
 
 Each question to object storage is a request over the network. So its files are listed when they are first needed, 1000
 a request, and the receipts fetched, many at the same time, into a folder of this machine and user; later only those
-whose version has changed. That folder is also where tasks run (`jobs.run.outcome`). Nothing in it is needed again: it
-may be removed while no run uses it.
+whose version has changed. That folder is also where tasks run (`jobs.run.outcome`).
 """
 
 from __future__ import annotations

@@ -63,11 +63,9 @@ def check(
 
 
 def _meant(subject: str, add: Sequence[str]) -> Path | Recipe | Fabric:
-    """Return the subject of a name: the folder of a data set, a recipe, or a fabric.
+    """Return the folder of a data set, the recipe or the fabric of a name, or BadInput.
 
-    A folder may have any name but that of a recipe or preset. The tables of a .toml file decide what it is. `add` has
-    the methods from outside that a recipe may name. BadInput if nothing or more than one thing has this name, or the
-    file cannot be used.
+    A folder may have any name but that of a recipe or preset. The tables of a .toml file decide what it is.
     """
     presets, recipes = preset_names(), recipe_names()
     folder = place(subject, _WHERE)
@@ -97,10 +95,7 @@ def _meant(subject: str, add: Sequence[str]) -> Path | Recipe | Fabric:
 
 
 def _check_dataset(folder: Path) -> list[str]:
-    """Check every shard of a data set and return the faults as sentences; without any, print a summary.
-
-    BadInput if the folder has no manifest.
-    """
+    """Check every shard of a data set and return the faults as sentences; without any, print a summary."""
     manifest = Manifest.load(folder)
     if not manifest.shards:
         return [f"{folder}: its manifest lists no shards; run `twillight generate`"]
@@ -157,8 +152,7 @@ def _repair(recipe: Recipe, name: str, out: Path, on: WorkerFlags, add: Sequence
     """Remove the damaged files of a recipe, run exactly their tasks again, and return the exit code.
 
     Stages of which nothing was ever made are left out. Shards, weights and cards come back byte for byte; times are
-    measured again, and the page that shows them is written again. BadInput if the recipe, the folder or the scheduler
-    cannot be used; WorkFailed if a task failed, or another run is at work in the folder.
+    measured again, and the page that shows them is written again.
     """
     ledger = Ledger(out)
     if not ledger.exists():

@@ -14,14 +14,12 @@ from weaves.errors import one_line
 
 
 def _place(type_: object, tokens: Sequence[Token]) -> Path:
-    """Return the path of a folder or file of this machine or of object storage."""
     from pipeline.storage import place
 
     return place(tokens[0].value, tokens[0].keyword or "")
 
 
 def _local(type_: object, tokens: Sequence[Token]) -> Path:
-    """Return the path of a folder or file of this machine; refuse an address of object storage."""
     path = _place(type_, tokens)
     if not isinstance(path, Path):
         raise ValueError(f"{one_line(tokens[0].value, 80)} is an address; a path of this machine is needed here")
@@ -36,8 +34,7 @@ def _added(type_: object, tokens: Sequence[Token]) -> list[str]:
 
 
 def _whole(type_: object, tokens: Sequence[Token]) -> int:
-    """Return an integer as it is written; cyclopts itself rounds 1.5 to 2."""
-    return int(tokens[0].value)
+    return int(tokens[0].value)  # cyclopts itself rounds 1.5 to 2
 
 
 def given(flags: Any) -> dict[str, Any]:

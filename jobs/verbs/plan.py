@@ -119,10 +119,7 @@ def _details(tasks: Sequence[Task], facts: Facts) -> Iterator[str]:
 
 
 def _print_schedule(tasks: Sequence[Task], facts: Facts, workers: int) -> None:
-    """Print how long the whole plan, and what is left of it, takes on 1, 2, 4, … workers, and on the wished number.
-
-    Notes below say the time without work for all at the end (tail), where it stops scaling, and what was measured.
-    """
+    """Print how long the whole plan, and what is left of it, takes on 1, 2, 4, … workers, and on the wished number."""
     left = facts.left(tasks)
     schedules = {schedule.workers: schedule for schedule in doublings(tasks, facts.seconds)}
     last = max(schedules)

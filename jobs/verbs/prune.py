@@ -72,7 +72,6 @@ def prune(
 
 
 def _files(out: Path) -> dict[str, _Content]:
-    """Return all files below a folder, by path relative to it."""
     if not is_local(out):
         return {path: _Content((path,), 1, stored.bytes) for path, stored in listing(out).items()}
     files = {}

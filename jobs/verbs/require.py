@@ -174,15 +174,13 @@ def _fallback_share(model: ModelRecipe, by_fabric: Iterable[tuple[Fabric, Querie
 
 
 def _fallback_cost(by_fabric: Sequence[tuple[Fabric, Queries]]) -> tuple[float, float]:
-    """Return the relative RMSE of the fallback (colour measure of the benchmark) and its nanoseconds per query.
-
-    Measured on queries with light or viewer behind, if the scene has any: those fall back most often.
-    """
+    """Return the relative RMSE of the fallback (colour measure of the benchmark) and its nanoseconds per query."""
     from pipeline.models.fallback import fallback_answers
     from pipeline.truth.estimator import estimate
     from pipeline.truth.options import TruthOptions
     from reports.error import COLOUR_WEIGHTS
 
+    # Queries with light or viewer behind, if there are any, fall back most often.
     behind = any(queries.behind.any() for _, queries in by_fabric)
     differences, colours, seconds, count = [], [], 0.0, 0
     for fabric, queries in by_fabric:

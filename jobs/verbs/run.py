@@ -117,11 +117,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
 
 
 def _work_part(recipe_name: str, stage: Stage, part: Part, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
-    """Run a part of the unfinished tasks of a stage in this process and print a summary; arguments as for `work`.
-
-    BadInput if the recipe or the folder cannot be used, or workers are chosen; WorkFailed if any task failed, if what
-    they need is not done, or if a run that is no part is at work in the folder.
-    """
+    """Run a part of the unfinished tasks of a stage in this process and print a summary; arguments as for `work`."""
     if replace(on, progress=ON.progress) != ON:
         allowed = "is done by one process without a scheduler: leave --workers, --scheduler and --tls-… out"
         raise BadInput("--part", "", f"{part.number}/{part.parts}", allowed)
@@ -155,7 +151,6 @@ def _print_summary(tasks: Sequence[Task], summary: RunSummary, ledger: Ledger) -
 
 
 def _refuse_failed(recipe_name: str, summary: RunSummary, ledger: Ledger, add: Sequence[str]) -> None:
-    """Raise WorkFailed if any task failed."""
     if summary.failed:
         first, *others = summary.failed
         flags = "".join(f" --add {source}" for source in add)
@@ -174,10 +169,7 @@ def _withdraw(page: Page, tasks: Sequence[Task], ledger: Ledger) -> None:
 
 
 def _print_methods(records: Sequence[Path]) -> None:
-    """Print a benchmark condensed to one row a method, from the files of its Records.
-
-    Bytes are left to the page, so that a line fits a terminal of 80 columns.
-    """
+    """Print a benchmark condensed to one row a method, without bytes, so that a line fits a terminal of 80 columns."""
     from reports.record import read_records
     from reports.tables.number_format import NO_BREAK
     from reports.tables.summary import summary_table

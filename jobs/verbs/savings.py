@@ -1,12 +1,10 @@
 """`twillight savings`: measured savings of a scene's own recipe against the general one, both finished.
 
-Rows and seconds of ground truth and training come from the ledger, queries learnt from are steps taken times batch,
-errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's method
-alone: the rows that this method learns from and is measured on, and its own first training; its errors are means over
-all its trainings. Seconds depend on what else a
-machine does, as rows and queries learnt from do not; so does the time of a frame, which therefore is also given in
-frames of point sampling at 2 points, timed in turns with it. The last rows are the fallback shares of both models in
-the other scenes of the general recipe: a scene's own model answers for its own domain only.
+Rows and seconds come from the ledger, queries learnt from are steps taken times batch, errors and the time of a frame
+are the Records of both pages. The general recipe is charged for the scene's method alone: the rows that it learns from
+and is measured on, and its first training; its errors are means over all its trainings. The time of a frame is also
+given in frames of point sampling at 2 points, timed in turns with it. The last rows are the fallback shares of both
+models in the other scenes of the general recipe: a scene's own model answers for its own domain only.
 """
 
 from __future__ import annotations
@@ -219,7 +217,6 @@ def _elsewhere(scene: str, out: Path, models: Sequence[tuple[ModelRecipe, Recipe
 
 
 def _print(rows: Sequence[SceneSaving]) -> None:
-    """Print a scene's quantities by both recipes."""
     cells = []
     for row in rows:
         unit = "" if row.unit == "1" else f", {row.unit}"
@@ -236,7 +233,6 @@ def _shown(value: Value) -> str:
 
 
 def _csv(rows: Sequence[SceneSaving]) -> str:
-    """Return all rows as CSV, RFC 4180."""
     text = io.StringIO()
     writer = csv.writer(text)
     values = [f"{name}{end}" for name in ("general", "own") for end in ("", "_low", "_high")]

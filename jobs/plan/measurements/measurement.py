@@ -20,8 +20,7 @@ from weaves.fabric import Fabric
 if TYPE_CHECKING:
     from reports.record import Provenance, Record
 
-_SUBJECTS: Final = ("study", "metric", "model", "fabric", "scene")
-"""Fields that say what is measured, in the order of a title."""
+_SUBJECTS: Final = ("study", "metric", "model", "fabric", "scene")  # what is measured, in the order of a title
 
 
 class Measurement(Task):

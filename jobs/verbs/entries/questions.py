@@ -73,7 +73,6 @@ def questions(
 
 
 def _about(recipe: Recipe) -> dict[str, Any]:
-    """Return the facts of the questions for programs."""
     dataset, rows = recipe.dataset, recipe.dataset.rows.test
     return {
         "recipe": recipe.name,

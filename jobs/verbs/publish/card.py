@@ -58,7 +58,6 @@ def licence_url(licence: str) -> str:
 
 
 def _hub_licence(licence: str) -> dict[str, str]:
-    """Return the keys of a data set card that state the licence."""
     if licence in _OF_HUBS:
         return {"license": _OF_HUBS[licence] or licence.lower()}
     return {"license": "other", "license_name": licence.lower(), "license_link": licence_url(licence)}

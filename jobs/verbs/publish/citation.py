@@ -12,9 +12,7 @@ from cyclopts import Parameter
 
 from weaves.errors import BadInput
 
-AUTHORS: Final = ("The Twillight authors",)
-"""Authors of a data set if none are named."""
-
+_AUTHORS: Final = ("The Twillight authors",)
 _FORMS: Final = {
     "title": (r"[^\s{}\\][^{}\\]{0,299}", "at most 300 letters are needed, without {, } and \\"),
     "author": (r"[^\s{}\\][^{}\\]{0,199}", '"Family, Given" or the name of a group is needed'),
@@ -29,7 +27,7 @@ class Citation:
     """A reference to a data set, also on the command line; empty: not known, or the default."""
 
     title: Annotated[str, Parameter(help="Title; default: what it holds, with the name of its recipe.")] = ""
-    author: Annotated[tuple[str, ...], Parameter(help='Author, "Family, Given" or a group; several.')] = AUTHORS
+    author: Annotated[tuple[str, ...], Parameter(help='Author, "Family, Given" or a group; several.')] = _AUTHORS
     date: Annotated[str, Parameter(help="Day of publication, such as 2026-11-26.")] = ""
     url: Annotated[str, Parameter(help="Address where the data set will be.")] = ""
     doi: Annotated[str, Parameter(help="DOI reserved for it, such as 10.5281/zenodo.7.")] = ""

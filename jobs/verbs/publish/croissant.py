@@ -17,7 +17,6 @@ _CR: Final = (
     "key md5 parentField path recordSet references regex repeated replace samplingRate separator source subField "
     "transform citeAs equivalentProperty"
 )
-"""Terms of the vocabulary of Croissant."""
 
 _CONTEXT: Final = {
     "@language": "en",
@@ -33,8 +32,7 @@ _CONTEXT: Final = {
     "examples": {"@id": "cr:examples", "@type": "@json"},
 }
 
-_TYPES: Final = {"string": "sc:Text", "float": "sc:Float", "int32": "sc:Integer"}
-"""Types of Croissant by those of Arrow."""
+_TYPES: Final = {"string": "sc:Text", "float": "sc:Float", "int32": "sc:Integer"}  # by those of Arrow
 
 
 def croissant(about: About) -> str:
@@ -68,7 +66,6 @@ def croissant(about: About) -> str:
 
 
 def _files(role: str, split: str) -> dict[str, Any]:
-    """Return the files of a role's split."""
     return {
         "@type": "cr:FileSet",
         "@id": f"files-{role}-{split}",
@@ -80,7 +77,6 @@ def _files(role: str, split: str) -> dict[str, Any]:
 
 
 def _records(role: str, split: str) -> dict[str, Any]:
-    """Return the rows of a role's split."""
     name = f"{role}-{split}"
     fields = [
         {

@@ -81,7 +81,6 @@ def publish(
 
 
 def _free(to: Path | None, folder: Path) -> Path:
-    """Return the folder to write if nothing is in it."""
     if to is None:
         raise BadInput("publish", "", "--to is missing", "the folder to write is needed")
     if to.is_dir():
