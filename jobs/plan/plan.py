@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from jobs.plan.dataset import DataSet, Shard
-from jobs.plan.measurements import answers, fabrics, models, scenes, timing, truth
+from jobs.plan.measurements import answers, fabrics, scenes, timing, truth
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.page import Page
@@ -24,13 +24,13 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     fabrics.TruthNoise,
     fabrics.OnFabric,
     fabrics.OnUnseenPopulation,
-    models.Latents,
+    fabrics.Latents,
     scenes.SceneShot,
     scenes.OnScene,
     scenes.LargerShot,
     scenes.LargerPicture,
     scenes.FrameTime,
-    models.AtExtremes,
+    fabrics.AtExtremes,
     timing.TimeOfMethods,
     fabrics.ErrorsBySize,
     fabrics.OfAddedMetric,

@@ -70,9 +70,8 @@ def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) ->
         with _external(scheduler, say) if scheduler.address else _local(workers, say) as client:
             yield client
     except (CancelledError, CommClosedError) as error:
-        raise WorkFailed(
-            "the dask scheduler is gone; what was finished is kept, run the same command to go on"
-        ) from error
+        sentence = "the dask scheduler is gone; what was finished is kept, run the same command to go on"
+        raise WorkFailed(sentence) from error
 
 
 @contextmanager

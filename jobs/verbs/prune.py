@@ -66,9 +66,9 @@ def prune(
         if delete:
             _delete(unneeded, out)
     named = ", ".join(recipes)
-    count = f"{len(unneeded):,} files"
     end = f"removed; {named} need the others" if delete else f"are not needed by {named}; --delete removes them"
-    print_lines(f"{out}: {count} {end}" if unneeded else f"{out}: nothing to remove: {named} need all products")
+    done = f"{len(unneeded):,} files {end}" if unneeded else f"nothing to remove: {named} need all products"
+    print_lines(f"{out}: {done}")
 
 
 def _files(out: Path) -> dict[str, _Content]:
@@ -112,10 +112,10 @@ def _made(ledger: Ledger, every: Iterable[str]) -> set[str]:
             places.update(str(folder / name) for name in read_files(ledger.out / folder))
     made, copied = set(), set()
     for path in every:
-        name, top = Path(path).name, Path(path).parts[0]
-        if path in places or _RECEIPT.fullmatch(path) or (top in FOLDERS and is_leftover(name)):
+        leftover = Path(path).parts[0] in FOLDERS and is_leftover(Path(path).name)
+        if path in places or _RECEIPT.fullmatch(path) or leftover:
             made.add(path)
-        elif name.endswith(".parquet"):
+        elif path.endswith(".parquet"):
             copied.add(Path(path).parent)
     for path in every:
         # A manifest goes with its shards: a copied data set, of which no receipt knows, stays whole.

@@ -156,9 +156,8 @@ def _refuse_failed(recipe_name: str, summary: RunSummary, ledger: Ledger, add: S
         flags = "".join(f" --add {source}" for source in add)
         more = f"; {len(others)} more failed" if others else ""
         waiting = f"; {len(summary.waiting)} tasks wait for what failed" if summary.waiting else ""
-        raise WorkFailed(
-            f"{first.title}: {ledger.reason(first)}{more}{waiting}; see `twillight status {recipe_name}{flags}`"
-        )
+        reason = f"{first.title}: {ledger.reason(first)}{more}{waiting}"
+        raise WorkFailed(f"{reason}; see `twillight status {recipe_name}{flags}`")
 
 
 def _withdraw(page: Page, tasks: Sequence[Task], ledger: Ledger) -> None:

@@ -40,9 +40,8 @@ def board(
         whole = {record.method for record in records} == {form.name}
         if not whole or not {record.metric for record in records} >= {*columns_of("entries")}:
             raise BadInput(str(folder / "records.json"), "", "holds other Records", f"those of {form.name} are needed")
-        stated = [
-            (record.metric, record.value, record.note) for record in records if record.metric in columns_of("entries")
-        ]
+        costs = [record for record in records if record.metric in columns_of("entries")]
+        stated = [(record.metric, record.value, record.note) for record in costs]
         if sorted(stated) != sorted(form.costs):
             raise BadInput(str(folder / "records.json"), "", "states other costs", f"those of {FORM} are needed")
         if not all(is_plain(record.fabric + record.setting) for record in records):
@@ -51,8 +50,7 @@ def board(
             raise BadInput(str(folder), "name", form.name, "is the name of another entry")
         names.add(form.name)
         about = records[0].provenance
-        own = {"questions": form.questions, "version": about.version, "dataset": about.dataset}
-        for key, value in own.items():
+        for key, value in (("questions", form.questions), ("version", about.version), ("dataset", about.dataset)):
             if (known := facts.setdefault(key, value)) != value:
                 raise BadInput(str(folder), key, value, f"that of the entries before is {known}")
         by_class[entry_class(max(form.bytes_stored, form.multiply_adds))] += records
