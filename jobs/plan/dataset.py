@@ -39,7 +39,6 @@ class Shard(Task):
     role: str
     """Role of the fabric in the data set (`pipeline.shards.manifest`)."""
     folders: Places
-    """Folders of the data sets that hold the shard."""
 
     @property
     def group(self) -> str:

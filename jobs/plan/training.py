@@ -25,11 +25,9 @@ class Training(Task):
     options: ModelOptions
     training: TrainingOptions
     fabrics: tuple[str, ...]
-    """Names of the fabrics that it learns."""
     shards: tuple[str, ...]
     """Ids of the tasks that make its rows."""
     dataset: Place
-    """Folder of the data set."""
 
     @classmethod
     def planned(cls, dataset: DataSet, model: ModelRecipe) -> list[dict[str, Training]]:

@@ -22,9 +22,8 @@ class KernelGroup(NamedTuple):
     """Kernels that are compiled together: those of an estimator, or of a model."""
 
     name: str
-    """The estimator, or the model's name."""
     model: Options | None = None
-    """Options of the model; None for an estimator."""
+    """None: `name` is an estimator."""
 
     def compile(self, ready: Callable[[str], None]) -> None:
         """Compile the kernels, or read them from the cache; `ready` is called with the name of each kernel."""

@@ -25,9 +25,7 @@ class Outcome(NamedTuple):
     """Result of a task: its products, or the reason of its failure."""
 
     files: Mapping[str, Product] = MappingProxyType({})
-    """Products by file name."""
     seconds: float = 0.0
-    """Time that the task took."""
     reason: str = ""
     """One line; empty if the task is done."""
     traceback: str = ""

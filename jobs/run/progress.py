@@ -29,9 +29,8 @@ class Event(NamedTuple):
 
     name: EventName
     task: Task | None
-    """The task that it is about."""
     share: float | None
-    """Its finished share."""
+    """Finished share of the task."""
     message: str | None
     """Reason of a failure, or a sentence."""
 

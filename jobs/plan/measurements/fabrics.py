@@ -42,7 +42,6 @@ class _OnHeldOut(Measurement):
     fabric: Coloured
     role: Role
     dataset: HeldOutRows
-    """Held-out queries of the fabric."""
     errors: ErrorOptions
     """Number of these queries."""
 
@@ -165,7 +164,6 @@ class OnUnseenPopulation(Measurement):
     ways: RunOptions
     fabrics: tuple[Coloured, ...]
     dataset: HeldOutRows
-    """Held-out queries of the fabrics."""
     errors: ErrorOptions
     """Number of these queries, each fabric."""
 
@@ -210,7 +208,6 @@ class ErrorsBySize(Measurement):
     kind: Literal["errors by size"] = "errors by size"
     model: Trained
     dataset: HeldOutRows
-    """The held-out queries of all fabrics."""
     seed: int
     """Seed of the points of random methods."""
 

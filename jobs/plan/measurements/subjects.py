@@ -35,7 +35,6 @@ class HeldOutRows(TaskPart):
     rows: tuple[str, ...]
     """Ids of the tasks that make the rows."""
     folder: Place
-    """Folder of the data set."""
 
     @property
     def needs(self) -> tuple[str, ...]:

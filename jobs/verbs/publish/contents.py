@@ -38,7 +38,6 @@ class PublishedPart(NamedTuple):
     """A file of rows of one role and one split."""
 
     file: str
-    """Path within the folder."""
     role: Role
     split: str
     fabrics: tuple[str, ...]
@@ -155,13 +154,10 @@ class About(NamedTuple):
     """Facts of a published data set."""
 
     manifest: Manifest
-    """Its fabrics, roles and options."""
     parts: list[PublishedPart]
-    """Its files of rows."""
     licence: str
     """SPDX identifier."""
     citation: Citation
-    """Reference to the data set."""
     truth_version: int
     """Version of the ground truth that answered the rows; 0 if the shards do not name it."""
 
