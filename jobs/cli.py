@@ -22,7 +22,6 @@ VERBS: Final[dict[str, Any]] = tomllib.loads(Path(__file__).with_name("verbs.tom
 
 
 def _version() -> str:
-    """Return the version of the package that is installed."""
     from importlib.metadata import version
 
     return f"twillight {version('twillight')}"

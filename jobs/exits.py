@@ -16,7 +16,7 @@ import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -24,9 +24,6 @@ from typing import Final
 from cyclopts import CycloptsError, MissingArgumentError
 
 from weaves.errors import BadInput, WorkFailed, one_line
-
-_NO_FILE: Final = {errno.ENAMETOOLONG, errno.ELOOP}
-"""Errors of looking for a file that show a path as one that no file can have."""
 
 _CONTINUES: Final = "finished work is kept, and the same command continues"
 
@@ -43,8 +40,15 @@ def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) ->
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names that are no UTF-8, terminals that show less
     stops: list[KeyboardInterrupt] = []
+
+    def stop(number: int, frame: object) -> None:
+        stops.append(KeyboardInterrupt() if number == signal.SIGINT else _Stopped(number))
+        raise stops[-1]
+
+    # Where Ctrl-C is ignored, as in the background of a shell, it stays so.
+    interrupt = {signal.SIGINT} if signal.getsignal(signal.SIGINT) is signal.default_int_handler else set()
     try:
-        with _signals(stops):
+        with handled(stop, signal.SIGTERM, signal.SIGHUP, *interrupt):  # what must be closed is closed
             answer = verb()
         sys.stdout.flush()
         return answer if isinstance(answer, int) else 0
@@ -72,7 +76,7 @@ def _handle(raised: BaseException, stops: Sequence[BaseException], tokens: Seque
 
         if told := explained(error):
             return _end(str(told), told.exit_code)
-    if isinstance(error, OSError) and error.errno in _NO_FILE:
+    if isinstance(error, OSError) and error.errno in (errno.ENAMETOOLONG, errno.ELOOP):  # no file can have this path
         return _end(f"{one_line(error.filename, 80, keep='end')}: {error.strerror}: another path is needed", 2)
     if type(error).__name__ == "ShellDetectionError":
         return _end("twillight --install-completion: the shell is not known: add --shell bash, zsh or fish", 2)
@@ -124,18 +128,6 @@ class _Stopped(KeyboardInterrupt):
     def __init__(self, number: int) -> None:
         super().__init__(f"stopped by {signal.Signals(number).name}; {_CONTINUES}")
         self.code = 128 + number
-
-
-def _signals(stops: list[KeyboardInterrupt]) -> AbstractContextManager[None]:
-    """Turn SIGTERM and SIGHUP into `_Stopped`, so that what must be closed is closed; `stops` receives those raised."""
-
-    def stop(number: int, frame: object) -> None:
-        stops.append(KeyboardInterrupt() if number == signal.SIGINT else _Stopped(number))
-        raise stops[-1]
-
-    # Where Ctrl-C is ignored, as in the background of a shell, it stays so.
-    interrupt = {signal.SIGINT} if signal.getsignal(signal.SIGINT) is signal.default_int_handler else set()
-    return handled(stop, signal.SIGTERM, signal.SIGHUP, *interrupt)
 
 
 @contextmanager

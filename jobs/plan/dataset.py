@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from jobs.plan.task import Places, Progress, Stage, Task
 from jobs.plan.truth_cost import SECONDS_A_POINT, TruthCost
@@ -39,21 +39,18 @@ class Shard(Task):
     role: str
     """Role of the fabric in the data set (`pipeline.shards.manifest`)."""
     folders: Places
-    """Folders of the data sets that hold the shard."""
 
     @property
     def group(self) -> str:
         """Role and split, or kind of extra rows."""
-        shard = self.shard
-        what = shard.kind.replace("_", " ") if isinstance(shard, ExtraShardTask) else shard.split
-        return f"{self.role.replace('_', ' ')} · {what}"
+        what = self.shard.kind if isinstance(self.shard, ExtraShardTask) else self.shard.split
+        return f"{self.role} · {what}".replace("_", " ")
 
     @property
     def title(self) -> str:
         """Fabric, split and rows."""
         shard = self.shard
-        last = shard.start + shard.rows - 1
-        return f"{shard.fabric.name} {shard.split} rows {shard.start}–{last}"
+        return f"{shard.fabric.name} {shard.split} rows {shard.start}–{shard.start + shard.rows - 1}"
 
     @property
     def products(self) -> tuple[str, ...]:
@@ -97,15 +94,8 @@ class Shard(Task):
         from pipeline.shards.manifest import ShardEntry
 
         shard = self.shard
-        return ShardEntry(
-            file=Path(self.products[0]).name,
-            fabric=shard.fabric.name,
-            kind=shard.kind,
-            split=shard.split,
-            start=shard.start,
-            rows=shard.rows,
-            sha256=sha256,
-        )
+        rows = {name: getattr(shard, name) for name in ("kind", "split", "start", "rows")}
+        return ShardEntry(file=Path(self.products[0]).name, fabric=shard.fabric.name, sha256=sha256, **rows)
 
     def run(self, out: Path, progress: Progress) -> None:
         """Write the shard to its first folder and link it into the others."""
@@ -123,32 +113,18 @@ class DataSet:
     def __init__(self, recipe: Recipe) -> None:
         self.recipe = recipe
         cuts = list(_cuts(recipe))
-        own = sorted(cut.id for cut in cuts if not isinstance(cut.first.shard, ExtraShardTask))
-        self.fingerprint = fingerprint(own)
+        self.fingerprint = fingerprint(sorted(id for first, _, id in cuts if isinstance(first.shard, ShardTask)))
         """Of its own rows."""
         self.folder = f"{DATASETS}/{recipe.name}-{self.fingerprint[:8]}"
         """Relative to the output folder."""
-        self.shards = [cut.shard(self.folder) for cut in cuts]
+        self.shards = []
+        for first, numbers, id in cuts:  # only the first of each set is validated
+            own = {"shard": first.shard.model_copy(update=numbers), "folders": (self.folder,), "id": id}
+            self.shards.append(first.model_copy(update=own))
 
 
-class _Cut(NamedTuple):
-    """Rows of a fabric's split or set, which are one shard."""
-
-    first: Shard
-    """Shard of the same split or set."""
-    numbers: dict[str, int]
-    """First row and number of rows."""
-    id: str
-    """Of the task."""
-
-    def shard(self, folder: str) -> Shard:
-        """Return the shard; validated is only the first."""
-        own = {"shard": self.first.shard.model_copy(update=self.numbers), "folders": (folder,), "id": self.id}
-        return self.first.model_copy(update=own)
-
-
-def _cuts(recipe: Recipe) -> Iterator[_Cut]:
-    """Cut the rows of every fabric into shards."""
+def _cuts(recipe: Recipe) -> Iterator[tuple[Shard, dict[str, int], str]]:
+    """Yield for every shard the first one of its set, its own first row and number of rows, and the id of its task."""
     dataset = recipe.dataset
     for role, fabric, kind, total in (*recipe.own_rows(), *recipe.extra_rows()):
         starts = range(0, total, dataset.shard_rows)
@@ -164,4 +140,4 @@ def _cuts(recipe: Recipe) -> Iterator[_Cut]:
             shard = ExtraShardTask(fabric=fabric, **numbers[0], extra=kind)
         first = Shard(shard=shard, role=role, folders=())
         for cut, id in zip(numbers, fingerprints(first.stage, first.identity(), numbers), strict=True):
-            yield _Cut(first, cut, id)
+            yield first, cut, id

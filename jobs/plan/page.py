@@ -11,7 +11,7 @@ from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.scenes import SceneShot
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.measurements.timing import TimeOfMethods
-from jobs.plan.measurements.truth_images import LivePage
+from jobs.plan.measurements.truth import LivePage
 from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import ModelRecipe, Recipe
@@ -29,17 +29,12 @@ class Page(Task):
     stage: ClassVar[Stage] = "report"
 
     recipe: str
-    """Name of the recipe."""
     about: str
-    """Sentence about the recipe."""
     dataset: str
     """Name and fingerprint of the data set."""
     fabrics: tuple[tuple[Fabric, Role], ...]
-    """The fabrics that are measured."""
     models: tuple[ModelNote, ...]
-    """The models."""
     options: BenchOptions
-    """Options of the measurements."""
     metrics: Annotated[tuple[AddedMetric, ...], PLACE]
     """Metrics from outside; the ids of their measurements are in `measured`."""
     measured: tuple[str, ...]
@@ -49,7 +44,6 @@ class Page(Task):
     timing: Place
     """File of the Records of times; the machine beside it is the page's."""
     pictures: Annotated[tuple[PictureFile, ...], PLACE]
-    """Pictures of the measurements."""
     live: Annotated[dict[str, str], PLACE]
     """Live page of each fabric that has one, by the fabric's name."""
 
@@ -58,21 +52,16 @@ class Page(Task):
         """Return the page of all measurements."""
         recipe = subjects.recipe
         shots = [task for task in benches if isinstance(task, SceneShot)]
+        firsts = zip(recipe.models, subjects.first_models, strict=True)
+        models = [_note(recipe, model, first.trainings, shots) for model, first in firsts]
+        forms = [entry.form for entry in recipe.entries]
+        models += [ModelNote(form.name, form.about, per_material=form.each_fabric, kind=ADDED_MODEL) for form in forms]
         return cls(
             recipe=recipe.name,
             about=recipe.about,
             dataset=f"{recipe.name}, {subjects.dataset.fingerprint}",
             fabrics=recipe.tested,
-            models=(
-                *(
-                    _note(recipe, model, first.trainings, shots)
-                    for model, first in zip(recipe.models, subjects.first_models, strict=True)
-                ),
-                *(
-                    ModelNote(form.name, form.about, per_material=form.each_fabric, kind=ADDED_MODEL)
-                    for form in (entry.form for entry in recipe.entries)
-                ),
-            ),
+            models=tuple(models),
             options=recipe.bench,
             metrics=recipe.metrics,
             measured=tuple(task.id for task in benches),
@@ -169,7 +158,10 @@ def _note(
             about += f"; unlike the paper: {', '.join(options.departures)}"
         if model.seeds > 1:
             about += f", {model.seeds} trainings with the seeds {training.seed} to {training.seed + model.seeds - 1}"
-        about += _trained_by(recipe, model) + _left_out(recipe, model, trainings, shots)
+        if (trainer := recipe.trainer_of(model)) is not recipe:
+            own = "" if trainer.dataset.queries == recipe.dataset.queries else ", on queries of its own"
+            about += f"; trained by the recipe {trainer.name}{own}"
+        about += _left_out(recipe, model, trainings, shots)
     return ModelNote(
         name=options.name,
         about=about,
@@ -177,13 +169,6 @@ def _note(
         per_material=model.of_one_material,
         kind=options.model,
     )
-
-
-def _trained_by(recipe: Recipe, model: ModelRecipe) -> str:
-    """Return which other recipe trains a model."""
-    trainer = recipe.trainer_of(model)
-    own = "" if trainer.dataset.queries == recipe.dataset.queries else ", on queries of its own"
-    return "" if trainer is recipe else f"; trained by the recipe {trainer.name}{own}"
 
 
 def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]) -> str:

@@ -9,40 +9,34 @@ from collections.abc import Iterable
 from typing import Final
 
 from jobs.plan.dataset import DataSet, Shard
-from jobs.plan.measurements.answers import OfAnswers
-from jobs.plan.measurements.fabrics import ErrorsBySize, OfAddedMetric, OnFabric, OnUnseenPopulation, TruthNoise
+from jobs.plan.measurements import answers, fabrics, scenes, timing, truth
 from jobs.plan.measurements.measurement import Measurement
-from jobs.plan.measurements.models import AtExtremes, Latents
-from jobs.plan.measurements.scenes import FrameTime, LargerPicture, LargerShot, OnScene, SceneShot
-from jobs.plan.measurements.studies import Study
 from jobs.plan.measurements.subjects import Subjects
-from jobs.plan.measurements.timing import TimeOfMethods
-from jobs.plan.measurements.truth_images import LivePage, TruthEdge, TruthFrames, TruthPicture
 from jobs.plan.page import Page
 from jobs.plan.task import Task
 from jobs.plan.training import Training
 from jobs.recipe.recipe import Recipe
 
 KINDS: Final[tuple[type[Measurement], ...]] = (
-    TruthPicture,
-    TruthFrames,
-    TruthEdge,
-    TruthNoise,
-    OnFabric,
-    OnUnseenPopulation,
-    Latents,
-    SceneShot,
-    OnScene,
-    LargerShot,
-    LargerPicture,
-    FrameTime,
-    AtExtremes,
-    TimeOfMethods,
-    ErrorsBySize,
-    OfAddedMetric,
-    OfAnswers,
-    LivePage,
-    Study,
+    truth.TruthPicture,
+    truth.TruthFrames,
+    truth.TruthEdge,
+    fabrics.TruthNoise,
+    fabrics.OnFabric,
+    fabrics.OnUnseenPopulation,
+    fabrics.Latents,
+    scenes.SceneShot,
+    scenes.OnScene,
+    scenes.LargerShot,
+    scenes.LargerPicture,
+    scenes.FrameTime,
+    fabrics.AtExtremes,
+    timing.TimeOfMethods,
+    fabrics.ErrorsBySize,
+    fabrics.OfAddedMetric,
+    answers.OfAnswers,
+    truth.LivePage,
+    truth.Study,
 )
 """The kinds of measurement, each after those that it reads."""
 

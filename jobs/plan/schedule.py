@@ -84,9 +84,8 @@ class Estimate:
     """
 
     def __init__(self) -> None:
-        self._sums: dict[str, list[float]] = defaultdict(
-            lambda: [0.0, 0.0]
-        )  # by kind: costs; with logarithms of ratios
+        # By kind: costs, and costs times logarithms of ratios.
+        self._sums: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
         self._end = self._next = -math.inf  # of the run, as last estimated; when the next estimate is due
 
     def learn(self, task: Task, seconds: float) -> None:

@@ -59,7 +59,6 @@ class Made(TaskPart):
     """Products of another task that this one reads."""
 
     task: str
-    """Id of that task."""
     path: Place
     """Path of its product, or of the folder of its products."""
 
@@ -73,11 +72,9 @@ class Task(TaskPart):
     """A piece of work; the methods that raise NotImplementedError are each kind's to define."""
 
     stage: ClassVar[Stage]
-    """The stage that does it."""
     shares_process: ClassVar[bool] = False
     """True if it may run beside others in one process: it uses no random numbers and threads of a library."""
     timed: ClassVar[bool] = False
-    """True if it measures time."""
 
     @property
     def group(self) -> str:

@@ -23,15 +23,11 @@ class Training(Task):
     stage: ClassVar[Stage] = "train"
 
     options: ModelOptions
-    """The network."""
     training: TrainingOptions
-    """Options of its training."""
     fabrics: tuple[str, ...]
-    """Names of the fabrics that it learns."""
     shards: tuple[str, ...]
     """Ids of the tasks that make its rows."""
     dataset: Place
-    """Folder of the data set."""
 
     @classmethod
     def planned(cls, dataset: DataSet, model: ModelRecipe) -> list[dict[str, Training]]:
@@ -49,13 +45,11 @@ class Training(Task):
         for part in dataset.shards:
             if part.shard.split in splits and (key := group_of.get(part.shard.fabric.name)) is not None:
                 read[key]["shards"].append(part.id)
-        return [
-            {
-                key: cls(options=single.options, training=single.training, dataset=dataset.folder, **rows)
-                for key, rows in read.items()
-            }
-            for single in model.single
-        ]
+        trainings = []
+        for single in model.single:
+            own = {"options": single.options, "training": single.training, "dataset": dataset.folder}
+            trainings.append({key: cls(**own, **rows) for key, rows in read.items()})
+        return trainings
 
     @property
     def group(self) -> str:
@@ -65,9 +59,8 @@ class Training(Task):
     @property
     def title(self) -> str:
         """Name of the model and its fabrics."""
-        fabrics = self._fabric or f"{len(self.fabrics)} fabrics"
         seed = f", seed {self.training.seed}" if self.training.seed else ""
-        return f"{self.options.name} on {fabrics}{seed}"
+        return f"{self.options.name} on {self._fabric or f'{len(self.fabrics)} fabrics'}{seed}"
 
     @property
     def products(self) -> tuple[str, ...]:

@@ -59,7 +59,6 @@ class TruthCost(NamedTuple):
 
     @property
     def _is_tabulated(self) -> bool:
-        """True if tables answer most rows."""
         truth = self.truth
         known = truth.frame == "ply" and (truth.walls != "rim" or 0.5 * self._width >= NARROWEST_RIMS)
         return truth.estimator in ("auto", "node_table") and known and _cells(self.fabric.weave) <= TABLE_CELLS

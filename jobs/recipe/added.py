@@ -7,7 +7,7 @@ all methods. A recipe alone never runs code.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Final
@@ -21,8 +21,7 @@ from reports.catalogue import AddedMetric
 from weaves.errors import BadInput, nearest
 from weaves.validation import validated
 
-_BESIDE: Final = ("model", "name", "version", "limit", "memory", "training", "seeds", "runtimes")
-"""Keys of a recipe's entry that are no options of the method."""
+_BESIDE: Final = ("model", "name", "version", "limit", "memory", "training", "seeds", "runtimes")  # no options
 
 
 class Added:
@@ -85,11 +84,15 @@ class Added:
             return entry  # it is written out in that recipe (`jobs.recipe.trained_by`)
         given, installed = self._given.get(model), _installed().get(model)
         if given is None and installed is None:
-            raise BadInput(where, f"{key}.model", model, _unknown(model, [*CLASSES, *self._given, *_installed()]))
+            known = nearest(model, [*CLASSES, *self._given, *_installed()])
+            allowed = f"code of your own is given with --add FILE.py:CLASS; {known}"
+            if model in REPLACED_MODELS:
+                allowed = f"this method is gone: take {REPLACED_MODELS[model]!r}"
+            raise BadInput(where, f"{key}.model", model, allowed)
         own = {name: value for name, value in entry.items() if name not in _BESIDE}
         name = entry.get("name", model)
         limits = {key: entry[key] for key in CallLimits.model_fields if key in entry}
-        source = f"{given.source}" if given else str(installed)
+        source = given.source if given else str(installed)
         method = describe(source, own, {"name": name, **limits})
         if isinstance(method, AddedFunction):
             raise BadInput(where, f"{key}.model", model, "is the entry point of a metric; a method is needed")
@@ -102,10 +105,3 @@ class Added:
 def _installed() -> dict[str, str]:
     """Return the methods of installed packages: their source by name."""
     return {entry.name: entry.value.replace(" ", "") for entry in entry_points(group=GROUP)}
-
-
-def _unknown(model: str, known: Iterator[str] | Sequence[str]) -> str:
-    """Return what is allowed in place of an unknown name."""
-    if model in REPLACED_MODELS:
-        return f"this method is gone: take {REPLACED_MODELS[model]!r}"
-    return f"code of your own is given with --add FILE.py:CLASS; {nearest(model, known)}"

@@ -7,9 +7,8 @@ what the form states is shown as stated.
 from __future__ import annotations
 
 import textwrap
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 from pydantic import AfterValidator, Field, StrictBool, StrictInt
 
@@ -87,15 +86,12 @@ class EntryForm(Frozen):
         return self.source or "without code"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A form, and the answers beside it by their hash."""
+class Entry(NamedTuple):
+    """A form, and the answers beside it by their hash (`pipeline.shards.answer_file`) and their absolute path."""
 
     form: EntryForm
     sha256: str
-    """Hash of the answers (`pipeline.shards.answer_file`)."""
     answers: str
-    """Absolute path of the answers."""
 
 
 def blank_form(questions: str) -> str:

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from jobs.recipe.recipe import ModelRecipe, Recipe
-    from pipeline.models.domain import Domain
     from pipeline.truth.query import Queries
     from weaves.fabric import Fabric
-
-
-class _DomainOnly:
-    """A method with a domain only."""
-
-    name = setting = ""
-
-    def __init__(self, domain: Domain | None, turns: bool) -> None:
-        self.domain, self.turns = domain, turns
 
 
 def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterable[tuple[Fabric, Queries]]) -> float:
@@ -42,7 +33,7 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
     if model.learns:
         learnt_from = recipe.seen + (recipe.unseen if model.of_one_material else recipe.population)
         domain = Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from)
-    method: Any = _DomainOnly(domain, options.turns)
+    method: Any = SimpleNamespace(name="", setting="", domain=domain, turns=options.turns)
     fallback = Fallback(method, options.kinds, recipe.bench.scenes.footprint)
     fallback_rows = [
         fallback.out_of_domain(fabric, queries) if fabric in known else np.ones(len(queries.u), np.bool_)

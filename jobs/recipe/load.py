@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -21,11 +21,8 @@ from weaves.fabric import Fabric, load_fabric, preset_names
 from weaves.population import population_fabrics
 from weaves.validation import read_toml, validated
 
-_MEASURED_BY: Final = {"stability": "truth", "sampler": "truth"}
-"""Recipes that measure what was once measured without a recipe."""
-
-MOST_RECIPES: Final = 32
-"""Most recipes that one recipe names, directly or through others."""
+_MEASURED_BY: Final = {"stability": "truth", "sampler": "truth"}  # of what was once measured without a recipe
+_MOST_RECIPES: Final = 32
 
 
 def load_recipe(name_or_path: str | Path, add: Sequence[str] = ()) -> Recipe:
@@ -51,15 +48,18 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
     where = str(path)
 
     def load(name: object, key: str) -> Recipe:
-        other = _beside(path, name, key)
+        what = "a recipe's name or the path of a .toml file beside this one"
+        other = _beside(name, recipe_names(), path, key, what) or RECIPES / f"{name}.toml"
         if (real := other.resolve()) in read:
             return read[real]
         named = (*chain, path, other)
         if real in [earlier.resolve() for earlier in named[:-1]]:
             circle = " → ".join(link.stem for link in named)
             raise BadInput(where, key, name, f"recipes must not wait for one another: {circle}")
-        if len(chain) + len(read) >= MOST_RECIPES:
-            raise BadInput(where, key, name, f"at most {MOST_RECIPES} recipes may be named, directly or through others")
+        if len(chain) + len(read) >= _MOST_RECIPES:
+            raise BadInput(
+                where, key, name, f"at most {_MOST_RECIPES} recipes may be named, directly or through others"
+            )
         read[real] = _load(other, named[:-1], read, added)
         return read[real]
 
@@ -96,41 +96,34 @@ def _entries(recipe: Recipe, forms: Sequence[Path]) -> Iterator[Entry]:
         yield entry
 
 
-def _beside(recipe: Path, name: object, key: str) -> Path:
-    """Return the path of a recipe that another one names: of the package, or beside it."""
-    if name in (known := recipe_names()):
-        return RECIPES / f"{name}.toml"
-    if isinstance(name, str) and name.endswith(".toml") and "\0" not in name and (recipe.parent / name).is_file():
+def _beside(
+    name: object, known: Collection[str], recipe: Path, key: str, what: str, endings: tuple[str, ...] = (".toml",)
+) -> Path | None:
+    """Return the path of a file beside a recipe that names it; None if the name is one of the package."""
+    if name in known:
+        return None
+    if isinstance(name, str) and name.endswith(endings) and "\0" not in name and (recipe.parent / name).is_file():
         return recipe.parent / name
-    allowed = f"a recipe's name or the path of a .toml file beside this one is needed; {nearest(str(name), known)}"
-    raise BadInput(str(recipe), key, name, allowed)
+    raise BadInput(str(recipe), key, name, f"{what} is needed; {nearest(str(name), known)}")
 
 
 def _fabrics(names: Sequence[str], recipe: Path, key: str) -> Iterator[Fabric]:
     """Load the fabrics that a recipe names."""
+    known, what = preset_names(), "a preset or the path of a .toml file beside the recipe"
     for index, name in enumerate(names):
-        known = preset_names()
-        if name in known:
-            yield load_fabric(name)
-        elif name.endswith(".toml") and "\0" not in name and (path := recipe.parent / name).is_file():
-            yield load_fabric(path)
-        else:
-            allowed = f"a preset or the path of a .toml file beside the recipe is needed; {nearest(name, known)}"
-            raise BadInput(str(recipe), f"{key}.{index}", name, allowed)
+        yield load_fabric(_beside(name, known, recipe, f"{key}.{index}", what) or name)
 
 
 def _with_scenes(bench: BenchOptions, recipe: Path) -> BenchOptions:
     """Return measurements whose scenes are there, paths being found from wherever the recipe is read."""
+    key, what = "bench.scenes.names", "a scene of the package or the path of a .toml or .xml file beside the recipe"
     references = []
     for index, name in enumerate(bench.scenes.names):
-        path = recipe.parent / name if "\0" not in name else Path()
-        if name not in SHIPPED and not (path.suffix in (".toml", ".xml") and path.is_file()):
-            allowed = "a scene of the package or the path of a .toml or .xml file beside the recipe is needed; "
-            raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed + nearest(name, SHIPPED))
-        references.append(name if name in SHIPPED else str(path.resolve()))
+        path = _beside(name, SHIPPED, recipe, f"{key}.{index}", what, (".toml", ".xml"))
+        references.append(str(path.resolve()) if path else name)
     scenes = [load_scene(name).name for name in references]
     for index, name in enumerate(scenes):
         if name in scenes[:index]:
             allowed = "names of scenes must differ, because files are called by them"
-            raise BadInput(str(recipe), f"bench.scenes.names.{index}", name, allowed)
+            raise BadInput(str(recipe), f"{key}.{index}", name, allowed)
     return bench.model_copy(update={"scenes": bench.scenes.model_copy(update={"names": tuple(references)})})

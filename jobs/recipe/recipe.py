@@ -72,15 +72,12 @@ class DatasetOptions(Frozen):
     No draft of it is in the population, unless a seen fabric has it too. No design may be chosen by what is measured
     on it (CONTRIBUTING.md)."""
     rows: Rows
-    """Queries for each fabric."""
     shard_rows: StrictInt = Field(default=8192, ge=64, le=2**24)
     """Most rows of one shard, which is one task."""
     seed: StrictInt = Field(default=0, ge=0, lt=2**63)
     """Seed of all queries and points."""
     queries: QueryOptions = QueryOptions()
-    """Distribution of the queries."""
     truth: TruthOptions = TruthOptions()
-    """Options of the truth."""
     training_truth: TruthOptions | None = None
     """How training rows are answered; left out: as all others. A training averages over the noise of its rows, so many
     coarse rows give a better model than the few exact ones that take the same time."""
@@ -93,9 +90,7 @@ class ModelRecipe(Frozen):
     """
 
     options: ModelOptions
-    """The design."""
     training: TrainingOptions = TrainingOptions()
-    """Options of its training."""
     seeds: StrictInt = Field(default=1, ge=1, le=100)
     """Number of trainings: the first has the seed of its options, each further one the next higher seed."""
     runtimes: tuple[RuntimeName, ...] | None = None
@@ -128,10 +123,9 @@ class ModelRecipe(Frozen):
 
     @model_validator(mode="after")
     def _nothing_idle(self) -> ModelRecipe:
-        if not self.learns and "training" in self.model_fields_set:
-            raise ValueError(f"{self.options.model} has nothing to train: leave [models.training] out")
-        if not self.learns and "seeds" in self.model_fields_set:
-            raise ValueError(f"{self.options.model} has nothing to train: leave seeds out")
+        for key, shown in {"training": "[models.training]", "seeds": "seeds"}.items():
+            if not self.learns and key in self.model_fields_set:
+                raise ValueError(f"{self.options.model} has nothing to train: leave {shown} out")
         if self.training.seed + self.seeds > 2**63:
             raise ValueError(f"seeds, {self.seeds}, from training.seed, {self.training.seed}, on: above 2^63 - 1")
         if not self.learns and self.runtimes is not None:
@@ -141,8 +135,8 @@ class ModelRecipe(Frozen):
     @property
     def single(self) -> list[ModelRecipe]:
         """The model with one training each, in the order of their seeds."""
-        seeds = [{"seed": self.training.seed + index} for index in range(self.seeds)]
-        trainings = [self.training.model_copy(update=seed) for seed in seeds]
+        seeds = range(self.training.seed, self.training.seed + self.seeds)
+        trainings = [self.training.model_copy(update={"seed": seed}) for seed in seeds]
         return [self.model_copy(update={"seeds": 1, "training": training}) for training in trainings]
 
     def measured(self, bench: BenchOptions) -> BenchOptions:

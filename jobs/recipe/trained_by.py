@@ -17,8 +17,7 @@ from typing import Any
 from jobs.recipe.recipe import ModelRecipe, Recipe
 from pipeline.models.added.added_code import ADDED_MODEL
 from pipeline.models.domain import PHYSICS, Domain
-from weaves.errors import BadInput
-from weaves.errors import nearest as nearest_name
+from weaves.errors import BadInput, nearest
 
 _KEYS = ("model", "name", "recipe", "runtimes")  # of an entry; all other keys are in the recipe that trains
 
@@ -38,11 +37,9 @@ def with_trained_by(
     models, trained_by = [], {}
     for index, entry in enumerate(entries):
         if isinstance(entry, Mapping) and "recipe" in entry:
-            model, trainer = _taken_over(entry, f"models.{index}", where, load)
-            models.append(model)
-            trained_by[model["name"]] = trainer
-        else:
-            models.append(entry)
+            entry, trainer = _taken_over(entry, f"models.{index}", where, load)
+            trained_by[entry["name"]] = trainer
+        models.append(entry)
     return {**content, "models": models}, trained_by
 
 
@@ -74,10 +71,10 @@ def _taken_over(
     """Return a model's entry in another recipe, and the recipe that trains it."""
     trainer = load(entry["recipe"], f"{key}.recipe")
     known = {model.options.name: model for model in trainer.models}
-    name = entry.get("name", entry.get("model"))
+    called = "name" if "name" in entry else "model"
+    name = entry.get(called)
     if not isinstance(name, str) or name not in known:
-        called = "name" if "name" in entry else "model"
-        allowed = f"must be a model of the recipe {trainer.name}; {nearest_name(str(name), list(known))}"
+        allowed = f"must be a model of the recipe {trainer.name}; {nearest(str(name), known)}"
         raise BadInput(where, f"{key}.{called}", name, allowed)
     model, options = known[name], known[name].options
     kind = options.name if options.model == ADDED_MODEL else options.model

@@ -28,12 +28,8 @@ from pipeline.truth.query import LOWEST_VIEWER
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
 
-_TAKEN = ("truth", "bench", "fallback")
-"""Names that stand beside those of models, in Records and among the versions in a task's identity."""
-
-MOST_SHARDS: Final = 250_000
-"""Most shards of a data set, each a task: 2 * 10^9 rows by default. The manifest then has 60 MB."""
-
+_TAKEN = ("truth", "bench", "fallback")  # beside names of models, in Records and among the versions of a task
+_MOST_SHARDS: Final = 250_000  # each a task: 2 * 10^9 rows by default; the manifest then has 60 MB
 _PLAIN = TruthOptions()
 # Physics that not every model can learn. A model without an option for walls is measured against any.
 _LEARNT = ("frame", "normaliser", "parallax", "shadows")
@@ -42,7 +38,7 @@ _LEARNT = ("frame", "normaliser", "parallax", "shadows")
 def validate_recipe(recipe: Recipe, where: str) -> None:
     """Check that the sections of a recipe fit together, so that no task is refused in the middle of a run.
 
-    BadInput for more shards than `MOST_SHARDS`, names given twice, an unseen draft in the population (also of random
+    BadInput for more than 250,000 shards, names given twice, an unseen draft in the population (also of random
     unseen fabrics, unless a seen fabric has it), different physics in two tables of truth options, viewers too low for
     parallax, models that do not know the queries or the physics of the data set, the estimator `node_table` for cloth
     or queries that it does not know, and live pages of fabrics that it has not.
@@ -93,22 +89,20 @@ def _check_number(recipe: Recipe, where: str) -> None:
     most, shards = recipe.dataset.shard_rows, 0
     for _, fabric, part, rows in (*recipe.own_rows(), *recipe.extra_rows()):
         shards += -(-rows // most)
-        if shards > MOST_SHARDS:
+        if shards > _MOST_SHARDS:
             name = part if isinstance(part, str) else part.kind
-            allowed = f"at most {MOST_SHARDS:,} shards are allowed, passed with {rows:,} rows ({name}) of {fabric.name}"
-            raise BadInput(where, "dataset.shard_rows", most, f"{allowed}: raise it, or lower the rows")
+            passed = f"passed with {rows:,} rows ({name}) of {fabric.name}: raise it, or lower the rows"
+            raise BadInput(where, "dataset.shard_rows", most, f"at most {_MOST_SHARDS:,} shards are allowed, {passed}")
 
 
 def _check_names(recipe: Recipe, where: str) -> None:
-    for key, names in (
-        ("dataset", [fabric.name for fabric in recipe.fabrics]),
-        ("models", [model.options.name for model in recipe.models]),
-    ):
+    models = [model.options.name for model in recipe.models]
+    for key, names in {"dataset": [fabric.name for fabric in recipe.fabrics], "models": models}.items():
         for name, count in Counter(names).items():
             if count > 1:
                 raise BadInput(where, key, name, "names must differ, because files are called by them")
-    for index, model in enumerate(recipe.models):
-        if (name := model.options.name) in _TAKEN:
+    for index, name in enumerate(models):
+        if name in _TAKEN:
             allowed = f"must be another name: {', '.join(_TAKEN)} name other things than models"
             raise BadInput(where, f"models.{index}.name", name, allowed)
 
@@ -163,10 +157,9 @@ def _check_truths(recipe: Recipe, where: str) -> None:
 def _truths(recipe: Recipe) -> Iterator[tuple[str, TruthOptions, QueryOptions | None, Sequence[Fabric]]]:
     """Yield each table of truth options: its key, itself, the queries if they are known, the fabrics."""
     dataset, bench = recipe.dataset, recipe.bench
-    named = (*recipe.seen, *recipe.unseen)
-    trained = (*recipe.seen, *recipe.population)
+    named, trained = (*recipe.seen, *recipe.unseen), (*recipe.seen, *recipe.population)
     if any("unseen" in model.trained_roles for model in recipe.own_models):
-        trained = (*trained, *recipe.unseen)
+        trained += recipe.unseen
     tested = (*named, *recipe.unseen_population)
     yield "dataset.truth", dataset.truth, dataset.queries, tested if dataset.training_truth else (*tested, *trained)
     if dataset.training_truth:
@@ -188,16 +181,14 @@ def _truths(recipe: Recipe) -> Iterator[tuple[str, TruthOptions, QueryOptions | 
 def _check_models(recipe: Recipe, where: str) -> None:
     queries, truth = recipe.dataset.queries, recipe.dataset.truth
     kinds = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
-    drawn = [kind for kind, there in kinds.items() if there]
     if recipe.bench.bounds and kinds["curvature"]:
         raise BadInput(where, "bench.bounds", True, "the bound does not know queries with curvature")
     if recipe.bench.bounds and not truth.parallax:
-        raise BadInput(
-            where, "bench.bounds", True, "the bound knows view rays alone, not dataset.truth.parallax = false"
-        )
+        allowed = "the bound knows view rays alone, not dataset.truth.parallax = false"
+        raise BadInput(where, "bench.bounds", True, allowed)
     for index, model in enumerate(recipe.models):
         options = model.options
-        for kind in (kind for kind in drawn if kind not in options.kinds):
+        for kind in (kind for kind, drawn in kinds.items() if drawn and kind not in options.kinds):
             allowed = f"does not know queries with {kind}: leave it out, or dataset.queries.{kind}"
             raise BadInput(where, f"models.{index}.name", options.name, allowed)
         for name in () if options.any_physics else (name for name in _LEARNT if not hasattr(options, name)):

@@ -13,8 +13,11 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final
+
+from cyclopts import Parameter
 
 from jobs.exits import handled
 from pipeline.own_process import ONE_THREAD, interrupts_held
@@ -29,17 +32,21 @@ _TRIES_TO_START: Final = 3  # the cluster on this machine
 _SECONDS_FOR_A_WORKER: Final = 60  # a cluster that adapts starts one when there is work
 
 
-class Scheduler(NamedTuple):
-    """A running scheduler, and files for TLS."""
+@dataclass(frozen=True)
+class Scheduler:
+    """A running scheduler, and files for TLS, also on the command line; empty: a cluster on this machine."""
 
-    address: str = ""
-    """Or the path of its ``--scheduler-file``; empty: a cluster on this machine."""
-    ca: str = ""
-    """Certificate of the authority; empty: none."""
-    certificate: str = ""
-    """Certificate of this client."""
-    key: str = ""
-    """Private key of this client."""
+    address: Annotated[
+        str,
+        Parameter(
+            name="--scheduler", help="Address or scheduler file of a running dask scheduler; default: this machine."
+        ),
+    ] = ""
+    ca: Annotated[str, Parameter(name="--tls-ca", help="Certificate of the scheduler's authority, a PEM file.")] = ""
+    certificate: Annotated[
+        str, Parameter(name="--tls-certificate", help="Own certificate for the scheduler, a PEM file.")
+    ] = ""
+    key: Annotated[str, Parameter(name="--tls-key", help="Its key, a PEM file.")] = ""
 
 
 HERE: Final = Scheduler()
@@ -63,9 +70,8 @@ def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) ->
         with _external(scheduler, say) if scheduler.address else _local(workers, say) as client:
             yield client
     except (CancelledError, CommClosedError) as error:
-        raise WorkFailed(
-            "the dask scheduler is gone; what was finished is kept, run the same command to go on"
-        ) from error
+        sentence = "the dask scheduler is gone; what was finished is kept, run the same command to go on"
+        raise WorkFailed(sentence) from error
 
 
 @contextmanager

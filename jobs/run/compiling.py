@@ -15,13 +15,6 @@ from pipeline.models.options import Options
 from pipeline.truth.options import TruthOptions
 
 _ROWS: Final = 8
-
-_SAMPLED: Final = ("mc", "r2")
-"""Estimators with the kernels of `owen`."""
-
-_FALLBACK: Final = ("node_table", "owen")
-"""Estimators that answer queries outside the domain of a method."""
-
 _LONGEST_FIRST: Final = ("node_table", "quadrature", "soft_nodes", "owen")
 
 
@@ -29,9 +22,8 @@ class KernelGroup(NamedTuple):
     """Kernels that are compiled together: those of an estimator, or of a model."""
 
     name: str
-    """The estimator, or the model's name."""
     model: Options | None = None
-    """Options of the model; None for an estimator."""
+    """None: `name` is an estimator."""
 
     def compile(self, ready: Callable[[str], None]) -> None:
         """Compile the kernels, or read them from the cache; `ready` is called with the name of each kernel."""
@@ -62,7 +54,6 @@ def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
     groups: dict[str, KernelGroup] = {}
     for task in tasks:
         for name in _estimators(task):
-            name = "owen" if name in _SAMPLED else name
             groups[name] = KernelGroup(name)
         for options in _models(task):
             # The value of the parameter is an argument of the same kernels.
@@ -73,11 +64,11 @@ def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
 
 
 def _estimators(task: Task) -> Iterator[str]:
-    """Yield the estimators that a task evaluates; a page evaluates none."""
-    if task.stage != "report":
-        yield from (truth.estimator for truth in held(task, TruthOptions))
+    """Yield the estimators that a task evaluates, `owen` for those with its kernels; a page evaluates none."""
+    for truth in held(task, TruthOptions) if task.stage != "report" else ():
+        yield "owen" if truth.estimator in ("mc", "r2") else truth.estimator
     if "fallback" in task.versions():
-        yield from _FALLBACK
+        yield from ("node_table", "owen")  # which answer queries outside the domain of a method
 
 
 def _models(task: Task) -> Iterator[Options]:

@@ -1,4 +1,4 @@
-"""Crew: the workers of a scheduler, their software, and the tasks that are with them.
+"""Crew: the workers of a scheduler, their software, and the tasks that are with them; or this process alone.
 
 Workers may come and go while a run is under way, as those of a cluster that adapts do. One whose software is not the
 driver's is refused: each new worker is checked before it counts, and a task that dask hands to one before that is not
@@ -18,23 +18,21 @@ from http.client import HTTPException
 from importlib import metadata
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 from urllib.request import ProxyHandler, build_opener
 
 from jobs.plan.task import Task
 from jobs.run.compiling import KernelGroup
+from jobs.run.ledger import Ledger
 from jobs.run.outcome import Outcome, work
 from jobs.run.receipt import Product
 from pipeline import patience
 from pipeline.storage import place
 from weaves.errors import WorkFailed
 
-_PACKAGES: Final = ("weaves", "pipeline", "reports", "jobs")
-_LIBRARIES: Final = ("numba", "numpy", "torch")
 _SECONDS_BETWEEN_LOOKS: Final = 1.0
 _SECONDS_BETWEEN_SIGNS: Final = 0.2
-_SECONDS_FOR_AN_ERROR: Final = 5.0
-_SECONDS_FOR_A_PAGE: Final = 5.0
+_SECONDS_FOR_AN_ANSWER: Final = 5.0
 _SECONDS_OF_SILENCE: Final = 5.0  # between two looks while kernels are compiled
 
 
@@ -98,7 +96,7 @@ class Crew:
         try:
             address = str(self._client.dashboard_link)
             # A scheduler names an address also without a dashboard, and then has no page there.
-            build_opener(ProxyHandler({})).open(address, timeout=_SECONDS_FOR_A_PAGE).close()
+            build_opener(ProxyHandler({})).open(address, timeout=_SECONDS_FOR_AN_ANSWER).close()
         except (KeyError, OSError, ValueError, HTTPException):
             return None
         return address
@@ -174,7 +172,7 @@ class Crew:
         """
         from distributed import KilledWorker
 
-        error = future.exception(timeout=_SECONDS_FOR_AN_ERROR)
+        error = future.exception(timeout=_SECONDS_FOR_AN_ANSWER)
         if isinstance(error, KilledWorker):
             if task.id not in self._begun:
                 return Outcome(reason="its worker died before it began", refused=True)
@@ -203,18 +201,60 @@ class Crew:
         return f"worker {address} gets no task: {self._checked[address]}; install the same version there"
 
 
+class Serial:
+    """Tasks one after the other in this process, with the interface of `Crew`: no scheduler and no port.
+
+    Other processes may be at work in the output folder: a task that one of them is at is waited for, and taken from it.
+    Tasks that measure time and code from outside have processes of their own, as always (`jobs.run.outcome`).
+    """
+
+    slots: ClassVar[int] = 1
+    dashboard: ClassVar[str | None] = None
+
+    def __init__(self, ledger: Ledger, hear: Callable[[Mapping[str, Any]], None]) -> None:
+        self._ledger, self._hear = ledger, hear
+        self._next: list[tuple[Task, Mapping[str, str]]] = []
+        self.accepted = ["this process"]
+
+    def look(self) -> None:
+        """Do nothing: no worker comes or goes."""
+
+    def recheck(self, address: str) -> None:
+        """Do nothing: its software is the driver's."""
+
+    def compile(self, groups: Sequence[KernelGroup], show: Callable[[int, Iterable[str]], None]) -> None:
+        """Compile groups of kernels; a failure here occurs again in the task that needs the kernel."""
+        for done, group in enumerate(groups):
+            show(done, [group.name])
+            with suppress(Exception):
+                group.compile(lambda kernel: self._hear({"kernel": kernel}))
+        if groups:
+            show(len(groups), ())
+
+    def start(self, task: Task, out: str, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
+        """Take a task that `ended` does; arguments as for a crew, and the folder is that of the ledger."""
+        self._next.append((task, inputs))
+
+    def ended(self, seconds: float) -> list[tuple[Task, Outcome]]:
+        """Do the task that was started, and return it with its outcome."""
+        task, inputs = self._next.pop()
+        with self._ledger.store.claimed(task.id):
+            if receipt := self._ledger.done(task):
+                return [(task, Outcome(receipt.files, receipt.seconds))]
+            hear = self._hear
+            return [(task, work(task, self._ledger.out, lambda share: hear({"task": task.id, "share": share}), inputs))]
+
+
 def _difference(there: Mapping[str, str] | BaseException) -> str:
     """Return how a worker's software differs from this process's, in words; empty if it does not."""
     if isinstance(there, BaseException):
         return f"it has no twillight of this version ({type(there).__name__})"
-    here = software()
-    other = [name for name in here if there.get(name) != here[name]]
-    words = [f"{name} {there.get(name, 'missing')} (here {here[name]})" for name in other]
+    pairs = ((name, there.get(name, "missing"), here) for name, here in software().items())
+    words = [f"{name} {other} (here {here})" for name, other, here in pairs if other != here]
     return f"it has {', '.join(words)}" if words else ""
 
 
 def _compile(group: KernelGroup, topic: str) -> None:
-    """Compile a group of kernels in a worker."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -259,16 +299,11 @@ def software() -> dict[str, str]:
 
     Builds of PyTorch for different devices (``+cpu``, ``+cu126``) count as one version.
     """
+    root, sources = Path(__file__).parents[2], hashlib.sha256()
+    packages = [root / name for name in ("weaves", "pipeline", "reports", "jobs")]
+    for path in sorted(path for package in packages for path in package.rglob("*.py")):
+        sources.update(f"{path.relative_to(root).as_posix()}\0".encode())
+        sources.update(hashlib.sha256(path.read_bytes()).digest())
     python = ".".join(platform.python_version_tuple()[:2])
-    libraries = {name: metadata.version(name).partition("+")[0] for name in _LIBRARIES}
-    return {"twillight's sources": _sources(), "Python": python, **libraries}
-
-
-def _sources() -> str:
-    """Return a hash of all Python files of the packages, by their paths within them."""
-    root = Path(__file__).parents[2]
-    digest = hashlib.sha256()
-    for path in sorted(path for package in _PACKAGES for path in (root / package).rglob("*.py")):
-        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()[:8]
+    libraries = {name: metadata.version(name).partition("+")[0] for name in ("numba", "numpy", "torch")}
+    return {"twillight's sources": sources.hexdigest()[:8], "Python": python, **libraries}

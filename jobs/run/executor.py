@@ -2,9 +2,7 @@
 
 A receipt is on the disk before any task that needs it starts, so a run that is stopped or killed at any moment loses
 only the tasks under way. A worker that dies is replaced and its task given to another (dask's retry).
-The inputs of a task are compared with their receipts before it starts; damaged ones are removed and made again, and a
-task that fails is tried once more if an input turns out to be damaged. Else a task that ends with an unexpected
-exception is tried again twice, elsewhere if there is a choice; bad input and work that failed are not.
+The inputs of a task are compared with their receipts before it starts; damaged ones are removed and made again.
 On this machine one task a core is handed out at a time: dask, which cannot know how long a task takes, would park short
 ones behind a training. A task that measures time starts when nothing else runs, in a process of its own
 (`jobs.run.outcome`).
@@ -25,14 +23,13 @@ from jobs.plan.schedule import Estimate
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.run.cluster import HERE, MOST_WORKERS, Scheduler, connected
 from jobs.run.compiling import kernel_groups
-from jobs.run.crew import Crew
+from jobs.run.crew import Crew, Serial
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
 from jobs.run.outcome import Outcome
 from jobs.run.progress import Board
 from jobs.run.progress_forms import ProgressForm, form_of
 from jobs.run.receipt import Product
-from jobs.run.serial import Serial
 from jobs.terminal import Terminal
 from pipeline import patience
 from pipeline.cores import cores
@@ -40,7 +37,7 @@ from pipeline.storage import size_of
 from weaves.errors import BadInput, WorkFailed
 
 _SECONDS_BETWEEN_LOOKS: Final = 1.0  # for workers that have come
-_TRIES: Final = 3  # of a task that ends with an unexpected exception
+_TRIES: Final = 3  # of a task that ends with an unexpected exception; bad input and failed work are not tried again
 
 
 class RunSummary(NamedTuple):
@@ -88,7 +85,8 @@ def execute(
         manifest.save()
     finished = {task.id for task in summary.before}
     todo = [task for task in tasks if task.id not in finished and task.stage in stages]
-    _refuse_gaps(todo, tasks, finished)
+    planned = {task.id: task for task in tasks}
+    _refuse_gaps(todo, planned, finished)
     if not todo:
         return summary
 
@@ -102,7 +100,6 @@ def execute(
         board.workers = len(crew.accepted)
         crew.compile(groups, lambda done, under_way: board.compiling(done, len(groups), under_way))
         board.start(len(crew.accepted), crew.dashboard)
-        planned = {task.id: task for task in tasks}
         driver = _Driver(planned, Ready(todo, finished), crew, ledger, board, stages, summary, manifests)
         try:
             driver.run()
@@ -129,7 +126,6 @@ class _Driver:
     failed_once: set[str] = field(default_factory=set)
 
     def run(self) -> None:
-        """Work until no task is left that can start."""
         while True:
             self.crew.look()
             self.board.workers = len(self.crew.accepted)
@@ -147,24 +143,20 @@ class _Driver:
             self.board.waiting_for(self.ready.running)
 
     def settle(self) -> None:
-        """Write what the manifests have put off."""
         for manifest in self.manifests:
             manifest.save()
 
     def close(self) -> None:
         """List what waits for tasks that failed; WorkFailed if products of a stage that does not run were damaged."""
         if self.lost:
-            first = self.lost[0]
-            allowed = f"run `twillight {first.stage}` first"
-            raise WorkFailed(f"{first.title}: its products were damaged and are removed; {allowed}")
+            damage = f"{self.lost[0].title}: its products were damaged and are removed"
+            raise WorkFailed(f"{damage}; run `twillight {self.lost[0].stage}` first")
         self.summary.waiting.extend(self.ready.waiting)
 
     def _start(self, alone: bool = True) -> list[Task]:
-        """Start as many tasks as there are slots, and return them."""
         started = self.ready.take(self.crew.slots, alone)
         for task in started:
-            needs = self._needs(task)
-            if damaged := self.ledger.damaged(needs):
+            if damaged := self.ledger.damaged(self._needs(task)):
                 self._reopen(damaged)
                 self.ready.again(task)
                 continue
@@ -183,9 +175,8 @@ class _Driver:
             return {}
         hashes = dict[str, str]()
         for need in self._needs(task):
-            if receipt := self.ledger.receipt(need):
-                files = receipt.files
-                hashes |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}
+            files = receipt.files if (receipt := self.ledger.receipt(need)) else {}
+            hashes |= {path: files[Path(path).name].sha256 for path in need.products if Path(path).name in files}
         return hashes
 
     def _take(self, task: Task, outcome: Outcome) -> None:
@@ -240,12 +231,9 @@ class _Driver:
                 self.ready.lose(task)
 
 
-def _refuse_gaps(todo: Sequence[Task], tasks: Sequence[Task], finished: set[str]) -> None:
+def _refuse_gaps(todo: Sequence[Task], planned: Mapping[str, Task], finished: set[str]) -> None:
     """Refuse to start if a product is missing of a stage that does not run."""
-    planned = {task.id: task for task in tasks}
-    own = {task.id for task in todo}
-    gaps = {need for task in todo for need in task.needs if need not in finished and need not in own}
-    if gaps:
+    if gaps := {need for task in todo for need in task.needs} - finished - {task.id for task in todo}:
         stage = min((planned[need].stage for need in gaps), key=STAGES.index)
         count = sum(planned[need].stage == stage for need in gaps)
         raise WorkFailed(f"{todo[0].stage}: {count} tasks that it needs are not done; run `twillight {stage}` first")
@@ -260,12 +248,12 @@ def _verified(task: Task, outcome: Outcome, ledger: Ledger) -> Outcome:
         expected = outcome.files[Path(path).name]
         try:
             # In object storage its size is enough: whoever fetches a file compares its hash.
-            as_written = Product.of(out / path) == expected if local else size_of(out / path) == expected.bytes
+            if Product.of(out / path) == expected if local else size_of(out / path) == expected.bytes:
+                continue
+            reason = f"{path} is not the file that its worker wrote: every worker must see {out}"
         except OSError as error:
             if not local and not isinstance(error, FileNotFoundError):
                 raise  # it is the storage that fails
             reason = f"{path} was written where this process does not see it: every worker must see --out, {out}"
-            return outcome._replace(reason=reason)
-        if not as_written:
-            return outcome._replace(reason=f"{path} is not the file that its worker wrote: every worker must see {out}")
+        return outcome._replace(reason=reason)
     return outcome

@@ -14,10 +14,9 @@ from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.page import Page
 from jobs.plan.task import Stage, Task
 from jobs.recipe.recipe import Recipe
-from jobs.run.ledger import Ledger
+from jobs.run.ledger import CHANGED, NEVER_MADE, Ledger, reasons
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.reasons import CHANGED, NEVER_MADE, reasons
-from jobs.run.receipt import Product, Receipt
+from jobs.run.receipt import Receipt
 from pipeline.cores import cores
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
@@ -25,8 +24,7 @@ from weaves.errors import BadInput
 Kind = Literal["missing", "outdated", "cut", "damaged", "odd", "foreign"]
 """`odd`: its bytes are those that were written, but its values are not allowed. `foreign`: no task made it."""
 
-RESULTS: Final = "results.md"
-"""File in a page's folder that `twillight results` writes."""
+_OTHER_BYTES: Final = "it does not have the bytes that were written (SHA-256 differs)"
 
 
 class Fault(NamedTuple):
@@ -54,9 +52,9 @@ def faults(
     """
     every: list[Fault] = []
     with ThreadPoolExecutor(cores()) as pool:
-        for index, of_task in enumerate(pool.map(partial(task_faults, ledger=ledger), tasks)):
+        for done, of_task in enumerate(pool.map(partial(task_faults, ledger=ledger), tasks), 1):
             every += of_task
-            seen((index + 1) / len(tasks))
+            seen(done / len(tasks))
     every = _explained(every, tasks, ledger)
     unknown = [fault.task for fault in every if fault.task and not ledger.done(fault.task)]
     bad = {Path(path).name for task in unknown for path in task.products}
@@ -78,8 +76,7 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
         if isinstance(task, Page):
             return [Fault("outdated", task.products[0], "it was written from other measurements or options", task)]
         return [Fault("missing", note, f"it does not exist, but products of {name} do", task)]
-    judged = (_product_fault(ledger, path, receipt.files.get(Path(path).name), task) for path in task.products)
-    wrong = [fault for fault in judged if fault]
+    wrong = [fault for path in task.products for fault in _product_faults(ledger, path, receipt, task)]
     if isinstance(task, Page) and task.products[1] not in {fault.path for fault in wrong}:
         wrong += _page_faults(task, ledger)
     if wrong:
@@ -87,25 +84,24 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
     return list(_value_faults(task, ledger.out, receipt)) if isinstance(task, Shard) else []
 
 
-def _product_fault(ledger: Ledger, path: str, expected: Product | None, task: Task) -> Fault | None:
-    """Return the fault of one product, or None."""
-    if expected is None:
-        return Fault("outdated", path, "it is not on the receipt of its task", task)
+def _product_faults(ledger: Ledger, path: str, receipt: Receipt, task: Task) -> Iterator[Fault]:
+    """Yield the fault of one product, if it has one."""
+    expected, size = receipt.files.get(Path(path).name), ledger.store.size(path)
     try:
-        bytes_ = ledger.store.size(path)
-        if bytes_ is None:
-            return Fault("missing", path, f"it does not exist, although {task.stage} {task.title} was run", task)
-        if bytes_ < expected.bytes:
-            return Fault("cut", path, f"it has {bytes_:,} of {expected.bytes:,} bytes", task)
-        if bytes_ > expected.bytes:
-            return Fault("damaged", path, f"it has {bytes_:,} bytes in place of {expected.bytes:,}", task)
-        if file_sha256(ledger.out / path) != expected.sha256:
-            return Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", task)
+        if expected is None:
+            yield Fault("outdated", path, "it is not on the receipt of its task", task)
+        elif size is None:
+            yield Fault("missing", path, f"it does not exist, although {task.stage} {task.title} was run", task)
+        elif size < expected.bytes:
+            yield Fault("cut", path, f"it has {size:,} of {expected.bytes:,} bytes", task)
+        elif size > expected.bytes:
+            yield Fault("damaged", path, f"it has {size:,} bytes in place of {expected.bytes:,}", task)
+        elif file_sha256(ledger.out / path) != expected.sha256:
+            yield Fault("damaged", path, _OTHER_BYTES, task)
     except OSError as error:
         if not ledger.store.is_local:
             raise  # it is the storage that fails
-        return Fault("damaged", path, f"it cannot be read ({error.strerror})", task)
-    return None
+        yield Fault("damaged", path, f"it cannot be read ({error.strerror})", task)
 
 
 def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
@@ -122,7 +118,7 @@ def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
         if not ledger.store.is_file(path):
             yield Fault("missing", path, "it does not exist, although the page was written", page)
         elif file_sha256(ledger.out / path) != sha256:
-            yield Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", page)
+            yield Fault("damaged", path, _OTHER_BYTES, page)
 
 
 def _value_faults(part: Shard, out: Path, receipt: Receipt) -> Iterator[Fault]:
@@ -195,13 +191,12 @@ def _by_stage(found: Sequence[Fault], tasks: Sequence[Task]) -> list[Fault]:
 
 def _foreign(recipe: Recipe, tasks: Sequence[Task], ledger: Ledger, faulty: Set[str]) -> list[Fault]:
     """Return the files in the recipe's own folders that no task made: data sets, models, pages with a sound list."""
-    known = set(own_files(recipe, tasks, ledger.out))
     folders = {str(Path(path).parent) for task in tasks if task.stage != "bench" for path in task.products}
     for page in (task for task in tasks if isinstance(task, Page)):
         if not faulty.isdisjoint({page.products[1], ledger.receipt_path(page)}):
             folders.discard(page.folder)
     named = {path for path in ledger.store.below(folders) if not is_leftover(Path(path).name)}
-    foreign = sorted(named - known)
+    foreign = sorted(named - set(own_files(recipe, tasks, ledger.out)))
     return [Fault("foreign", path, "no task of this recipe made it") for path in foreign]
 
 
@@ -215,7 +210,7 @@ def own_files(recipe: Recipe, tasks: Sequence[Task], out: Path) -> Iterator[str]
     for task in tasks:
         yield from task.products
         if isinstance(task, Page):
-            yield f"{task.folder}/{RESULTS}"
+            yield f"{task.folder}/results.md"  # of `twillight results`
             with suppress(BadInput):  # its list of files is damaged
                 yield from task.written(out)
 

@@ -1,4 +1,4 @@
-"""Ledger: which tasks are done, failed or missing, from the files alone.
+"""Ledger: which tasks are done, failed or missing, and why they would run, from the files alone.
 
 A receipt ``ledger/<task id>.json`` lists a task's products with their sizes and hashes; it is written after them,
 whole or not at all. A task is done exactly when its receipt and every product, of the listed size, are there. No other
@@ -26,6 +26,16 @@ from weaves.reading import MIB, read_json
 
 State = Literal["done", "failed", "missing"]
 
+NEVER_MADE: Final = "never made"
+"""Reason of a task that has no predecessor."""
+
+ELSEWHERE: Final = "taken from another data set"
+"""Reason of a task that need not run: its products are in another data set, and a run links them."""
+
+CHANGED: Final = "changed: "
+"""Beginning of the reason of a task that was made before with another identity."""
+
+_MOST_KEYS: Final = 3  # that a reason names
 _SECONDS_BETWEEN_SYNCS: Final = 1.0
 
 
@@ -109,8 +119,7 @@ class Ledger:
 
     def fail(self, task: Task, reason: str, traceback: str = "") -> None:
         """Note why a task failed."""
-        heading = {"task": task.id, "stage": task.stage, "title": task.title}
-        note = heading | {"reason": reason, "traceback": traceback}
+        note = {"task": task.id, "stage": task.stage, "title": task.title, "reason": reason, "traceback": traceback}
         self.store.write(_note(task), json.dumps(note, indent=1).encode() + b"\n")
 
     def adopt(self, task: Task) -> Receipt | None:
@@ -143,13 +152,14 @@ class Ledger:
 
         The task then counts as missing. Damaged copies in other data sets go too: they may be links to the same bytes.
         """
-        receipt, removed = self.receipt(task), []
-        for path in task.products if receipt else ():
-            for file in {path, *self._copies(path)}:
-                if self.store.size(file) is not None and receipt and not self._is_whole(file, receipt, verify=True):
-                    self.store.remove(file)
-                    removed.append(file)
-        return sorted(removed)
+        if (receipt := self.receipt(task)) is None:
+            return []
+        files = {file for path in task.products for file in (path, *self._copies(path))}
+        there = [file for file in sorted(files) if self.store.size(file) is not None]
+        removed = [file for file in there if not self._is_whole(file, receipt, verify=True)]
+        for file in removed:
+            self.store.remove(file)
+        return removed
 
     def damaged(self, tasks: Sequence[Task], *, anew: bool = False) -> list[Task]:
         """Return those done tasks whose products are damaged, and remove these products.
@@ -160,9 +170,8 @@ class Ledger:
         unread = [task for task in tasks if anew or (self.store.is_local and task.id not in self._sound)]
         with ThreadPoolExecutor() as pool:
             removed = list(pool.map(self.discard, unread))
-        damaged = [
-            task for task, paths in zip(unread, removed, strict=True) if not set(paths).isdisjoint(task.products)
-        ]
+        pairs = zip(unread, removed, strict=True)
+        damaged = [task for task, paths in pairs if not set(paths).isdisjoint(task.products)]
         self._sound.update(task.id for task in unread)
         self._sound.difference_update(task.id for task in damaged)
         return damaged
@@ -187,3 +196,40 @@ class Ledger:
 
 def _note(task: Task) -> str:
     return f"{LEDGER}/{task.id}.failed.json"
+
+
+def reasons(tasks: Sequence[Task], ledger: Ledger) -> dict[str, str]:
+    """Return why each task that is not done would run, by its id.
+
+    The predecessor of a task is the finished task of the same stage and title whose identity is most like its own.
+    """
+    states = {task.id: ledger.state(task) for task in tasks}
+    left = {(task.stage, task.title): task for task in tasks if states[task.id] != "done"}
+    before: dict[tuple[str, str], list[Receipt]] = {key: [] for key in left}
+    for receipt in ledger.receipts(states) if left else ():
+        if (receipt.stage, receipt.title) in left:
+            before[receipt.stage, receipt.title].append(receipt)
+    why = {}
+    for key, task in left.items():
+        if states[task.id] == "failed":
+            why[task.id] = f"failed: {ledger.reason(task)}"
+        elif ledger.is_elsewhere(task):
+            why[task.id] = ELSEWHERE
+        elif ledger.receipt(task):
+            why[task.id] = "a product is missing or damaged"
+        else:
+            why[task.id] = _changed(task, before[key])
+    return why
+
+
+def _changed(task: Task, before: Sequence[Receipt]) -> str:
+    """Return which keys are not those of the most similar predecessor."""
+    if not before:
+        return NEVER_MADE
+    now = Receipt.of(task, {}, 0.0)
+    lists = [receipt.changes(now) for receipt in before if receipt.identity]
+    if not lists:
+        return "made before; its receipt does not say from what"
+    changes = min(lists, key=len)
+    more = f" and {len(changes) - _MOST_KEYS} more" if len(changes) > _MOST_KEYS else ""
+    return f"{CHANGED}{', '.join(changes[:_MOST_KEYS])}{more}"

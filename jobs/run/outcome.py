@@ -25,9 +25,7 @@ class Outcome(NamedTuple):
     """Result of a task: its products, or the reason of its failure."""
 
     files: Mapping[str, Product] = MappingProxyType({})
-    """Products by file name."""
     seconds: float = 0.0
-    """Time that the task took."""
     reason: str = ""
     """One line; empty if the task is done."""
     traceback: str = ""
@@ -64,10 +62,9 @@ def work(
         with _workspace(task, out, inputs) as folder:
             in_own_process(task.run, folder, progress=progress) if own else task.run(folder, progress)
             outcome = Outcome({Path(path).name: Product.of(folder / path) for path in task.products})
-    except (BadInput, WorkFailed) as error:
-        outcome = Outcome.failed(error)
     except Exception as error:
-        explained = None if storage.is_local(out) else storage.explained(error)
+        known = storage.is_local(out) or isinstance(error, BadInput | WorkFailed)
+        explained = None if known else storage.explained(error)
         outcome = Outcome(reason=str(explained), storage_failed=True) if explained else Outcome.failed(error)
     return outcome._replace(seconds=time.perf_counter() - start)
 
@@ -76,8 +73,7 @@ def work(
 def _workspace(task: Task, out: Path, inputs: Mapping[str, str]) -> Iterator[Path]:
     """Yield the folder in which a task runs; afterwards its products are where they belong.
 
-    If the products are in object storage, it is a folder of this machine and user: what the task needs is fetched into
-    it and compared with the receipts; WorkFailed if its bytes are others.
+    For object storage it is a folder of this machine and user, into which what the task needs is fetched.
     """
     if storage.is_local(out):
         yield out

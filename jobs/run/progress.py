@@ -19,7 +19,6 @@ from pipeline import patience
 _SILENCE: Final = 60.0  # seconds without a report until the first line says so
 _MOST_NAMED: Final = 5  # tasks in that line
 
-
 EventName = Literal["compile", "start", "begin", "progress", "end", "failed", "again", "message", "stop"]
 """Kernels are ready; the tasks start; a task begins, advances, ends, failed, or failed and is tried again; a sentence;
 the end, also if the tasks never began."""
@@ -30,9 +29,8 @@ class Event(NamedTuple):
 
     name: EventName
     task: Task | None
-    """The task that it is about."""
     share: float | None
-    """Its finished share."""
+    """Finished share of the task."""
     message: str | None
     """Reason of a failure, or a sentence."""
 
@@ -158,10 +156,9 @@ class Board:
         self._silence *= 2
         names = [f"{task.stage} {task.title}" for task in tasks]
         more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-        titles = ", ".join(names[:_MOST_NAMED]) + more
-        where = "1 process" if self.workers == 1 else f"{self.workers} workers"
-        where = where if self.workers else "no worker: the scheduler has none"
-        self.say(f"nothing reported for {silence:.0f} s; under way: {titles} ({where})")
+        counts = {0: "no worker: the scheduler has none", 1: "1 process"}
+        where = counts.get(self.workers, f"{self.workers} workers")
+        self.say(f"nothing reported for {silence:.0f} s; under way: {', '.join(names[:_MOST_NAMED])}{more} ({where})")
 
     def _advance(self, task: Task, share: float) -> None:
         """Take the finished share of a task under way."""

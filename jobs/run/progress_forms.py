@@ -58,10 +58,9 @@ class _Bars:
         self._status: Status | None = None
         self._rows: dict[str, TaskID] = {}
         columns = ["{task.description:<9}", "{task.fields[count]:>11}", "{task.fields[rate]}", "{task.fields[left]}"]
-        name, *texts = (TextColumn(column) for column in columns)
-        self._bars = Progress(
-            name, BarColumn(bar_width=None), *texts, TimeElapsedColumn(), console=console, expand=True
-        )
+        name, *texts = map(TextColumn, columns)
+        parts = name, BarColumn(bar_width=None), *texts, TimeElapsedColumn()
+        self._bars = Progress(*parts, console=console, expand=True)
 
     def show(self, event: Event, board: Board) -> None:
         if event.name == "compile":

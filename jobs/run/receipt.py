@@ -16,13 +16,8 @@ from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
 from weaves.reading import MIB, read_bytes
 
-_CHECKSUM_DIGITS: Final = 16
-
 _END: Final = b"\n}\n"  # of the file
-
 _LONGEST_LEAF: Final = 24  # characters of a value that is written as it is
-
-_ABSENT: Final = "–"
 _HASH: Final = re.compile(r"^#|\b[0-9a-f]{16}\b")
 
 Leaf = str | int | float | bool | None
@@ -97,7 +92,7 @@ class Receipt(BaseModel):
         """Return what differs in the identity of a later receipt: versions first, values where they are short."""
         changes = []
         for key in sorted(self.identity.keys() | now.identity.keys(), key=lambda key: ("version" not in key, key)):
-            old, new = (receipt.identity.get(key, _ABSENT) for receipt in (self, now))
+            old, new = (receipt.identity.get(key, "–") for receipt in (self, now))
             if old != new:
                 hashed = any(_HASH.search(str(value)) for value in (old, new))
                 changes.append(key if hashed else f"{key} {old} → {new}")
@@ -105,7 +100,7 @@ class Receipt(BaseModel):
 
 
 def _checksum(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:_CHECKSUM_DIGITS]
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def _last_line(checksum: str) -> bytes:
@@ -115,9 +110,8 @@ def _last_line(checksum: str) -> bytes:
 def _leaves(identity: Mapping[str, Any]) -> dict[str, Leaf]:
     leaves: dict[str, Leaf] = {}
     for key, value in identity.items():
-        parts = value.items() if isinstance(value, dict) and value else [("", value)]
-        for name, part in parts:
-            leaves[f"{key}.{name}" if name else key] = _leaf(part)
+        parts = {f"{key}.{name}": part for name, part in value.items()} if isinstance(value, dict) else {}
+        leaves |= {name: _leaf(part) for name, part in (parts or {key: value}).items()}
     return leaves
 
 

@@ -2,8 +2,7 @@
 
 Each question to object storage is a request over the network. So its files are listed when they are first needed, 1000
 a request, and the receipts fetched, many at the same time, into a folder of this machine and user; later only those
-whose version has changed. That folder is also where tasks run (`jobs.run.outcome`). Nothing in it is needed again: it
-may be removed while no run uses it.
+whose version has changed. That folder is also where tasks run (`jobs.run.outcome`).
 """
 
 from __future__ import annotations
@@ -30,7 +29,8 @@ LEDGER: Final = "ledger"
 LOCKS: Final = frozenset({f"{LEDGER}/lock", f"{LEDGER}/tasks.lock"})
 """Empty files by which processes keep out of each other's way; no task makes them."""
 
-_FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "entries", "report")
+FOLDERS: Final = (LEDGER, DATASETS, "models", "records", "entries", "report")
+"""Folders of the receipts, and of the products of each stage."""
 
 
 class Store:
@@ -122,13 +122,9 @@ class Store:
             yield
 
     def _lock_file(self, name: str) -> IO[bytes]:
-        folder = self._lock_folder()
+        folder = self.out / LEDGER if self.is_local else storage.workspace(self.out)
         folder.mkdir(parents=True, exist_ok=True)
         return (folder / name).open("a+b")
-
-    def _lock_folder(self) -> Path:
-        """Return the folder of this machine with the locks."""
-        return self.out / LEDGER
 
 
 class _RemoteStore(Store):
@@ -156,7 +152,7 @@ class _RemoteStore(Store):
 
     def below(self, folders: Iterable[str]) -> Iterator[str]:
         wanted = set(folders)
-        yield from [path for path in self._sizes if any(str(parent) in wanted for parent in Path(path).parents)]
+        yield from [path for path in self._sizes if not wanted.isdisjoint(map(str, Path(path).parents))]
 
     def copy(self, path: str) -> Path:
         self._read()
@@ -187,9 +183,6 @@ class _RemoteStore(Store):
             (self.out / LEDGER / "lock").write_bytes(b"")
             yield
 
-    def _lock_folder(self) -> Path:
-        return storage.workspace(self.out)
-
     @property
     def _folder(self) -> Path:
         """Folder of the copies."""
@@ -205,7 +198,7 @@ class _RemoteStore(Store):
         with self._lock:
             if self._is_read:
                 return
-            for folder in _FOLDERS:
+            for folder in FOLDERS:
                 for name, stored in storage.listing(self.out / folder).items():
                     path = f"{folder}/{name}"
                     self._known[path] = stored.bytes

@@ -112,11 +112,7 @@ def evaluate(
 
 
 def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
-    """Return a model, by name or by the folder of a trained one, prepared for a fabric.
-
-    BadInput if there is no such model, its files are damaged, or it does not cover the fabric; `extrapolate` accepts
-    yarns outside the training domain.
-    """
+    """Return a model prepared for a fabric; `extrapolate` accepts yarns outside the training domain."""
     from pipeline.models.card import CARD
     from pipeline.models.method import faults as faults_of
     from pipeline.models.named import loaded

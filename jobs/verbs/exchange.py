@@ -1,4 +1,4 @@
-"""`twillight import` makes a fabric of a draft file; `export` and `view` write a fabric for other programs."""
+"""`twillight import` makes a fabric of a draft file; `export`, `view` and `gallery` write fabrics for others."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from cyclopts import Parameter
 
 from jobs.terminal import Terminal, print_lines, progress
-from jobs.verbs.parameters import FabricName, Local, Whole, given
-from pipeline.atomic import atomic_write
+from jobs.verbs.parameters import NOTHING, FabricName, Local, Whole, given
+from pipeline.atomic import atomic_write, refuse_unwritable
 from reports.exports.export import export
 from weaves.draft_files.read import DraftThreads, cut_out, read_draft
 from weaves.draft_files.to_fabric import fabric_of
 from weaves.errors import BadInput
-from weaves.fabric import load_fabric
+from weaves.fabric import load_fabric, preset_names
+
+_PICTURE_SIZE: Final = (720, 540)  # pixels, of a gallery
 
 
 @dataclass(frozen=True)
@@ -133,14 +135,47 @@ def view(
         _write("view", fabric, "viewer", out, {"truth": truth, "progress": advance}, viewer="out")
 
 
+def gallery(
+    fabrics: Annotated[list[str], Parameter(help="Presets or .toml files; default: all presets.")] = NOTHING,
+    /,
+    *,
+    out: Annotated[Local, Parameter(help="Folder of the site; files of the same names are replaced.")],
+    size: Annotated[Whole, Parameter(help="Texels of the longer side of maps, a power of two.")] = 1024,
+    language: Annotated[list[str], Parameter(help="Of shaders, as for `export`, beside Slang; several.")] = NOTHING,
+) -> None:
+    """Write a static site of fabrics, with everything that other programs take of them, and print where it opens.
+
+    BadInput if a fabric, a number or a language cannot be used.
+    """
+    from jobs.verbs.show import write_swatch
+    from pipeline.materials.planes import layout
+    from reports.exports.gallery import INDEX, PICTURE, gallery_page, write_fabric
+
+    cloths = {name: load_fabric(name) for name in fabrics or preset_names()}
+    if len({cloth.name for cloth in cloths.values()}) < len(cloths):
+        raise BadInput("gallery", "FABRICS", ", ".join(cloths), "two have the same name; each needs its own")
+    with _named_flags("gallery"):
+        for cloth in cloths.values():
+            layout(cloth, size)  # a size that one of them cannot have ends the work before it begins
+    refuse_unwritable(out / INDEX)
+    cards = []
+    for number, cloth in enumerate(cloths.values(), 1):
+        print_lines(f"{number} of {len(cloths)}: {cloth.name}", stderr=True)
+        with _named_flags("gallery"):
+            cards.append(write_fabric(cloth, out, size, language))
+        write_swatch(cloth, out / cloth.name, _PICTURE_SIZE).replace(out / cloth.name / PICTURE)
+    atomic_write(out / INDEX, gallery_page(cards).encode())
+    print_lines(f"{out / INDEX}: {len(cards)} fabrics; open it in a browser")
+
+
 def _write(verb: str, name: str, kind: str, path: Path, options: Mapping[str, Any], **flags: str) -> None:
     """Export a fabric and print what was written."""
-    with named_flags(verb, **flags):
+    with _named_flags(verb, **flags):
         print_lines(export(load_fabric(name), kind, path, **options))
 
 
 @contextmanager
-def named_flags(verb: str, **flags: str) -> Iterator[None]:
+def _named_flags(verb: str, **flags: str) -> Iterator[None]:
     """Name options of exports in messages as the verb does, as flags; `flags` are those that differ."""
     try:
         yield

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -16,9 +16,6 @@ from weaves.errors import BadInput, nearest
 
 if TYPE_CHECKING:
     from pipeline.fitting.fitted import Fitted
-
-SHEETS: Final = (".toml", ".csv")
-"""Endings of data sheets; other files are BSDFs."""
 
 
 def fit(
@@ -43,7 +40,7 @@ def fit(
         if out is None or out.suffix != ".toml":
             raise BadInput("fit", "--out", "" if out is None else str(out), "a path that ends in .toml is needed")
         refuse_unwritable(out)
-    if path.suffix in SHEETS:
+    if path.suffix in (".toml", ".csv"):
         _sheet(path, out, row, like)
     else:
         _bsdf(path, out, band, draft)

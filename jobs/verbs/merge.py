@@ -93,17 +93,16 @@ def _parts(ledger: Ledger) -> Iterator[MergedTask]:
 
 def _refuse_conflict(first: MergedTask, second: MergedTask) -> None:
     """Refuse two products of one task with unlike bytes; the machine and the date beside Records do not count."""
-    files, others = (_numbers(part.receipt.files) for part in (first, second))
+    files, others = (
+        {name: product for name, product in part.receipt.files.items() if not name.endswith(".machine.json")}
+        for part in (first, second)
+    )
     if files != others:
         name = next(name for name in sorted(files) if files[name] != others.get(name))
         task = f"{first.receipt.stage} {first.receipt.title}"
         allowed = f"delete ledger/{first.receipt.task}.json in the folder whose product is not wanted"
         where = f"{first.ledger.out} and {second.ledger.out}"
         raise BadInput(where, "", f"{name} of {task} has other bytes in each", allowed)
-
-
-def _numbers(files: dict[str, Product]) -> dict[str, Product]:
-    return {name: product for name, product in files.items() if not name.endswith(".machine.json")}
 
 
 def _manifests(ledgers: Sequence[Ledger], out: Path) -> dict[Path, Manifest]:

@@ -5,25 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from cyclopts import Parameter, Token
 
+from jobs.run.cluster import HERE, Scheduler
 from weaves.errors import one_line
-
-if TYPE_CHECKING:
-    from jobs.run.cluster import Scheduler
 
 
 def _place(type_: object, tokens: Sequence[Token]) -> Path:
-    """Return the path of a folder or file of this machine or of object storage."""
     from pipeline.storage import place
 
     return place(tokens[0].value, tokens[0].keyword or "")
 
 
 def _local(type_: object, tokens: Sequence[Token]) -> Path:
-    """Return the path of a folder or file of this machine; refuse an address of object storage."""
     path = _place(type_, tokens)
     if not isinstance(path, Path):
         raise ValueError(f"{one_line(tokens[0].value, 80)} is an address; a path of this machine is needed here")
@@ -38,8 +34,7 @@ def _added(type_: object, tokens: Sequence[Token]) -> list[str]:
 
 
 def _whole(type_: object, tokens: Sequence[Token]) -> int:
-    """Return an integer as it is written; cyclopts itself rounds 1.5 to 2."""
-    return int(tokens[0].value)
+    return int(tokens[0].value)  # cyclopts itself rounds 1.5 to 2
 
 
 def given(flags: Any) -> dict[str, Any]:
@@ -77,22 +72,11 @@ class WorkerFlags:
     """Processes that do the tasks, and how their progress is shown."""
 
     workers: Annotated[Whole, Parameter(help="Worker processes on this machine, one thread each; 0: one per core.")] = 0
-    scheduler: Annotated[
-        str, Parameter(help="Address or scheduler file of a running dask scheduler; default: this machine.")
-    ] = ""
-    tls_ca: Annotated[str, Parameter(help="Certificate of the scheduler's authority, a PEM file.")] = ""
-    tls_certificate: Annotated[str, Parameter(help="Own certificate for the scheduler, a PEM file.")] = ""
-    tls_key: Annotated[str, Parameter(help="Its key, a PEM file.")] = ""
+    scheduler: Annotated[Scheduler, Parameter(name="*")] = HERE
     progress: Annotated[
         Literal["auto", "rich", "plain", "json"],
         Parameter(help="Progress as bars, as lines of a log, or as JSON lines; auto: bars on a terminal, else lines."),
     ] = "auto"
-
-    def connection(self) -> Scheduler:
-        """Return the scheduler to connect to."""
-        from jobs.run.cluster import Scheduler
-
-        return Scheduler(self.scheduler, self.tls_ca, self.tls_certificate, self.tls_key)
 
 
 On = Annotated[WorkerFlags, Parameter(name="*")]

@@ -13,15 +13,13 @@ from jobs.plan.ready import chains
 from jobs.plan.schedule import LEAST_GAIN, Estimate, Schedule, doublings
 from jobs.plan.task import STAGES, Task
 from jobs.recipe.load import load_recipe
-from jobs.run.ledger import Ledger
-from jobs.run.reasons import ELSEWHERE, reasons
+from jobs.run.ledger import ELSEWHERE, Ledger, reasons
 from jobs.terminal import duration, print_lines, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out, RecipeName, Whole
 from pipeline.cores import cores
 from weaves.errors import BadInput
 
-_MOST_WORKERS: Final = 100_000
-"""Workers of a simulated schedule, at most."""
+_MOST_WORKERS: Final = 100_000  # of a simulated schedule
 
 
 class Facts(NamedTuple):
@@ -45,8 +43,7 @@ def print_status(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT) -> N
     states = {task.id: ledger.state(task) for task in tasks}
     rows = []
     for stage in STAGES:
-        of_stage = [states[task.id] for task in tasks if task.stage == stage]
-        if of_stage:
+        if of_stage := [states[task.id] for task in tasks if task.stage == stage]:
             rows.append((stage, *(of_stage.count(state) for state in ("done", "failed", "missing"))))
     failed = [f"{task.title}: {ledger.reason(task)}" for task in tasks if states[task.id] == "failed"]
     print_table(("stage", "done", "failed", "missing"), rows, caption="\n".join(failed))
@@ -122,10 +119,7 @@ def _details(tasks: Sequence[Task], facts: Facts) -> Iterator[str]:
 
 
 def _print_schedule(tasks: Sequence[Task], facts: Facts, workers: int) -> None:
-    """Print how long the whole plan, and what is left of it, takes on 1, 2, 4, … workers, and on the wished number.
-
-    Notes below say the time without work for all at the end (tail), where it stops scaling, and what was measured.
-    """
+    """Print how long the whole plan, and what is left of it, takes on 1, 2, 4, … workers, and on the wished number."""
     left = facts.left(tasks)
     schedules = {schedule.workers: schedule for schedule in doublings(tasks, facts.seconds)}
     last = max(schedules)

@@ -20,14 +20,11 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.faults import is_leftover, own_files
 from jobs.run.ledger import Ledger
-from jobs.run.store import LOCKS
+from jobs.run.store import FOLDERS, LOCKS
 from jobs.terminal import MOST_SENTENCES, print_lines, print_table, size
 from jobs.verbs.parameters import NOTHING, OUT, Add, Out
 from pipeline.storage import is_local, listing, remove_all
 from weaves.errors import BadInput
-
-_FOLDERS: Final = (DATASETS, "models", "records", "entries", "report", "ledger")
-"""Folders of the products of each stage, and of the receipts."""
 
 _RECEIPT: Final = re.compile(r"ledger/([0-9a-f]{16})(\.failed)?\.json")
 
@@ -69,13 +66,12 @@ def prune(
         if delete:
             _delete(unneeded, out)
     named = ", ".join(recipes)
-    count = f"{len(unneeded):,} files"
     end = f"removed; {named} need the others" if delete else f"are not needed by {named}; --delete removes them"
-    print_lines(f"{out}: {count} {end}" if unneeded else f"{out}: nothing to remove: {named} need all products")
+    done = f"{len(unneeded):,} files {end}" if unneeded else f"nothing to remove: {named} need all products"
+    print_lines(f"{out}: {done}")
 
 
 def _files(out: Path) -> dict[str, _Content]:
-    """Return all files below a folder, by path relative to it."""
     if not is_local(out):
         return {path: _Content((path,), 1, stored.bytes) for path, stored in listing(out).items()}
     files = {}
@@ -116,10 +112,10 @@ def _made(ledger: Ledger, every: Iterable[str]) -> set[str]:
             places.update(str(folder / name) for name in read_files(ledger.out / folder))
     made, copied = set(), set()
     for path in every:
-        name, top = Path(path).name, Path(path).parts[0]
-        if path in places or _RECEIPT.fullmatch(path) or (top in _FOLDERS and is_leftover(name)):
+        leftover = Path(path).parts[0] in FOLDERS and is_leftover(Path(path).name)
+        if path in places or _RECEIPT.fullmatch(path) or leftover:
             made.add(path)
-        elif name.endswith(".parquet"):
+        elif path.endswith(".parquet"):
             copied.add(Path(path).parent)
     for path in every:
         # A manifest goes with its shards: a copied data set, of which no receipt knows, stays whole.

@@ -35,44 +35,10 @@ from weaves.validation import validated
 
 _WHERE: Final = "render"
 
-MOST_FRAMES: Final = 100_000
-"""Most frames of a film."""
-
-RATE: Final = 24
-"""Frames a second of a film."""
-
+_MOST_FRAMES: Final = 100_000
+_RATE: Final = 24  # frames a second of a film
 _LAYERS: Final = {"normal": "XYZ", "uv": "UV", "sigma": ("major", "minor")}
 _HALF: Final = ("normal", "sigma", "fabric")  # three digits are enough
-
-
-@dataclass(frozen=True)
-class RenderLook:
-    """How a picture is made and shown."""
-
-    size: tuple[int, int] | None
-    """Width and height; None: those of the scene's film."""
-    side: int
-    """Rays along each side of a pixel."""
-    options: SceneOptions
-    tone: Tone
-    exposure: float
-    """Stops above the exposure of the page."""
-
-
-def look(
-    size: str, samples: int, directions: int, tone: Tone, exposure: float, bounces: Bounces = BOUNCES
-) -> RenderLook:
-    """Return how a picture is made, from the command line; BadInput if a value cannot be used."""
-    if samples not in (squares := [side**2 for side in range(1, MOST_SAMPLES + 1)]):
-        raise BadInput(_WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")
-    try:
-        options = validated(SceneOptions, {"environment_directions": directions, "bounces": bounces}, _WHERE)
-    except BadInput as error:
-        raise BadInput(_WHERE, "--directions", directions, error.allowed) from error
-    if not -STOPS <= exposure <= STOPS:
-        raise BadInput(_WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
-    film = size_of(size, _WHERE) if size else None
-    return RenderLook(film, round(samples**0.5), options, tone, exposure)
 
 
 def size_of(size: str, where: str) -> tuple[int, int]:
@@ -103,45 +69,43 @@ def render(
     BadInput if a value, the scene, a fabric, the method or the path cannot be used; WorkFailed if the memory does not
     suffice.
     """
-    how = look(size, samples, directions, tone, exposure, bounces)
-    dressed_scene = dressed(load_scene(scene), fabric)
+    if samples not in (squares := [side**2 for side in range(1, MOST_SAMPLES + 1)]):
+        raise BadInput(_WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")
+    try:
+        options = validated(SceneOptions, {"environment_directions": directions, "bounces": bounces}, _WHERE)
+    except BadInput as error:
+        raise BadInput(_WHERE, "--directions", directions, error.allowed) from error
+    if not -STOPS <= exposure <= STOPS:
+        raise BadInput(_WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
+    chosen_size = size_of(size, _WHERE) if size else None
+    dressed = _dressed(load_scene(scene), fabric)
     start = time.monotonic()
-    maker = make(dressed_scene, method, _frames(frames, dressed_scene, out), how, out)
-    width, height = maker.size
-    share = "" if method == "truth" else f"; {maker.share:.0%} of the queries by the fallback"
+    count = _frames(frames, dressed, out)
+    loaded, answerer = _loaded(dressed, options, method)
+    film = _Film(loaded, answerer, chosen_size or loaded.camera.size, round(samples**0.5), tone, exposure, count)
+    film.make(out, method)
+    width, height = film.size
+    share = "" if method == "truth" else f"; {film.share:.0%} of the queries by the fallback"
     print_lines(f"{out}: {width} x {height}, {duration(time.monotonic() - start)}{share}")
 
 
-def make(scene: Scene, method: str, frames: int, how: RenderLook, out: Path) -> FilmMaker:
-    """Make a picture, a film or a folder, and return what made it; errors as for `render`."""
+def _loaded(scene: Scene, options: SceneOptions, method: str) -> tuple[Loaded, PictureMethod]:
+    """Load a scene, and a method prepared for its fabrics."""
     # Torch, which help need not wait for.
     from pipeline.models.fallback import Fallback
     from pipeline.models.named import TRUTH, named_method
 
     answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, _WHERE, "--method")
-    loaded = load(scene, how.options)
+    loaded = load(scene, options)
     if isinstance(answerer, Fallback):
         for _, fabric in loaded.cloths.values():
             if not answerer.covers(fabric):
                 raise BadInput(_WHERE, "--method", method, f"this model was not trained on {fabric.name}")
             answerer.prepare(fabric)
-    size = how.size or loaded.camera.size
-    if out.suffix == ".mp4" and (size[0] % 2 or size[1] % 2):
-        raise BadInput(_WHERE, "--size", f"{size[0]}x{size[1]}", "both sides of a film must be even")
-    refuse_unwritable(out if out.suffix else out / "frame")
-    maker = FilmMaker(loaded, answerer, size, how, frames)
-    try:
-        maker.write(out, method)
-    except KeyboardInterrupt as stop:
-        kept = f"{out} is as it was before" if out.suffix else f"finished frames are in {out}"
-        stop.args = (f"stopped; {kept}",)
-        raise
-    except MemoryError as error:
-        raise WorkFailed(f"{out}: the memory does not suffice for {size[0]} x {size[1]} pixels") from error
-    return maker
+    return loaded, answerer
 
 
-def dressed(scene: Scene, fabrics: Sequence[str]) -> Scene:
+def _dressed(scene: Scene, fabrics: Sequence[str]) -> Scene:
     """Return a scene whose cloths are made of other fabrics, in their order; the rest keeps its own."""
     keys = list(worn(scene))
     if len(fabrics) > len(keys):
@@ -158,8 +122,8 @@ def _frames(frames: int | None, scene: Scene, out: Path) -> int:
     """Return the number of frames; BadInput if it does not go with the file."""
     if out.suffix not in (".png", ".exr", ".mp4", ""):
         raise BadInput(_WHERE, "--out", str(out), "must end in .png, .exr or .mp4, or be a folder without a suffix")
-    if frames is not None and not 1 <= frames <= MOST_FRAMES:
-        raise BadInput(_WHERE, "--frames", frames, f"must be from 1 to {MOST_FRAMES}")
+    if frames is not None and not 1 <= frames <= _MOST_FRAMES:
+        raise BadInput(_WHERE, "--frames", frames, f"must be from 1 to {_MOST_FRAMES}")
     if out.suffix == ".mp4":
         refuse_missing(_WHERE, "--out", out)
     if out.suffix in (".png", ".exr"):
@@ -170,40 +134,49 @@ def _frames(frames: int | None, scene: Scene, out: Path) -> int:
 
 
 @dataclass
-class FilmMaker:
+class _Film:
     """A scene, a method, and threads that make frames by it."""
 
     loaded: Loaded
     answerer: PictureMethod
     size: tuple[int, int]
-    how: RenderLook
-    count: int
-    """Number of frames."""
+    side: int  # rays along each side of a pixel
+    tone: Tone
+    exposure: float  # stops above that of the page
+    count: int  # frames
+    # So far; those of the queries that the fallback answered.
     queries: int = 0
-    """Queries so far, and how many of them the fallback answered."""
     fallback: int = 0
     pixels: int = 0
-    """Pixels so far."""
 
     @property
     def share(self) -> float:
         """Share of the queries that the fallback answered."""
         return self.fallback / max(self.queries, 1)
 
-    def write(self, out: Path, method: str) -> None:
-        """Write a picture, a film or a folder of pictures."""
+    def make(self, out: Path, method: str) -> None:
+        """Make a picture, a film or a folder; errors as for `render`."""
+        width, height = self.size
+        if out.suffix == ".mp4" and (width % 2 or height % 2):
+            raise BadInput(_WHERE, "--size", f"{width}x{height}", "both sides of a film must be even")
+        refuse_unwritable(out if out.suffix else out / "frame")
         self._pool = ThreadPoolExecutor(cores())
         try:
             with progress("rendering") as self._advance:
                 if out.suffix == ".exr":
                     self._write_exr(out, method)
                 elif out.suffix == ".mp4":
-                    write_film(out, map(self._shown, range(self.count)), self.size, RATE)
-                elif out.suffix == ".png":
-                    atomic_write(out, png(opaque(self._shown(0)), 1))
+                    write_film(out, map(self._shown, range(self.count)), self.size, _RATE)
                 else:
                     for frame in range(self.count):
-                        atomic_write(out / f"frame-{frame + 1:04}.png", png(opaque(self._shown(frame)), 1))
+                        path = out if out.suffix else out / f"frame-{frame + 1:04}.png"
+                        atomic_write(path, png(opaque(self._shown(frame)), 1))
+        except KeyboardInterrupt as stop:
+            kept = f"{out} is as it was before" if out.suffix else f"finished frames are in {out}"
+            stop.args = (f"stopped; {kept}",)
+            raise
+        except MemoryError as error:
+            raise WorkFailed(f"{out}: the memory does not suffice for {width} x {height} pixels") from error
         finally:
             self._pool.shutdown(cancel_futures=True)
 
@@ -211,7 +184,7 @@ class FilmMaker:
         """Return a frame as it is shown."""
         codes = np.zeros((self.size[1], self.size[0], 3), np.uint8)
         for part in self._parts(frame, layers=False):
-            codes[shown_at(part)] = displayed(part.planes["rgb"], self.how.tone, self.how.exposure)
+            codes[shown_at(part)] = displayed(part.planes["rgb"], self.tone, self.exposure)
         return codes
 
     def _write_exr(self, out: Path, method: str) -> None:
@@ -239,9 +212,9 @@ class FilmMaker:
             "scene": self.loaded.scene.name,
             "method": method,
             "fabrics": ", ".join(fabrics),
-            "samples": self.how.side**2,
-            "directions": self.how.options.environment_directions,
-            "bounces": self.how.options.bounces,
+            "samples": self.side**2,
+            "directions": self.loaded.options.environment_directions,
+            "bounces": self.loaded.options.bounces,
             "fallback_share": 0.0 if isinstance(self.answerer, TruthAnswers) else self.share,
             "versions": f"truth {versions.TRUTH}, fallback {versions.FALLBACK}, scenes {versions.SCENES}{own}",
         }
@@ -250,7 +223,7 @@ class FilmMaker:
         from pipeline.models.network import one_thread  # torch
 
         with one_thread():
-            for part in picture(self.loaded, self.answerer, self._pool, self.size, float(frame), self.how.side, layers):
+            for part in picture(self.loaded, self.answerer, self._pool, self.size, float(frame), self.side, layers):
                 self.queries += part.queries
                 self.fallback += part.fallback
                 yield part

@@ -26,8 +26,7 @@ from jobs.verbs.run import work
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.requirement import Requirement
 from pipeline.truth.query import Queries
-from weaves.errors import BadInput
-from weaves.errors import nearest as nearest_name
+from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
 from weaves.reading import MOST_TEXT
 from weaves.validation import parse_toml
@@ -65,18 +64,15 @@ def require(
     """
     from reports.measure.by_size import EDGES, SIZES
     from reports.record import read_records
-    from reports.tables.equal_time import size_table
-    from reports.tables.method_choice import nearest, of_method, predictions, with_measured
-    from reports.tables.number_format import display
+    from reports.tables import equal_time, method_choice, number_format, tradeoff
     from reports.tables.summary import rows, scene_table
-    from reports.tables.tradeoff import cheapest
 
     _refuse_limits(error=error, time=time, frames=frames, margin=margin, effort=effort)
     general = load_recipe(recipe, add)
     options = _options(set_)
     names = [model.options.name for model in general.models]
     if method and method not in names:
-        allowed = f"{general.name} has no such method; {nearest_name(method, names)}"
+        allowed = f"{general.name} has no such method; {nearest(method, names)}"
         raise BadInput("require", "--method", method, allowed)
     described = load_scene(scene)
     if run:
@@ -87,7 +83,7 @@ def require(
         first = f"`twillight run {recipe}` must run first, or --run here; `twillight plan {recipe}` says how long"
         raise BadInput(missing.where, missing.key, missing.value, first) from missing
     records = read_records([page])
-    sizes = size_table(records)
+    sizes = equal_time.size_table(records)
     if sizes.empty:
         raise BadInput(str(out), "recipe", recipe, "its page has no errors by size of footprint; run the recipe again")
     queries_by_fabric, worn = _queries_of(described, frames, general.bench.scenes)
@@ -95,33 +91,33 @@ def require(
     by_fabric = [(worn[name][1], queries) for name, queries in queries_by_fabric.items()]
     every_share = {model.options.name: _fallback_share(model, by_fabric, general) for model in general.models}
     shares = {name: share for name, share in every_share.items() if share is not None}
-    fallback = _fallback_cost(by_fabric)
-    table = predictions(sizes, requirement.sizes, requirement.queries_per_frame, shares, fallback)
-    table = with_measured(table, scene_table(records), requirement.scene)
+    costs = requirement.queries_per_frame, shares, _fallback_cost(by_fabric)
+    table = method_choice.predictions(sizes, requirement.sizes, *costs)
+    table = method_choice.with_measured(table, scene_table(records), requirement.scene)
     _print_requirement(requirement)
     cells = []
     for row in rows(table):
         of_truth = f"{100 * row.error:.2g} %" if row.error > 0 else "in the noise"
-        name = display(row.method, row.setting)
+        name = number_format.display(row.method, row.setting)
         cells.append((name, of_truth, f"{row.ms:,.3g}", f"{100 * row.fallback:.0f} %", row.known))
     front = {index: "bold" for index, row in enumerate(rows(table)) if row.front}
     print_table(("method", "error", "ms per frame", "fallback share", ""), cells, text=("",), styles=front)
     print_lines("")
-    if method and (table := of_method(table, method)).empty:
+    if method and (table := method_choice.of_method(table, method)).empty:
         allowed = "it was not measured on footprints of these sizes, or does not cover the fabrics of the scene"
         raise BadInput("require", "--method", method, allowed)
-    chosen = cheapest(table, "error" if math.isinf(error) else "ms", error=error, ms=time)
+    chosen = tradeoff.cheapest(table, "error" if math.isinf(error) else "ms", error=error, ms=time)
     if chosen is None:
         near = "; ".join(
             f"{row.method} {row.setting}".strip() + f": {100 * row.error:.2g} % in {row.ms:.3g} ms"
-            for row in rows(nearest(table, error, time))
+            for row in rows(method_choice.nearest(table, error, time))
         )
         limits = f"{100 * error:g} % in {time:g} ms per frame"
         raise BadInput("require", "limits", limits, f"no method meets them; the nearest points of the front are {near}")
     if chosen.method not in names:
         allowed = "the page shows it, the recipe has no such method: run the recipe again, or choose one with --method"
-        told = nearest_name(chosen.method, names)
-        raise BadInput(f"the page of {general.name}", "method", chosen.method, f"{allowed}; {told}")
+        where, known = f"the page of {general.name}", nearest(chosen.method, names)
+        raise BadInput(where, "method", chosen.method, f"{allowed}; {known}")
     path = out / "recipes" / f"require-{requirement.scene}.toml"
     write_recipe(path, requirement, general, chosen.method, chosen.setting, scene, worn, effort, options, add)
     name = f"{chosen.method} {chosen.setting}".strip()
@@ -178,15 +174,13 @@ def _fallback_share(model: ModelRecipe, by_fabric: Iterable[tuple[Fabric, Querie
 
 
 def _fallback_cost(by_fabric: Sequence[tuple[Fabric, Queries]]) -> tuple[float, float]:
-    """Return the relative RMSE of the fallback (colour measure of the benchmark) and its nanoseconds per query.
-
-    Measured on queries with light or viewer behind, if the scene has any: those fall back most often.
-    """
+    """Return the relative RMSE of the fallback (colour measure of the benchmark) and its nanoseconds per query."""
     from pipeline.models.fallback import fallback_answers
     from pipeline.truth.estimator import estimate
     from pipeline.truth.options import TruthOptions
     from reports.error import COLOUR_WEIGHTS
 
+    # Queries with light or viewer behind, if there are any, fall back most often.
     behind = any(queries.behind.any() for _, queries in by_fabric)
     differences, colours, seconds, count = [], [], 0.0, 0
     for fabric, queries in by_fabric:
@@ -207,7 +201,6 @@ def _fallback_cost(by_fabric: Sequence[tuple[Fabric, Queries]]) -> tuple[float, 
 
 
 def _print_requirement(of: Requirement) -> None:
-    """Print the requirements of a scene."""
     low, high = of.curvature
     curved = f"{100 * of.curved:.0f} %, {low:.2g} to {high:.2g} a yarn" if of.curved else "none"
     rows = (

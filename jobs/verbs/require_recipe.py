@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import tomli_w
+from pydantic import BaseModel
 
 from jobs.plan.plan import plan
 from jobs.recipe.added import Added
@@ -75,7 +76,7 @@ def write_recipe(
             "shard_rows": general.dataset.shard_rows,
             "seed": general.dataset.seed,
             "rows": _rows(general, effort if model.learns else 1.0),
-            "queries": queries.model_dump(mode="json", exclude_defaults=True, exclude_none=True),
+            "queries": _stated(queries),
             **_truths(general, queries, [fabric for _, fabric in worn.values()]),
         },
         "models": [
@@ -126,21 +127,21 @@ def _rows(general: Recipe, effort: float) -> dict[str, int]:
 def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> dict[str, Any]:
     """Return how rows are answered: as in the general recipe, where its estimators know the queries."""
     truth, training = general.dataset.truth, general.dataset.training_truth
+    tables: dict[str, Any] = {}
     physics = {name: getattr(truth, name) for name in PHYSICS}
     sampled = truth.model_copy(update={"estimator": SAMPLED.estimator}), SAMPLED.model_copy(update=physics)
-    return {
-        name: _truth_table(
-            other if stated.estimator == "node_table" and table_refusal(stated, queries, fabrics) else stated
-        )
-        for name, stated, other in zip(("truth", "training_truth"), (truth, training), sampled, strict=True)
-        if stated is not None
-    }
+    for name, stated, other in zip(("truth", "training_truth"), (truth, training), sampled, strict=True):
+        if stated is not None:
+            refused = stated.estimator == "node_table" and table_refusal(stated, queries, fabrics)
+            chosen = other if refused else stated
+            always = {"estimator": chosen.estimator, "relative_error": chosen.relative_error}
+            tables[name] = always | _stated(chosen)
+    return tables
 
 
-def _truth_table(truth: TruthOptions) -> dict[str, Any]:
-    """Return a truth's table: its estimator, its error, and options other than the default."""
-    stated = {"estimator": truth.estimator, "relative_error": truth.relative_error}
-    return stated | truth.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+def _stated(options: BaseModel) -> dict[str, Any]:
+    """Return the options other than the default, for TOML."""
+    return options.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
 
 
 def _bent(model: ModelRecipe, queries: QueryOptions) -> dict[str, Any]:
@@ -162,7 +163,7 @@ def _model(
     if isinstance(model.options, AddedMethod):
         options = {"name": model.options.name, "limit": model.options.limit} | model.options.own | dict(other)
     else:
-        options = model.options.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | dict(other)
+        options = _stated(model.options) | dict(other)
         options["name"] = model.options.name
         validated(type(model.options), options, "--set")
         options.pop("model", None)
@@ -172,14 +173,13 @@ def _model(
         training = model.training
         average = round(training.average ** (1 / effort), 6)  # it spans the same share of the training
         shorter = {"steps": max(1, round(effort * training.steps)), "average": average}
-        options["training"] = training.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | shorter
+        options["training"] = _stated(training) | shorter
     return options
 
 
 def _bench(general: Recipe, scene: str) -> dict[str, Any]:
     """Return the general recipe's measurements, of this scene and of the method as it is."""
-    bench = general.bench.model_copy(update={"bounds": False, "runtimes": ()})
-    measurements = bench.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    measurements = _stated(general.bench.model_copy(update={"bounds": False, "runtimes": ()}))
     return measurements | {"scenes": measurements.get("scenes", {}) | {"names": [scene]}}
 
 

@@ -1,21 +1,21 @@
 """Stages of a recipe: plan, lock the output folder, execute, update the manifest, print a summary.
 
-A stage may be divided into parts (`jobs.plan.part`). Parts write products and receipts. Manifests, and what cannot be
-divided, are left to the same verb without `--part`.
+A stage may be divided into parts, each for one of several processes that know nothing of each other. They write
+products and receipts. Manifests, and what cannot be divided, are left to the same verb without `--part`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from cyclopts import Parameter
 
 from jobs.plan.dataset import DataSet
 from jobs.plan.page import Page
-from jobs.plan.part import Part
 from jobs.plan.plan import plan
 from jobs.plan.task import STAGES, Stage, Task
 from jobs.recipe.load import load_recipe
@@ -27,6 +27,34 @@ from jobs.verbs.parameters import NOTHING, ON, OUT, Add, On, Out, RecipeName, Wo
 from weaves.errors import BadInput, WorkFailed
 
 Share = Annotated[str, Parameter(help="Do this share of the tasks alone, such as 17/1000; needs no scheduler.")]
+
+
+class Part(NamedTuple):
+    """Part `number` of `parts`, 1 <= number <= parts: 17/1000 has the tasks at the places 17, 1017, 2017, … of a plan.
+
+    The plan is the same everywhere, so each task is in exactly one of the thousand parts, whatever is done already.
+    """
+
+    number: int
+    parts: int
+
+    @classmethod
+    def read(cls, text: str) -> Part:
+        """Return the part of a text such as ``17/1000``; BadInput if it names none."""
+        match = re.fullmatch(r"([1-9][0-9]{0,8})/([1-9][0-9]{0,8})", text)
+        if match is None or int(match[1]) > int(match[2]):
+            raise BadInput("--part", "", text, "must be a number, a slash and the number of parts: 1/1000 to 1000/1000")
+        return cls(int(match[1]), int(match[2]))
+
+    def of(self, tasks: Sequence[Task], stage: Stage) -> list[Task]:
+        """Return the tasks of the part, from all tasks of a plan.
+
+        A task that measures time needs a machine of its own, and one that needs another of its stage must wait for it:
+        they are in no part.
+        """
+        own = {task.id: task for task in tasks if task.stage == stage}
+        divisible = [task for task in own.values() if task.slots == "one" and own.keys().isdisjoint(task.needs)]
+        return divisible[self.number - 1 :: self.parts]
 
 
 def _verb(*stages: Stage) -> Callable[..., None]:
@@ -75,7 +103,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
             tasks,
             ledger,
             stages=stages,
-            scheduler=on.connection(),
+            scheduler=on.scheduler,
             workers=on.workers,
             manifests=manifests,
             progress=on.progress,
@@ -89,11 +117,7 @@ def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, 
 
 
 def _work_part(recipe_name: str, stage: Stage, part: Part, out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
-    """Run a part of the unfinished tasks of a stage in this process and print a summary; arguments as for `work`.
-
-    BadInput if the recipe or the folder cannot be used, or workers are chosen; WorkFailed if any task failed, if what
-    they need is not done, or if a run that is no part is at work in the folder.
-    """
+    """Run a part of the unfinished tasks of a stage in this process and print a summary; arguments as for `work`."""
     if replace(on, progress=ON.progress) != ON:
         allowed = "is done by one process without a scheduler: leave --workers, --scheduler and --tls-… out"
         raise BadInput("--part", "", f"{part.number}/{part.parts}", allowed)
@@ -114,23 +138,26 @@ def _work_part(recipe_name: str, stage: Stage, part: Part, out: Path, on: Worker
 
 
 def _print_summary(tasks: Sequence[Task], summary: RunSummary, ledger: Ledger) -> None:
-    """Print what a run did of some tasks."""
+    """Print some tasks by stage, how many of them a run did, and the seconds of work in them."""
     if not summary.ran and not summary.failed:
         print_lines(f"nothing to do: {len(tasks)} tasks done" if tasks else "nothing to do: no task is in this part")
-    else:
-        _print_work(tasks, {task.id: ledger.seconds(task) for task in summary.ran})
+        return
+    ran, rows = {task.id: ledger.seconds(task) for task in summary.ran}, []
+    for stage in STAGES:
+        if ids := [task.id for task in tasks if task.stage == stage]:
+            now = [ran[key] for key in ids if key in ran]
+            rows.append((stage, len(ids), len(now), duration(sum(now)) if now else ""))
+    print_table(("stage", "tasks", "done now", "work"), rows)
 
 
 def _refuse_failed(recipe_name: str, summary: RunSummary, ledger: Ledger, add: Sequence[str]) -> None:
-    """Raise WorkFailed if any task failed."""
     if summary.failed:
         first, *others = summary.failed
         flags = "".join(f" --add {source}" for source in add)
         more = f"; {len(others)} more failed" if others else ""
         waiting = f"; {len(summary.waiting)} tasks wait for what failed" if summary.waiting else ""
-        raise WorkFailed(
-            f"{first.title}: {ledger.reason(first)}{more}{waiting}; see `twillight status {recipe_name}{flags}`"
-        )
+        reason = f"{first.title}: {ledger.reason(first)}{more}{waiting}"
+        raise WorkFailed(f"{reason}; see `twillight status {recipe_name}{flags}`")
 
 
 def _withdraw(page: Page, tasks: Sequence[Task], ledger: Ledger) -> None:
@@ -140,21 +167,8 @@ def _withdraw(page: Page, tasks: Sequence[Task], ledger: Ledger) -> None:
         ledger.store.remove(page.products[0])
 
 
-def _print_work(tasks: Sequence[Task], ran: Mapping[str, float]) -> None:
-    """Print the tasks of a run by stage, how many of them it did, and the seconds of work in them."""
-    rows = []
-    for stage in STAGES:
-        if ids := [task.id for task in tasks if task.stage == stage]:
-            now = [ran[key] for key in ids if key in ran]
-            rows.append((stage, len(ids), len(now), duration(sum(now)) if now else ""))
-    print_table(("stage", "tasks", "done now", "work"), rows)
-
-
 def _print_methods(records: Sequence[Path]) -> None:
-    """Print a benchmark condensed to one row a method, from the files of its Records.
-
-    Bytes are left to the page, so that a line fits a terminal of 80 columns.
-    """
+    """Print a benchmark condensed to one row a method, without bytes, so that a line fits a terminal of 80 columns."""
     from reports.record import read_records
     from reports.tables.number_format import NO_BREAK
     from reports.tables.summary import summary_table

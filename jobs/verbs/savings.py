@@ -1,12 +1,10 @@
 """`twillight savings`: measured savings of a scene's own recipe against the general one, both finished.
 
-Rows and seconds of ground truth and training come from the ledger, queries learnt from are steps taken times batch,
-errors and the time of a frame are the Records of both pages. The general recipe is charged for the scene's method
-alone: the rows that this method learns from and is measured on, and its own first training; its errors are means over
-all its trainings. Seconds depend on what else a
-machine does, as rows and queries learnt from do not; so does the time of a frame, which therefore is also given in
-frames of point sampling at 2 points, timed in turns with it. The last rows are the fallback shares of both models in
-the other scenes of the general recipe: a scene's own model answers for its own domain only.
+Rows and seconds come from the ledger, queries learnt from are steps taken times batch, errors and the time of a frame
+are the Records of both pages. The general recipe is charged for the scene's method alone: the rows that it learns from
+and is measured on, and its first training; its errors are means over all its trainings. The time of a frame is also
+given in frames of point sampling at 2 points, timed in turns with it. The last rows are the fallback shares of both
+models in the other scenes of the general recipe: a scene's own model answers for its own domain only.
 """
 
 from __future__ import annotations
@@ -36,11 +34,8 @@ from pipeline.models.card import read_card
 from pipeline.scenes.catalogue import load_scene
 from weaves.errors import BadInput
 
-ENOUGH: Final = 3.0
-"""Least factor by which a scene's recipe should reduce rows and training."""
-
-_MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")
-"""Records of a method on a scene that are held side by side."""
+_ENOUGH: Final = 3.0  # least factor by which a scene's recipe should reduce rows and training
+_MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_time")  # that are held side by side
 
 DIFFERENCE: Final = "mse, own less general"
 """Quantity that pairs both pictures, pixel by pixel (`reports.measure.block_bootstrap`)."""
@@ -103,14 +98,14 @@ def saved(scene: str, out: Path, general: Recipe, run: str = "", add: Sequence[s
     own = load_recipe(path, add)
     model = own.models[0]
     name, worn = model.options.name, {fabric.name for fabric in own.seen}
-    same = next((model_there for model_there in general.models if model_there.options.name == name), None)
+    same = next((candidate for candidate in general.models if candidate.options.name == name), None)
     if same is None:
         raise BadInput(str(path), "models.0.name", name, f"{general.name} has no such method; require the scene again")
-    both = []
+    both, ledger = [], Ledger(out)
     for whole, chosen, called in ((general, same, run or general.name), (own, model, str(path))):
-        costs = _costs(alone(whole, {name}), chosen, worn, Ledger(out), plan(whole), called)
+        costs = _costs(alone(whole, {name}), chosen, worn, ledger, plan(whole), called)
         both.append(costs | _measured(out, whole.name, scene, model, called))
-    if Ledger(out).state(plan(own)[-1]) != "done":
+    if ledger.state(plan(own)[-1]) != "done":
         raise BadInput("savings", "recipe", own.name, f"its page is older than the recipe; `twillight run {path}`")
     theirs, ours = both
     rows = [SceneSaving(scene, name, *what, value, ours[what]) for what, value in theirs.items()]
@@ -131,7 +126,7 @@ def conclusion(rows: Sequence[SceneSaving]) -> str:
         proven = "less" if (high or 0.0) < 0.0 else "more" if (low or 0.0) > 0.0 else "no difference shown"
         ratio += f", paired: {proven}"
     most = max(saving.ratio for saving in (generated, learnt) if not math.isnan(saving.ratio))
-    short = "" if most >= ENOUGH else f"; less than {ENOUGH:g} times"
+    short = "" if most >= _ENOUGH else f"; less than {_ENOUGH:g} times"
     return f"{rows[0].scene}, {rows[0].method}: {', '.join(fewer)}; {ratio}{short}."
 
 
@@ -149,13 +144,12 @@ def _costs(
     trainings = [task for task in tasks if isinstance(task, Training)]
     cards = [read_card(ledger.out / task.folder) for task in trainings]
     needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.fabrics)]
-    weights = sum(ledger.store.size(task.products[0]) or 0 for task in needed)
     return {
         ("queries generated", "1"): Value(sum(task.rows for task in shards)),
         ("generation", "s"): Value(sum(ledger.seconds(task) for task in shards)),
         ("queries learnt from", "1"): Value(sum(card["steps_taken"] * model.training.batch for card in cards)),
         ("training", "s"): Value(sum(ledger.seconds(task) for task in trainings)),
-        ("weights", "bytes"): Value(weights),
+        ("weights", "bytes"): Value(sum(ledger.store.size(task.products[0]) or 0 for task in needed)),
     }
 
 
@@ -223,7 +217,6 @@ def _elsewhere(scene: str, out: Path, models: Sequence[tuple[ModelRecipe, Recipe
 
 
 def _print(rows: Sequence[SceneSaving]) -> None:
-    """Print a scene's quantities by both recipes."""
     cells = []
     for row in rows:
         unit = "" if row.unit == "1" else f", {row.unit}"
@@ -240,7 +233,6 @@ def _shown(value: Value) -> str:
 
 
 def _csv(rows: Sequence[SceneSaving]) -> str:
-    """Return all rows as CSV, RFC 4180."""
     text = io.StringIO()
     writer = csv.writer(text)
     values = [f"{name}{end}" for name in ("general", "own") for end in ("", "_low", "_high")]

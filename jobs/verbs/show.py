@@ -32,29 +32,13 @@ from weaves.yarn import Yarn
 if TYPE_CHECKING:
     from pipeline.models.fallback import Fallback
 
-TEXELS_PER_YARN: Final = 64
-"""Texels of the maps across a yarn, at most."""
-
-MOST_TEXELS: Final = 2048
-"""Texels of a side of the maps, at most: they take 36 bytes each."""
-
-SWATCH_SIZE: Final = "1200x900"
-"""Width and height of the picture of a swatch."""
-
-POINTS_OF_MANY_CELLS: Final = 4
-"""Points a pixel of a swatch with more than `TABLE_CELLS` different cells: tables of other methods grow with them."""
-
-WALKS_OF_SWATCH: Final = 1 << 14
-"""Walks of the table of light between yarns: a quarter of the usual ones, for a picture."""
-
-QUERIES_OF_PIXEL: Final = 12
-"""Queries that a pixel of a swatch counts for: it has 3, but smaller windows take less memory."""
-
-LEAST_YARNS: Final = 48
-"""Yarns across a swatch, at least."""
-
-MOST_YARNS: Final = 400
-"""Yarns across a swatch, at most: they are a pixel wide."""
+_TEXELS_PER_YARN = 64  # of the maps, at most
+_MOST_TEXELS = 2048  # of a side of the maps: they take 36 bytes each
+_SWATCH_SIZE: Final = "1200x900"
+_POINTS = 4  # a pixel of a swatch with more than `TABLE_CELLS` different cells: tables of other methods grow with them
+_WALKS = 1 << 14  # of the table of light between yarns: a quarter of the usual ones, for a picture
+_QUERIES_OF_PIXEL = 12  # that a pixel of a swatch counts for: it has 3, but smaller windows take less memory
+_LEAST_YARNS, _MOST_YARNS = 48, 400  # across a swatch; at most they are a pixel wide
 
 _RUNS = 16  # shown of a sequence of colours
 _UNITS: Final = {"width": "yarn spacings", "bend": "degrees", "twist": "degrees"}
@@ -65,22 +49,25 @@ def show(
     *,
     out: Annotated[Local | None, Parameter(help="Folder for pictures: the draft and a lit swatch.")] = None,
     maps: Annotated[bool, Parameter(help="Also height and normals, as PNG and EXR.", negative="")] = False,
-    size: Annotated[str, Parameter(help="WIDTHxHEIGHT of the swatch in pixels.")] = SWATCH_SIZE,
+    size: Annotated[str, Parameter(help="WIDTHxHEIGHT of the swatch in pixels.")] = _SWATCH_SIZE,
 ) -> None:
     """Print a fabric, and write its pictures if a folder is given."""
     cloth = load_fabric(fabric)
-    if out is None and (maps or size != SWATCH_SIZE):
-        raise BadInput("show", "", "--out is missing", "a folder is needed for pictures")
     if out is None:
+        if maps or size != _SWATCH_SIZE:
+            raise BadInput("show", "", "--out is missing", "a folder is needed for pictures")
         _print_fabric(cloth)
-    else:
-        from jobs.verbs.render import size_of  # modules that the numbers alone need not wait for
+        return
+    from jobs.verbs.render import size_of  # modules that the numbers alone need not wait for
 
-        film = size_of(size, "show")
-        _print_fabric(cloth)
-        with Terminal().status("draft and maps" if maps else "draft"):
-            paths = [*_drawn(cloth, out, draft), *(write_maps(cloth, out) if maps else [])]
-        print_lines(*paths, write_swatch(cloth, out, film))
+    film = size_of(size, "show")
+    _print_fabric(cloth)
+    with Terminal().status("draft and maps" if maps else "draft"):
+        paths = _drawn(cloth, out, draft)
+        if maps:
+            paths += [*_drawn(cloth, out, tiles.height, tiles.normals), out / f"{cloth.name}-maps.exr"]
+            write_geometry(cloth, paths[-1], _TEXELS_PER_YARN)
+    print_lines(*paths, write_swatch(cloth, out, film))
 
 
 def _drawn(fabric: Fabric, folder: Path, *draws: Callable[[Fabric], bytes]) -> list[Path]:
@@ -90,20 +77,13 @@ def _drawn(fabric: Fabric, folder: Path, *draws: Callable[[Fabric], bytes]) -> l
     return paths
 
 
-def write_maps(fabric: Fabric, folder: Path) -> list[Path]:
-    """Write height and normals as pictures, and the geometry as EXR, into a folder and return the paths."""
-    paths = [*_drawn(fabric, folder, tiles.height, tiles.normals), folder / f"{fabric.name}-maps.exr"]
-    write_geometry(fabric, paths[-1], TEXELS_PER_YARN)
-    return paths
-
-
 def write_geometry(fabric: Fabric, path: Path, texels: int) -> None:
-    """Write one repeat as EXR, with so many texels across a yarn if its sides stay within `MOST_TEXELS`.
+    """Write one repeat as EXR, with so many texels across a yarn if its sides stay within 2048.
 
     First pick at the bottom, first end on the left: height in yarn spacings, normal and fibre tangent as X (along the
     weft), Y (along the warp) and Z, the yarn (0 warp, 1 weft, 2 gap), and A = 0 in gaps.
     """
-    texels = min(texels, MOST_TEXELS // max(fabric.weave.repeat))
+    texels = min(texels, _MOST_TEXELS // max(fabric.weave.repeat))
     surface = surface_maps(fabric, texels)
     solid = surface.yarn != GAP
     channels = {"A": solid, "height": np.where(solid, surface.height, 0.0), "yarn": surface.yarn}
@@ -117,19 +97,18 @@ def write_geometry(fabric: Fabric, path: Path, texels: int) -> None:
 def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
     """Write a picture, (width, height) in pixels, of a lit swatch of 1.5 repeats or more; return its path."""
     from jobs.verbs.render import shown_at
-    from pipeline.scenes.bounces import light_between, tables_of
-    from pipeline.scenes.picture import answered, windows
+    from pipeline.scenes import bounces, picture
     from pipeline.scenes.swatch import Swatch
 
     period = max(*fabric.weave.repeat, *(len(colours.diffuse) for colours in fabric.thread_colours()))
-    swatch = Swatch(min(max(LEAST_YARNS, 1.5 * period), MOST_YARNS), size)
+    swatch = Swatch(min(max(_LEAST_YARNS, 1.5 * period), _MOST_YARNS), size)
     path, codes = folder / f"{fabric.name}-swatch.png", np.zeros((size[1], size[0], 3), np.uint8)
-    parts = windows(size, QUERIES_OF_PIXEL)
+    parts = picture.windows(size, _QUERIES_OF_PIXEL)
     with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
         method = method_of(fabric)
         method.prepare(fabric)
-        between = partial(light_between, tables=tables_of(WALKS_OF_SWATCH))
-        done = answered(swatch.frame, parts, {"swatch": fabric}, method, pool, ("swatch",), between)
+        between = partial(bounces.light_between, tables=bounces.tables_of(_WALKS))
+        done = picture.answered(swatch.frame, parts, {"swatch": fabric}, method, pool, ("swatch",), between)
         for number, part in enumerate(done, 1):
             codes[shown_at(part)] = tiles.displayed(part.planes["rgb"])
             advance(number / len(parts))
@@ -144,7 +123,7 @@ def method_of(fabric: Fabric) -> Fallback:
     from pipeline.models.fallback import Fallback
 
     if fabric.weave.different_cells() > TABLE_CELLS:
-        points = PointSampledOptions(counts=[POINTS_OF_MANY_CELLS])
+        points = PointSampledOptions(counts=[_POINTS])
         return Fallback(points.methods()[0], points.kinds)
     nodes = SoftNodesOptions(levels=[2])
     return Fallback(nodes.methods()[0], nodes.kinds)

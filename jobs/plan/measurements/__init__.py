@@ -1,8 +1,8 @@
 """Kinds of measurement: what each depends on, its tasks in a recipe, and its work.
 
 `measurement.py` is their base class; what a task needs, its title and the names of its files follow from its fields.
-`subjects.py` has their fabrics and models. References by the truth: `truth_images.py`, `SceneShot` in `scenes.py`.
-Measurements: of methods on fabrics (`fabrics.py`), at their extremes and between fabrics (`models.py`), in scenes
-(`scenes.py`), in time (`timing.py`), and of the truth itself (`studies.py`). The code that measures is in
-`reports.measure` and `reports.truth`; it is imported when a task runs.
+`subjects.py` has their fabrics and models. References by the truth: images in `truth.py`, `SceneShot` in `scenes.py`.
+Measurements: of methods on fabrics, at their extremes and between fabrics (`fabrics.py`), in scenes (`scenes.py`), in
+time (`timing.py`), and of the truth itself (`truth.py`). The code that measures is in `reports.measure` and
+`reports.truth`; it is imported when a task runs.
 """

@@ -26,17 +26,13 @@ class OfAnswers(Measurement):
     kind: Literal["answers"] = "answers"
     form: EntryForm
     sha256: str
-    """Hash of the answers."""
     fabrics: tuple[tuple[Coloured, Role], ...]
     """All fabrics, in the order of the questions."""
     named: int
     """Number of fabrics that the recipe names, the first ones; the others are random."""
     dataset: HeldOutRows
-    """Held-out queries of the fabrics."""
     errors: ErrorOptions
-    """Number of these queries."""
     file: Place
-    """Path of the answers."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:

@@ -1,4 +1,4 @@
-"""Measurements on fabrics: of the truth, of a model on one fabric, on random unseen ones, by the size of footprints."""
+"""Measurements on fabrics: of the truth, and of a model on one, on random unseen ones, at extremes, between them."""
 
 from __future__ import annotations
 
@@ -9,13 +9,27 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
-from jobs.plan.measurements.truth_images import TruthEdge, TruthFrames, TruthPicture
-from jobs.plan.task import Coloured, Made, Progress
+from jobs.plan.measurements.truth import TruthEdge, TruthFrames, TruthPicture
+from jobs.plan.task import Coloured, Made, Progress, Uncoloured
+from pipeline.models.domain import PHYSICS
 from pipeline.scenes.options import View
+from pipeline.shards.queries import QueryOptions
+from pipeline.truth.options import TruthOptions
 from reports.catalogue import AddedMetric
-from reports.options import EdgeOptions, ErrorOptions, FrameOptions, PictureOptions, Role, RunOptions, select
+from reports.options import (
+    EXTREME_PRECISIONS,
+    EXTREME_TRUTH,
+    LATENT_PAIRS,
+    EdgeOptions,
+    ErrorOptions,
+    FrameOptions,
+    PictureOptions,
+    Role,
+    RunOptions,
+    select,
+)
 from reports.page.content import PictureFile
-from weaves.fabric import Fabric
+from weaves.fabric import Fabric, load_fabric
 
 if TYPE_CHECKING:
     from reports.measure.held_out import HeldOutFabric
@@ -28,18 +42,15 @@ class _OnHeldOut(Measurement):
     fabric: Coloured
     role: Role
     dataset: HeldOutRows
-    """Held-out queries of the fabric."""
     errors: ErrorOptions
     """Number of these queries."""
 
     @classmethod
     def of(cls, subjects: Subjects, fabric: Fabric, role: Role, **more: Any) -> Self:
-        """Return the measurement of a fabric; `more` are the other fields."""
         rows, errors = subjects.held_out(fabric), select(ErrorOptions, subjects.recipe.bench)
         return cls(fabric=fabric, role=role, dataset=rows, errors=errors, **more)
 
     def held_out(self, out: Path) -> HeldOutFabric:
-        """Read the queries."""
         (rows,) = self.dataset.read(out, [self.fabric.name], self.errors.rows)
         return rows
 
@@ -61,11 +72,10 @@ class TruthNoise(_OnHeldOut):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure it."""
-        from reports.measure.frames import measure_truth_frames
-        from reports.measure.held_out import measure_truth
+        from reports.measure import frames, held_out
 
-        frames = measure_truth_frames(self.fabric, self.frame_options, out / self.frames.path)
-        return [measure_truth(self.held_out(out)), *frames]
+        motion = frames.measure_truth_frames(self.fabric, self.frame_options, out / self.frames.path)
+        return [held_out.measure_truth(self.held_out(out)), *motion]
 
 
 class OnFabric(_OnHeldOut):
@@ -119,30 +129,25 @@ class OnFabric(_OnHeldOut):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        width, height = self.frame_options.frame_size
-        queries = self.frame_options.frames * width * height + self.errors.rows
+        queries = self.frame_options.frames * math.prod(self.frame_options.frame_size) + self.errors.rows
         pixels = sum(math.prod(self.picture_options.size(view)) for view in self.views)
         return 0.3 + self.model.seconds(queries + pixels, 1.0, self.ways)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""
-        from reports.measure.frames import measure_aliasing
-        from reports.measure.furnace import measure_furnace
-        from reports.measure.held_out import measure_errors
-        from reports.measure.pictures import render_method
-        from reports.measure.silhouette import measure_silhouette
+        from reports.measure import frames, furnace, held_out, pictures, silhouette
 
         rows, methods, records = self.held_out(out), self.model.methods(out), []
         methods += self.model.variants(methods, self.ways)
         for index, method in enumerate(methods, start=1):
-            records += measure_errors(method, rows, self.errors.seed)
-            records += measure_furnace(method, self.fabric)
-            records += measure_aliasing(method, self.fabric, self.frame_options, out / self.frames.path)
+            records += held_out.measure_errors(method, rows, self.errors.seed)
+            records += furnace.measure_furnace(method, self.fabric)
+            records += frames.measure_aliasing(method, self.fabric, self.frame_options, out / self.frames.path)
             if self.edge and self.edge_options:
-                records += measure_silhouette(method, self.fabric, self.edge_options, out / self.edge.path)
+                records += silhouette.measure_silhouette(method, self.fabric, self.edge_options, out / self.edge.path)
             for view, truth in self.views.items() if method.setting in self.shown else ():
-                path = out / self.picture(method.setting, view)
-                records += render_method(method, self.fabric, view, self.picture_options, out / truth.path, path)
+                paths = out / truth.path, out / self.picture(method.setting, view)
+                records += pictures.render_method(method, self.fabric, view, self.picture_options, *paths)
             progress(index / len(methods))
         return records
 
@@ -159,7 +164,6 @@ class OnUnseenPopulation(Measurement):
     ways: RunOptions
     fabrics: tuple[Coloured, ...]
     dataset: HeldOutRows
-    """Held-out queries of the fabrics."""
     errors: ErrorOptions
     """Number of these queries, each fabric."""
 
@@ -203,9 +207,7 @@ class ErrorsBySize(Measurement):
 
     kind: Literal["errors by size"] = "errors by size"
     model: Trained
-    """The model with the networks of all fabrics."""
     dataset: HeldOutRows
-    """The held-out queries of all fabrics."""
     seed: int
     """Seed of the points of random methods."""
 
@@ -250,3 +252,82 @@ class OfAddedMetric(_OnHeldOut):
 
         rows = self.held_out(out)
         return [measure_added(method, self.metric, rows, self.errors.seed) for method in self.model.methods(out)]
+
+
+class AtExtremes(Measurement):
+    """All methods of a model at extreme sizes, angles and places, trained ones in half precision too."""
+
+    kind: Literal["extremes"] = "extremes"
+    code: ClassVar = ("truth", "extremes")
+    model: Trained
+    fabrics: tuple[tuple[Uncoloured, Role], ...]
+    """One fabric of each role."""
+    truth: TruthOptions
+    """The recipe's physics, at a fixed precision."""
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a model and seed, on the first fabric of each role that it answers for."""
+        physics = {name: getattr(subjects.recipe.dataset.truth, name) for name in PHYSICS}
+        truth = EXTREME_TRUTH.model_copy(update=physics)
+        for model in subjects.models:
+            known: dict[Role, Fabric] = {}
+            for fabric, role in subjects.fabrics:
+                if model.on([fabric.name]):
+                    known.setdefault(role, fabric)
+            if trained := model.on([fabric.name for fabric in known.values()]) if known else None:
+                yield cls(model=trained, fabrics=tuple((fabric, role) for role, fabric in known.items()), truth=truth)
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return 0.6 + self.model.seconds(0.0, len(self.fabrics))
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure all methods side by side."""
+        from pipeline.models.added.guarded import unchecked
+        from pipeline.models.runtimes import runs
+        from reports.measure.extremes import lustrous, measure_extremes
+
+        fabrics = list(self.fabrics)
+        if not self.model.options.of_one_material:
+            fabrics.append((lustrous(fabrics[0][0]), "unseen"))
+        precisions = EXTREME_PRECISIONS if self.model.networks else ()
+        families = [[unchecked(method), *runs(method, precisions)] for method in self.model.methods(out)]
+        return measure_extremes(families, fabrics, self.truth)
+
+
+class Latents(Measurement):
+    """Answers of a model between pairs of presets, and the time of edits."""
+
+    kind: Literal["latents"] = "latents"
+    timed: ClassVar = True
+    code: ClassVar = ("truth", "bench")
+    seconds: ClassVar = 10.0
+    model: Trained
+    presets: tuple[Uncoloured, ...]
+    """Presets of the pairs."""
+    queries: QueryOptions
+    truth: TruthOptions
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield one a model that blends latents, trained with its first seed."""
+        names = sorted({name for first, second, _ in LATENT_PAIRS for name in (first, second)})
+        dataset = subjects.recipe.dataset
+        for model in subjects.first_models:
+            if subjects.recipe.bench.latents and model.recipe.options.blends:
+                presets = tuple(map(load_fabric, names))
+                yield cls(model=model.whole, presets=presets, queries=dataset.queries, truth=dataset.truth)
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure edits, then one pair after the other."""
+        from reports.measure.latents import measure_edits, measure_paths, pairs
+
+        (method,) = self.model.methods(out)
+        chosen = pairs()
+        records = measure_edits(method, chosen[0].first)
+        for index, pair in enumerate(chosen, start=1):
+            records += measure_paths(method, pair, self.queries, self.truth)
+            progress(index / len(chosen))
+        return records

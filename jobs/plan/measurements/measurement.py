@@ -18,10 +18,9 @@ from reports.page.content import PictureFile
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
-    from reports.record import Provenance, Record
+    from reports.record import Record
 
-_SUBJECTS: Final = ("study", "metric", "model", "fabric", "scene")
-"""Fields that say what is measured, in the order of a title."""
+_SUBJECTS: Final = ("study", "metric", "model", "fabric", "scene")  # what is measured, in the order of a title
 
 
 class Measurement(Task):
@@ -104,20 +103,10 @@ class Measurement(Task):
         """Return the path of the picture of a setting."""
         return Path("-".join(filter(None, (self.stem, setting.replace(" = ", ""), view))) + ".exr")
 
-    @property
-    def provenance(self) -> Provenance:
-        """Data set and training that its numbers come from, where there is one."""
-        from reports.record import Provenance
-
-        dataset, model = getattr(self, "dataset", None), getattr(self, "model", None)
-        trained = {"model": " ".join(model.needs), "seed": model.seed} if model else {}
-        return Provenance(dataset=dataset.fingerprint if dataset else "", **trained)
-
     def versions(self) -> dict[str, int]:
         """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
-        code, ways = {*self.code}, list(held(self, RunOptions))
-        code |= {"bound"} if any(way.bounds for way in ways) else set()
-        options = [model.options for model in held(self, Trained)]
+        code, options = {*self.code}, [model.options for model in held(self, Trained)]
+        code |= {"bound"} if any(way.bounds for way in held(self, RunOptions)) else set()
         code |= {"fallback"} if any(model.model == "selvage" for model in options) else set()
         models = {model.name: model.version for model in options}
         numbers = {**vars(versions), "BENCH": catalogue.BENCH}
@@ -173,8 +162,12 @@ class Measurement(Task):
         raise NotImplementedError
 
     def _stamped(self, record: Record) -> Record:
-        """Return a Record with the provenance, and the role of the fabric where all have the same."""
-        about = self.provenance.model_copy(update={"origin": record.provenance.origin})
+        """Return a Record with its data set and training, and the role of the fabric where all have the same."""
+        from reports.record import Provenance
+
+        dataset, model = getattr(self, "dataset", None), getattr(self, "model", None)
+        trained = {"model": " ".join(model.needs), "seed": model.seed} if model else {}
+        about = Provenance(dataset=dataset.fingerprint if dataset else "", origin=record.provenance.origin, **trained)
         return record.model_copy(update={"provenance": about, "role": getattr(self, "role", record.role)})
 
 

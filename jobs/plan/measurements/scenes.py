@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
@@ -52,28 +53,19 @@ class _Shot(Measurement):
     step: tuple[float, float, float]
     """Step of the camera from frame to frame."""
     options: ShotOptions
-    """Options of the frames and of the truth."""
 
     @classmethod
     def of(cls, name: str, options: ShotOptions) -> Self:
-        """Return the shot of a scene."""
         scene = load_scene(name)
         cloths = {}
         for key, fabric in worn(scene).items():
             cloth = scene.cloths.get(key, Cloth())
             cloths[key] = SceneCloth(fabric=load_fabric(fabric), yarns=cloth.yarns, turn=cloth.turn)
-        return cls(
-            scene=scene.name,
-            found=name,
-            files=tuple(file_sha256(path) for path in files(scene)),
-            cloths=cloths,
-            step=scene.step,
-            options=options,
-        )
+        hashes = tuple(map(file_sha256, files(scene)))
+        return cls(scene=scene.name, found=name, files=hashes, cloths=cloths, step=scene.step, options=options)
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a scene."""
         yield from cls.all(subjects.recipe.bench.scenes)
 
     @classmethod
@@ -83,34 +75,27 @@ class _Shot(Measurement):
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
-        """The truth's frames."""
         return (PictureFile("", self.scene, "truth", "", Path(self.products[1]), self.larger),)
 
     @property
     def fabrics(self) -> list[str]:
-        """Names of its fabrics, sorted."""
         return sorted({cloth.fabric.name for cloth in self.cloths.values()})
 
     @property
     def cost(self) -> float:
-        """Estimated seconds on one core."""
         options = self.options
         fabrics = [cloth.fabric for cloth in self.cloths.values()]
-        first = [TruthCost(options.truth, fabric) for fabric in fabrics]
-        rows = sum(answer.row(flat=False) for answer in first) / len(first)
-        further = sum(TruthCost(options.frame_truth, fabric).row(flat=False) for fabric in fabrics) / len(first)
-        pixels = options.size[0] * options.size[1]
-        answers = pixels * _QUERIES_A_PIXEL * (rows + (options.frames - 1) * further)
+        first, further = ([TruthCost(t, f) for f in fabrics] for t in (options.truth, options.frame_truth))
+        row, next_row = (sum(answer.row(flat=False) for answer in each) / len(each) for each in (first, further))
+        answers = math.prod(options.size) * _QUERIES_A_PIXEL * (row + (options.frames - 1) * next_row)
         return 5.0 + sum(answer.bounces for answer in first) + answers
 
     def run(self, out: Path, progress: Progress) -> None:
-        """Render the queries and answer them."""
-        from reports.measure.scene.scene_errors import write_truth
-        from reports.measure.scene.shot import read_shot, shoot
+        from reports.measure.scene import scene_errors, shot
 
-        shot, picture = (out / path for path in self.products)
-        shoot(self.found, self.options, shot, progress)
-        write_truth(read_shot(shot), picture)
+        queries, picture = (out / path for path in self.products)
+        shot.shoot(self.found, self.options, queries, progress)
+        scene_errors.write_truth(shot.read_shot(queries), picture)
 
 
 class SceneShot(_Shot):
@@ -133,10 +118,8 @@ class LargerShot(_Shot):
     @classmethod
     def all(cls, options: SceneBenchOptions) -> list[Self]:
         """Return the shots of a recipe's scenes, in its order; none if it wants no larger pictures."""
-        if options.picture_size is None:
-            return []
-        first = {"size": options.picture_size, "frames": 1}
-        return [cls.of(name, select(ShotOptions, options).model_copy(update=first)) for name in options.names]
+        larger = select(ShotOptions, options).model_copy(update={"size": options.picture_size, "frames": 1})
+        return [cls.of(name, larger) for name in options.names] if options.picture_size else []
 
 
 class _OnShot(Measurement):
@@ -148,14 +131,12 @@ class _OnShot(Measurement):
     shot: Made
     """Frames of the scene with the truth's answers."""
     model: Trained
-    """The model with one setting."""
     options: SceneErrorOptions
     shown: tuple[str, ...]
     """Settings that pictures are made of."""
     extent: tuple[int, int]
     """Width and height of a frame in pixels."""
     frames: int
-    """Number of frames."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -179,32 +160,28 @@ class _OnShot(Measurement):
 
     @property
     def subjects(self) -> tuple[str, ...]:
-        """Model, scene and setting."""
         return (*super().subjects, *map(self.model.options.setting_of, self.model.options.settings))
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
-        """The frames of every setting shown."""
         subject, larger = ("", self.scene, self.model.options.name), self.shots.larger
         return tuple(PictureFile(*subject, setting, self.picture(setting), larger) for setting in self.shown)
 
     @property
     def cost(self) -> float:
-        """Estimated seconds on one core."""
-        queries = self.extent[0] * self.extent[1] * _QUERIES_A_PIXEL * self.frames
+        queries = math.prod(self.extent) * _QUERIES_A_PIXEL * self.frames
         unknown = queries if {"behind", "curvature"} - self.model.options.kinds else 0.0
         # Tables know light from behind and curved cloth.
         return 0.5 + self.model.seconds(queries, fabrics=3.0) + _FALLBACK * unknown
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
-        """Measure it; of a larger picture there are no Records."""
-        from reports.measure.scene.scene_errors import measure_scene
-        from reports.measure.scene.shot import read_shot
+        from reports.measure.scene import scene_errors, shot
 
         methods = self.model.with_fallback(out, self.options.footprint)
         pictures = {setting: out / self.picture(setting) for setting in self.shown}
-        records = measure_scene(methods, read_shot(out / self.shot.path), self.options, pictures)
-        return [] if self.shots.larger else records
+        frames = shot.read_shot(out / self.shot.path)
+        records = scene_errors.measure_scene(methods, frames, self.options, pictures)
+        return [] if self.shots.larger else records  # of a larger picture there are none
 
 
 class OnScene(_OnShot):
@@ -236,7 +213,6 @@ class FrameTime(Measurement):
     footprint: RoundFootprint
     """Round footprint that replaces an ellipse where a method answers round footprints only."""
     options: RepeatOptions
-    """Repeats."""
     seed: int
     """Seed of the order of the queries."""
 
@@ -256,8 +232,7 @@ class FrameTime(Measurement):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Time all methods."""
-        from reports.measure.scene.scene_errors import time_scene
-        from reports.measure.scene.shot import read_shot
+        from reports.measure.scene import scene_errors, shot
 
         methods = [method for model in self.models for method in model.with_fallback(out, self.footprint)]
-        return time_scene(methods, read_shot(out / self.shot.path), self.options, self.seed)
+        return scene_errors.time_scene(methods, shot.read_shot(out / self.shot.path), self.options, self.seed)

@@ -35,7 +35,6 @@ class HeldOutRows(TaskPart):
     rows: tuple[str, ...]
     """Ids of the tasks that make the rows."""
     folder: Place
-    """Folder of the data set."""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -163,13 +162,11 @@ class Subjects:
     @cached_property
     def models(self) -> list[ModelSubject]:
         """The models in the order of the recipe, once for each seed that they are trained with."""
-        return [
-            ModelSubject(single, trainings, is_first=index == 0)
-            for model in self.recipe.models
-            for index, (single, trainings) in enumerate(
-                zip(model.single, self.trainings.get(model.options.name, [{}]), strict=True)
-            )
-        ]
+        models = []
+        for model in self.recipe.models:
+            trained = zip(model.single, self.trainings.get(model.options.name, [{}]), strict=True)
+            models += [ModelSubject(single, nets, is_first=not index) for index, (single, nets) in enumerate(trained)]
+        return models
 
     @property
     def first_models(self) -> list[ModelSubject]:

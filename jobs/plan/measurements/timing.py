@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from reports.record import Record
 
 
-_SECONDS_A_CALL: Final = 0.15  # of a round of one row: all queries, then each of five classes of sizes
+_SECONDS_A_CALL = 0.15  # of a round of one row: all queries, then each of five classes of sizes
 
 
 class TimedModel(Trained):
@@ -45,9 +45,7 @@ class TimeOfMethods(Measurement):
     code: ClassVar = ("truth", "bench")  # the truth is timed too
     models: tuple[TimedModel, ...]
     dataset: HeldOutRows
-    """The held-out queries of all fabrics."""
     options: TimingOptions
-    """Rows, repeats and threads."""
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:

@@ -2,5 +2,5 @@
 
 questions writes the held-out queries of a recipe, with everything that is known of their fabrics, and the form of an
 entry. challenge makes a seed and, once it is revealed, the recipe of its round. Answers come in by `bench --answers`;
-board shows those that were measured.
+its board shows those that were measured.
 """

@@ -1,4 +1,4 @@
-"""`twillight challenge`: a secret seed with a public hash, and the recipe whose cloths and queries it draws.
+"""`twillight challenge`: a secret seed with a public hash, the recipe that it draws, and the board of entries.
 
 A round is the recipe `challenge` with the seeds of the round in place of its own. So the population and the queries are
 those of the code that all recipes share, and whoever has the seed generates the same bytes. A text that is public only
@@ -18,6 +18,7 @@ from typing import Annotated, Final
 import tomli_w
 from cyclopts import Parameter
 
+from jobs.recipe.entry import FORM, EntryForm, is_plain
 from jobs.recipe.shipped import RECIPES
 from jobs.terminal import print_lines
 from jobs.verbs.parameters import Local
@@ -25,12 +26,21 @@ from pipeline.atomic import atomic_write, disk_errors
 from pipeline.fingerprint import stream_seed
 from weaves.errors import BadInput
 from weaves.reading import read_text
+from weaves.validation import read_toml, validated
 
 _WHERE: Final = "challenge"
 _SEED: Final = "seed"
 _MOST: Final = 1024  # bytes of a file with a seed
 _DIGITS: Final = 8  # of the hash, in the name of a round
 _MOST_LETTERS: Final = 80  # of a text: `about` of a recipe has 200
+
+_HEAD: Final = """\
+# Entries
+
+Written by `twillight challenge board` from the folders of {count} entries, which answer the questions `{questions}`. \
+Errors were measured by benchmark version {version}, on the data set `{dataset}`; whoever has the recipe measures them \
+again with `twillight bench RECIPE --answers FOLDER`. Costs are stated by the entrants. Entries are compared within a \
+class only: the most multiply-adds of a query, and bytes of a fabric."""
 
 Folder = Annotated[Local, Parameter(help="Folder to write to.")]
 
@@ -75,6 +85,49 @@ def reveal(
     path = to / f"{content['name']}.toml"
     atomic_write(path, tomli_w.dumps(content).encode())
     print_lines(f"{path}: `twillight questions {path} --to FOLDER` writes its questions")
+
+
+def board(
+    entries: Annotated[list[Local], Parameter(help="Folders that `bench --answers` left in out/entries.")],
+    *,
+    to: Annotated[Local, Parameter(help="Markdown file to write.")],
+) -> None:
+    """Write the tables of entries; BadInput if one was not measured, two have one name, or their rows differ."""
+    from reports.catalogue import columns_of
+    from reports.record import Record, read_records
+    from reports.tables.page_tables import ENTRY_CLASSES, entry_class, page_frames, result_tables
+
+    by_class: dict[str, list[Record]] = {entry_class(size): [] for size in (*ENTRY_CLASSES, ENTRY_CLASSES[-1] + 1)}
+    facts: dict[str, object] = {}
+    names = set[str]()
+    for folder in entries:
+        form = validated(EntryForm, read_toml(folder / FORM), str(folder / FORM))
+        records = read_records([folder / "records.json"])
+        whole = {record.method for record in records} == {form.name}
+        if not whole or not {record.metric for record in records} >= {*columns_of("entries")}:
+            raise BadInput(str(folder / "records.json"), "", "holds other Records", f"those of {form.name} are needed")
+        costs = [record for record in records if record.metric in columns_of("entries")]
+        stated = [(record.metric, record.value, record.note) for record in costs]
+        if sorted(stated) != sorted(form.costs):
+            raise BadInput(str(folder / "records.json"), "", "states other costs", f"those of {FORM} are needed")
+        if not all(is_plain(record.fabric + record.setting) for record in records):
+            raise BadInput(str(folder / "records.json"), "", "has names with signs of Markdown", "letters are needed")
+        if form.name in names:
+            raise BadInput(str(folder), "name", form.name, "is the name of another entry")
+        names.add(form.name)
+        about = records[0].provenance
+        for key, value in (("questions", form.questions), ("version", about.version), ("dataset", about.dataset)):
+            if (known := facts.setdefault(key, value)) != value:
+                raise BadInput(str(folder), key, value, f"that of the entries before is {known}")
+        by_class[entry_class(max(form.bytes_stored, form.multiply_adds))] += records
+    parts = [_HEAD.format(count=len(entries), **facts)]
+    for name, records in by_class.items():
+        tables = result_tables(records, page_frames(records), {}) if records else {}
+        shown = [table for section in ("entries", "error") for table in tables.get(section, ())]
+        parts += [f"## {name}"] if shown else []
+        parts += [f"### {table.title}\n\n{table.markdown()}" for table in shown]
+    atomic_write(to, ("\n\n".join(parts) + "\n").encode())
+    print_lines(f"{to}: {len(entries)} entries")
 
 
 def _read(seed: str) -> str:

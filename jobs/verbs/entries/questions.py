@@ -32,7 +32,6 @@ from reports.images.draft import drawdown
 from reports.tables.table import markdown_table
 from weaves.draft_files.write import wif_text
 from weaves.errors import BadInput
-from weaves.fabric import Fabric
 
 _TEXELS: Final = 16  # of a map of the geometry, across a yarn
 
@@ -59,21 +58,19 @@ def questions(
         count = write_questions(folder, (shard for shard in shards if isinstance(shard, ShardTask)))
         about = _about(loaded)
         texts = {_LISTING: json.dumps(about), FORM: blank_form(about["questions"]), "README.md": _readme(loaded, count)}
+        (folder / "fabrics").mkdir()
         for fabric, _ in loaded.tested:
             texts[f"fabrics/{fabric.name}.toml"] = fabric.to_toml()
             with suppress(BadInput):  # its colours need more threads than a draft file can have
                 texts[f"fabrics/{fabric.name}.wif"] = wif_text(fabric)
-        (folder / "fabrics").mkdir()
-        for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8")
-        for fabric, _ in loaded.tested:
             (folder / "fabrics" / f"{fabric.name}.png").write_bytes(drawdown(fabric))
             write_geometry(fabric, folder / "fabrics" / f"{fabric.name}.exr", _TEXELS)
+        for name, text in texts.items():
+            (folder / name).write_text(text, encoding="utf-8")
     print_lines(f"{to}: {count:,} questions about {len(loaded.tested)} fabrics; README.md says how to answer them")
 
 
 def _about(recipe: Recipe) -> dict[str, Any]:
-    """Return the facts of the questions for programs."""
     dataset, rows = recipe.dataset, recipe.dataset.rows.test
     return {
         "recipe": recipe.name,
@@ -82,20 +79,18 @@ def _about(recipe: Recipe) -> dict[str, Any]:
         "queries": dataset.queries.model_dump(mode="json"),
         "truth": {name: getattr(dataset.truth, name) for name in PHYSICS},
         "fabrics": [
-            {"role": role, "first_id": rows * index, "last_id": rows * (index + 1) - 1, **_of_fabric(fabric)}
+            {
+                "role": role,
+                "first_id": rows * index,
+                "last_id": rows * (index + 1) - 1,
+                "name": fabric.name,
+                "repeat": fabric.weave.repeat,
+                "drawdown": fabric.weave.rows(),
+                "colours": np.round(colours(fabric), 9).tolist(),
+                "transmitted_colours": np.round(colours(fabric, transmitted=True), 9).tolist(),
+            }
             for index, (fabric, role) in enumerate(recipe.tested)
         ],
-    }
-
-
-def _of_fabric(fabric: Fabric) -> dict[str, Any]:
-    """Return what a program needs of a fabric beside its yarns."""
-    return {
-        "name": fabric.name,
-        "repeat": fabric.weave.repeat,
-        "drawdown": fabric.weave.rows(),
-        "colours": np.round(colours(fabric), 9).tolist(),
-        "transmitted_colours": np.round(colours(fabric, transmitted=True), 9).tolist(),
     }
 
 

@@ -1,5 +1,5 @@
 """The verb `publish`: a data set as a folder that others read and cite.
 
 `publish` checks and writes; `contents` says which rows are in which file; `recipe` writes the generating recipe;
-`card` and `croissant` describe the folder for people and for tools.
+`card` describes the folder for people and for tools.
 """

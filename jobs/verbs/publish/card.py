@@ -1,7 +1,12 @@
-"""Card of a published data set (`README.md`) with the header that data hubs read, its licence, and `CITATION.cff`."""
+"""Descriptions of a published data set: card (`README.md`) with the header of data hubs, `CITATION.cff`, Croissant 1.0.
+
+`croissant.json` has the columns and files for tools that load them: one record set for each role and split, made from
+the Arrow schema of the rows and the meanings in it.
+"""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from itertools import pairwise
@@ -38,6 +43,29 @@ _SIZES: Final = ("n<1K", *(f"{low}<n<{high}" for low, high in pairwise(_BOUNDS))
 """The hubs' classes of size: below a thousand rows, then a class for each digit more."""
 
 
+_CR: Final = (
+    "column conformsTo dataType extract field fileObject fileProperty fileSet format includes isLiveDataset jsonPath "
+    "key md5 parentField path recordSet references regex repeated replace samplingRate separator source subField "
+    "transform citeAs equivalentProperty"
+)
+
+_CONTEXT: Final = {
+    "@language": "en",
+    "@vocab": "https://schema.org/",
+    **{term: f"cr:{term}" for term in _CR.split()},
+    "conformsTo": "dct:conformsTo",
+    "cr": "http://mlcommons.org/croissant/",
+    "rai": "http://mlcommons.org/croissant/RAI/",
+    "dct": "http://purl.org/dc/terms/",
+    "sc": "https://schema.org/",
+    "data": {"@id": "cr:data", "@type": "@json"},
+    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    "examples": {"@id": "cr:examples", "@type": "@json"},
+}
+
+_TYPES: Final = {"string": "sc:Text", "float": "sc:Float", "int32": "sc:Integer"}  # by those of Arrow
+
+
 def licence_id(given: str | None) -> str:
     """Return an SPDX identifier as it is written; BadInput if none is given, or there is no such licence."""
     if not given:
@@ -52,16 +80,15 @@ def licence_id(given: str | None) -> str:
         raise BadInput("publish", "--licence", given, allowed) from error
 
 
-def licence_url(licence: str) -> str:
+def _licence_url(licence: str) -> str:
     """Return the address of a licence's text."""
     return f"https://spdx.org/licenses/{licence}.html"
 
 
 def _hub_licence(licence: str) -> dict[str, str]:
-    """Return the keys of a data set card that state the licence."""
     if licence in _OF_HUBS:
         return {"license": _OF_HUBS[licence] or licence.lower()}
-    return {"license": "other", "license_name": licence.lower(), "license_link": licence_url(licence)}
+    return {"license": "other", "license_name": licence.lower(), "license_link": _licence_url(licence)}
 
 
 def card(about: About) -> str:
@@ -86,7 +113,7 @@ def card(about: About) -> str:
         columns=_table([("column", "type", "meaning"), *((f"`{c}`", kind, m) for c, kind, m in columns_joined())]),
         options=_table([("option", "value"), *_options(manifest.about)]),
         licence=about.licence,
-        url=licence_url(about.licence),
+        url=_licence_url(about.licence),
         reference=about.citation.line(about.version),
         bibtex=about.citation.bibtex(about.id, about.version),
         fingerprint=manifest.fingerprint,
@@ -135,3 +162,61 @@ def citation_file(about: About) -> str:
         keywords=["woven cloth", "appearance", "BSDF", "rendering", "ground truth"],
         identifiers=[number],
     )
+
+
+def croissant(about: About) -> str:
+    """Return the text of ``croissant.json``."""
+    doi = about.citation.doi
+    known = {
+        "datePublished": about.citation.date,
+        "url": about.citation.url,
+        "sameAs": doi and f"https://doi.org/{doi}",
+    }
+    content = {
+        "@context": _CONTEXT,
+        "@type": "sc:Dataset",
+        "conformsTo": "http://mlcommons.org/croissant/1.0",
+        "name": about.citation.title,
+        "description": about.summary,
+        "license": _licence_url(about.licence),
+        "creator": [
+            {"@type": "sc:Person", "name": f"{given} {family}", "familyName": family, "givenName": given}
+            if given
+            else {"@type": "sc:Organization", "name": family}
+            for family, given in about.citation.persons
+        ],
+        **{key: value for key, value in known.items() if value},
+        "version": about.version,
+        "citeAs": about.citation.bibtex(about.id, about.version),
+        "distribution": [_file_set(role, split) for role, split in about.sets],
+        "recordSet": [_record_set(role, split) for role, split in about.sets],
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def _file_set(role: str, split: str) -> dict[str, Any]:
+    return {
+        "@type": "cr:FileSet",
+        "@id": f"files-{role}-{split}",
+        "name": f"files-{role}-{split}",
+        "description": f"Rows of {role} fabrics, split {split}.",
+        "encodingFormat": "application/x-parquet",  # readers do not know application/vnd.apache.parquet
+        "includes": f"{stem(role, split)}-*.parquet",
+    }
+
+
+def _record_set(role: str, split: str) -> dict[str, Any]:
+    name = f"{role}-{split}"
+    fields = [
+        {
+            "@type": "cr:Field",
+            "@id": f"{name}/{column}",
+            "name": f"{name}/{column}",
+            "description": meaning,
+            "dataType": _TYPES[kind],
+            "source": {"fileSet": {"@id": f"files-{name}"}, "extract": {"column": column}},
+        }
+        for column, kind, meaning in columns_joined()
+    ]
+    description = f"One query and its answer in each row: {role} fabrics, split {split}."
+    return {"@type": "cr:RecordSet", "@id": name, "name": name, "description": description, "field": fields}

@@ -16,10 +16,8 @@ from filelock import FileLock, Timeout
 
 from jobs.terminal import print_lines, size, tracked
 from jobs.verbs.parameters import Local
-from jobs.verbs.publish.card import LOADER, card, citation_file, licence_id
-from jobs.verbs.publish.citation import Citation
-from jobs.verbs.publish.contents import About, PublishedPart, own_shards, parts_of
-from jobs.verbs.publish.croissant import croissant
+from jobs.verbs.publish.card import LOADER, card, citation_file, croissant, licence_id
+from jobs.verbs.publish.contents import About, Citation, PublishedPart, own_shards, parts_of
 from jobs.verbs.publish.recipe import recipe_files
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import file_sha256, fingerprint
@@ -81,7 +79,6 @@ def publish(
 
 
 def _free(to: Path | None, folder: Path) -> Path:
-    """Return the folder to write if nothing is in it."""
     if to is None:
         raise BadInput("publish", "", "--to is missing", "the folder to write is needed")
     if to.is_dir():

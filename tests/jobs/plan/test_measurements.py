@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import Field, TypeAdapter
 
-from jobs.plan.measurements.studies import Study
+from jobs.plan.measurements.truth import Study
 from jobs.plan.plan import KINDS, plan
 from jobs.recipe.entry import Entry, EntryForm
 from jobs.recipe.load import load_recipe

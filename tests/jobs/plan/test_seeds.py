@@ -1,7 +1,6 @@
 import pytest
 
-from jobs.plan.measurements.fabrics import ErrorsBySize, OnFabric
-from jobs.plan.measurements.models import AtExtremes, Latents
+from jobs.plan.measurements.fabrics import AtExtremes, ErrorsBySize, Latents, OnFabric
 from jobs.plan.measurements.scenes import FrameTime, OnScene
 from jobs.plan.measurements.timing import TimeOfMethods
 from jobs.plan.training import Training

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from jobs.plan.measurements.models import AtExtremes
+from jobs.plan.measurements.fabrics import AtExtremes
 from jobs.recipe.load import load_recipe
 from jobs.recipe.shipped import recipe_names
 from pipeline.scenes.catalogue import load_scene

@@ -3,8 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from jobs.run.ledger import Ledger
-from jobs.run.reasons import ELSEWHERE
+from jobs.run.ledger import ELSEWHERE, Ledger
 from jobs.run.receipt import Product
 from jobs.verbs.plan import facts_of
 

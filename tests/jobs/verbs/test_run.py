@@ -15,8 +15,11 @@ from jobs.plan.plan import KINDS
 from jobs.plan.training import Training
 from jobs.run import executor, outcome
 from jobs.run.ledger import Ledger
+from jobs.verbs.run import Part
 from tests.jobs import made_up
-from weaves.errors import WorkFailed
+from weaves.errors import BadInput, WorkFailed
+
+NO_PARTS = ["0/1000", "1001/1000", "x/y", "5/0", "", "3", "1/2/3", "-1/2", "1.0/2", "01/2", " 1/2", "1/2\n", "٣/٤"]
 
 
 @pytest.fixture
@@ -96,3 +99,24 @@ def test_libraries_of_a_part_are_loaded_for_one_thread():
     command = ["env", "OPENBLAS_NUM_THREADS=2", sys.executable, "-c", code, "train", "quick", "--part=0/1"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout == "False 2 1\n"
+
+
+@pytest.mark.parametrize("text", [*NO_PARTS, f"1/{10**9}", "9" * 5000 + "/1"])
+def test_a_text_that_names_no_part_is_bad_input(text):
+    with pytest.raises(BadInput, match="must be a number, a slash and the number of parts"):
+        Part.read(text)
+
+
+@pytest.mark.parametrize("stage", ["generate", "train", "bench"])
+def test_each_task_that_waits_for_no_other_of_its_stage_is_in_exactly_one_part(files, stage):
+    tasks = files.plan()
+    whole = [task.id for task in Part(1, 1).of(tasks, stage)]
+    for parts in (1, 2, 3, 7, len(whole) + 5):
+        named = [Part.read(f"{number}/{parts}") for number in range(1, parts + 1)]
+        shares = [[task.id for task in part.of(tasks, stage)] for part in named]
+        assert sorted(id for share in shares for id in share) == sorted(whole)
+        assert max(map(len, shares)) - min(map(len, shares)) <= 1
+    rest = [task for task in tasks if task.stage == stage and task.id not in whole]
+    own = {task.id for task in tasks if task.stage == stage}
+    assert all(task.timed or own & set(task.needs) for task in rest)
+    assert bool(rest) == (stage == "bench")

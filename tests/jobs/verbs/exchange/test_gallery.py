@@ -3,7 +3,7 @@ import shutil
 
 import pytest
 
-import jobs.verbs.gallery
+import jobs.verbs.show
 import reports.exports.gallery
 from reports.exports.gallery import FIBRES, Card, gallery_page
 from tests.browser import opened
@@ -22,7 +22,7 @@ def test_the_site_has_every_file_that_it_names(twillight, refused, monkeypatch, 
         return path
 
     monkeypatch.setattr(reports.exports.gallery, "export", export)
-    monkeypatch.setattr(jobs.verbs.gallery, "write_swatch", swatch)
+    monkeypatch.setattr(jobs.verbs.show, "write_swatch", swatch)
     own = load_fabric("gauze").model_copy(update={"name": "own", "source": "<b>mine</b>"})
     (tmp_path / "own.toml").write_text(own.to_toml(), encoding="utf-8")
     code, text, _ = twillight("gallery", "voile", "own.toml", "--out", "site", "--size", "64", "--language", "glsles")

@@ -1,10 +1,12 @@
-"""Images of the truth of one fabric, which other measurements and the page read; all recipes and models share them."""
+"""Measurements of the truth itself: images of one fabric, which others and the page read, and studies."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Final, Literal, Self
 
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects
@@ -14,16 +16,21 @@ from jobs.recipe.recipe import Recipe
 from pipeline import versions
 from pipeline.scenes.options import View, ViewOptions
 from pipeline.truth.options import TruthOptions
-from reports.options import EdgeOptions, FrameOptions, PictureOptions, select
+from reports.options import EdgeOptions, FrameOptions, PictureOptions, StudyName, select
 from reports.page.content import PictureFile
 from weaves.fabric import Fabric
 
+if TYPE_CHECKING:
+    from reports.record import Record
+
 _START = 0.3  # seconds of any image
 _LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 37.0, 512, 5
+_UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced", "measured_cloth")
+_LONG: Final[dict[StudyName, float]] = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0, "measured_cloth": 840.0}
 
 
 class _OfFabric(Measurement):
-    """Images of one measured fabric, as one file."""
+    """Images of one measured fabric, as one file; all recipes and models share them."""
 
     code: ClassVar = ("truth", "bench")
     endings: ClassVar = (".exr",)
@@ -31,7 +38,6 @@ class _OfFabric(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield the images of all named fabrics."""
         for fabric, _ in subjects.fabrics:
             yield from cls.of(fabric, subjects.recipe)
 
@@ -49,7 +55,6 @@ class TruthPicture(_OfFabric):
     extent: tuple[int, int]
     """Width and height in pixels."""
     view: ViewOptions
-    """Camera, light and scale."""
     truth: TruthOptions
     seed: int
     """Seed of the truth's points."""
@@ -70,7 +75,7 @@ class TruthPicture(_OfFabric):
     def cost(self) -> float:
         """Estimated seconds on one core."""
         answers = TruthCost(self.truth, self.fabric)
-        return _START + answers.bounces + answers.table + self.extent[0] * self.extent[1] * answers.row()
+        return _START + answers.bounces + answers.table + math.prod(self.extent) * answers.row()
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render it."""
@@ -92,7 +97,6 @@ class TruthFrames(_OfFabric):
 
     kind: Literal["truth frames"] = "truth frames"
     options: FrameOptions
-    """Options of the frames and of the truth."""
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
@@ -102,9 +106,8 @@ class TruthFrames(_OfFabric):
     @property
     def cost(self) -> float:
         """Estimated seconds on one core."""
-        width, height = self.options.frame_size
         answers = TruthCost(self.options.frame_truth, self.fabric)
-        return _START + answers.table + width * height * self.options.frames * answers.row()
+        return _START + answers.table + math.prod(self.options.frame_size) * self.options.frames * answers.row()
 
     def run(self, out: Path, progress: Progress) -> None:
         """Render them."""
@@ -118,7 +121,6 @@ class TruthEdge(_OfFabric):
 
     kind: Literal["truth edge"] = "truth edge"
     options: EdgeOptions
-    """Cylinder, camera, light and truth."""
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
@@ -159,8 +161,7 @@ class LivePage(_OfFabric):
 
     def versions(self) -> dict[str, int]:
         """Return the versions of the truth, of the models that it shows, and of the page."""
-        shown = ("soft_nodes", "map_material")
-        models = {name: versions.MODELS.get(name, 1) for name in shown}
+        models = {name: versions.MODELS.get(name, 1) for name in ("soft_nodes", "map_material")}
         return {"truth": versions.TRUTH, "viewer": versions.VIEWER} | models
 
     def run(self, out: Path, progress: Progress) -> None:
@@ -168,3 +169,36 @@ class LivePage(_OfFabric):
         from reports.viewer.view import write_page
 
         write_page(self.fabric, out / self.products[0], self.pixels)
+
+
+class Study(Measurement):
+    """A module of `reports.truth`: all that its ``measure`` yields becomes Records; no data set is read."""
+
+    kind: Literal["study"] = "study"
+    code: ClassVar = ("truth", "bench")
+    study: StudyName
+
+    @classmethod
+    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
+        """Yield those that the recipe names."""
+        for name in subjects.recipe.bench.studies:
+            yield cls(study=name)
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return _LONG.get(self.study, 40.0)
+
+    @property
+    def slots(self) -> Literal["one", "all"]:
+        """All where times are among the results."""
+        return "one" if self.study in _UNTIMED else "all"
+
+    def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure it.
+
+        BadInput if Mitsuba is not installed; WorkFailed if an expression of `stability` exceeds its limit.
+        """
+        module = import_module(f"reports.truth.{self.study}")
+        records: list[Record] = module.RECORDS.to_records(module.measure())
+        return records
