@@ -34,16 +34,13 @@ def test_every_row_once_in_tasks_of_shard_rows(tasks):
     assert rows == named | {(f"random_00{index}", "train"): 800 for index in range(3)}
 
 
-def test_plans_are_pure_and_in_order_of_need_and_no_two_tasks_write_one_file(files, tasks):
+def test_plans_are_pure_in_order_of_need_with_ids_of_what_tasks_compute_and_a_file_for_each_task(files, tasks):
     assert [task.id for task in tasks] == [task.id for task in plan(load_recipe(files.write()))]
     before, written = set(), set()
     for task in tasks:
         assert before.issuperset(task.needs) and task.id not in before and written.isdisjoint(task.products)
         before.add(task.id)
         written.update(task.products)
-
-
-def test_the_ids_of_a_plan_are_those_of_what_its_tasks_compute(tasks):
     assert [task.id for task in tasks] == [fingerprint([task.stage, task.identity()]) for task in tasks]
 
 

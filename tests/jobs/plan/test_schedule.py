@@ -30,17 +30,14 @@ def shards_and_net(count, length):
     return tasks, of(tasks, [1.0] * count + [length])
 
 
-def test_a_long_task_at_the_end_is_the_tail_and_tasks_that_measure_time_run_one_by_one():
+def test_a_long_task_at_the_end_is_the_tail_and_doubling_ends_where_it_saves_little():
     tasks, seconds = shards_and_net(8, 10.0)
     found = Schedule.of(tasks, seconds, 4)
     assert (found.makespan, found.tail) == (12.0, 10.0) and max(chains(tasks, seconds).values()) == 11.0
     assert Schedule.of(tasks[-1:], seconds, 4).makespan == 10.0  # what it needs is done
     tasks = [Step(name="a"), Step(name="b"), Alone(name="c"), Alone(name="d")]
     assert Schedule.of(tasks, of(tasks, [1.0, 1.0, 5.0, 5.0]), 8).makespan == 11.0
-
-
-def test_doubling_ends_where_it_saves_little():
-    """The last saves 3.7 %."""
+    # The last saves 3.7 %.
     found = doublings(*shards_and_net(64, 100.0))
     assert [one.makespan for one in found] == [164.0, 132.0, 116.0, 108.0, 104.0]
     (nothing,) = doublings([], {})
@@ -60,7 +57,7 @@ def costly(name, seconds, needs=()):
     return task(name, Costly, needs, seconds=seconds)
 
 
-def test_a_kind_takes_what_its_tasks_took_and_others_what_their_stage_took():
+def test_a_kind_takes_what_its_tasks_took_others_what_their_stage_took_and_one_wrong_cost_moves_little():
     estimate, first, other = Estimate(), costly("a 1", 100.0), costly("b 1", 100.0)
     assert estimate.seconds(first) == 100.0
     for _ in range(20):
@@ -70,10 +67,7 @@ def test_a_kind_takes_what_its_tasks_took_and_others_what_their_stage_took():
     for _ in range(2):
         estimate.learn(other, 100.0)
     assert estimate.seconds(other) == pytest.approx(100.0, rel=0.02)
-
-
-def test_one_wrong_cost_moves_no_other_kind_by_much():
-    """A second that took ten minutes, among tasks that took what they cost."""
+    # A second that took ten minutes, among tasks that took what they cost.
     estimate = Estimate()
     for number in range(10):
         estimate.learn(costly(f"a {number}", 5.0), 5.0)

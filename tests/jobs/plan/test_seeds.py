@@ -63,7 +63,7 @@ def test_errors_are_measured_of_every_training(one, three, kind):
     assert len({task.title for same in after.values() for task in same}) == 3 * len(before[0])
 
 
-def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, three):
+def test_times_latents_pictures_and_runtimes_are_of_the_first_training_and_bounds_of_every_one(one, three, files):
     """And errors by size, which are measured with its times."""
     assert not of(one, ErrorsBySize) and list(of(three, ErrorsBySize)) == [1, 2]
     for kind in (TimeOfMethods, FrameTime, Latents):
@@ -73,9 +73,6 @@ def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, thre
         assert {bool(task.pictures) for task in of(three, kind)[0]} == {True}
         assert {bool(task.pictures) for seed in (1, 2) for task in of(three, kind)[seed]} == {False}
     assert {seed: same[0].ways.runtimes for seed, same in of(three, OnFabric).items()} == {0: ("onnx",), 1: (), 2: ()}
-
-
-def test_the_bound_is_measured_of_every_training(three, files):
     tasks = files.exchange("frames = 4", "frames = 4\nbounds = true").plan()
     bounds = {seed: {task.ways.bounds for task in same} for seed, same in of(tasks, OnFabric).items()}
     assert bounds == {0: {True}, 1: {True}, 2: {True}}

@@ -43,14 +43,11 @@ def test_estimates_are_scaled_by_what_was_measured(files, out):
     assert facts.seconds[training.id] > 2 * training.cost  # another stage, of which nothing was done
 
 
-def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, call):
+def test_schedules_are_of_the_wished_number_of_workers_and_a_price_of_each_core_hour_that_is_left(files, out, call):
     code, told, _ = call("plan", files.write(), "--workers", "3")
     assert code == 0
     for part in ("3 workers: ", "workers save less than 5%", "durations are measured"):
         assert part in told
-
-
-def test_a_price_is_of_each_core_hour_that_is_left(files, out, call):
     costs = []
     for price in (1000, 2000):
         told = call("plan", files.write(), "--price", price)[1]

@@ -42,7 +42,12 @@ def require(tmp_path, call, refused):
     return require
 
 
-def test_the_wish_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, monkeypatch):
+def test_a_wish_for_a_method_or_an_error_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, monkeypatch):
+    code, text, _ = require("--method", "woven", "--effort", ".5", "--set", "hidden=16")
+    assert code == 0 and "(from its footprints)" in text
+    own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
+    assert own.models[0].options.model == "woven" and own.models[0].options.hidden == 16
+    assert own.models[0].training.steps == 200 and own.dataset.rows.train == 4096
     code, text, _ = require("--error", ".3")
     assert code == 0 and "denim 100 %" in text and "light from behind 0.0 %" in text
     # 16 points err .2 and take less time than woven does.
@@ -50,14 +55,6 @@ def test_the_wish_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, 
     own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
     assert own.models[0].options.counts == [16] and [fabric.name for fabric in own.fabrics] == ["denim"]
     assert own.bench.scenes.names == ("plane",) and own.bench.scenes.size == (24, 18)
-
-
-def test_a_method_may_be_wished_for(require, tmp_path):
-    code, text, _ = require("--method", "woven", "--effort", ".5", "--set", "hidden=16")
-    assert code == 0 and "(from its footprints)" in text
-    own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
-    assert own.models[0].options.model == "woven" and own.models[0].options.hidden == 16
-    assert own.models[0].training.steps == 200 and own.dataset.rows.train == 4096
 
 
 def test_what_lies_beyond_the_general_domain_counts_as_the_fallbacks(require, monkeypatch):

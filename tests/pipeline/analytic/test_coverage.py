@@ -57,16 +57,13 @@ def test_closed_form_along_half_cylinders():
             np.testing.assert_allclose(quick_coverage(CORDUROY, asked), truth, atol=allowed)
 
 
-def test_what_needs_no_ray():
+def test_rows_are_answered_one_by_one_and_some_need_no_ray():
     fabric = load_fabric("denim")
     asked = looks(fabric, 40, (0.1, 9.0), (0.01, 1.0))
     assert (quick_coverage(fabric, asked._replace(curvature=np.zeros(40, np.float32))) == 1).all()
     assert (quick_coverage(fabric, asked._replace(wo=asked.wo * np.float32([1, 1, -1]))) == 0).all()
     assert (quick_coverage(fabric, asked._replace(wo=np.tile(np.float32([0.6, 0, 0.8]), (40, 1)))) < 1).sum() == 0
     assert (quick_coverage(fabric, asked._replace(wo=np.tile(np.float32([0, 0, 1]), (40, 1)))) == 1).all()
-
-
-def test_rows_are_answered_one_by_one():
     fabric = load_fabric("silk_charmeuse")
     asked = looks(fabric, 60, (0.05, 20.0), (0.01, 1.0))
     whole = quick_coverage(fabric, asked)

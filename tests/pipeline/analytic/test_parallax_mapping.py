@@ -29,7 +29,7 @@ def test_on_a_slope_the_place_is_known(theta, phi):
         np.testing.assert_allclose(displaced(maps, u, v, 0.1, wo), expected, atol=1e-4)
 
 
-def test_what_is_nearer_hides_what_is_behind_it():
+def test_what_is_nearer_hides_what_is_behind_it_and_rays_from_above_stay():
     """A ridge .5 high: a ray that comes down behind it ends on it; one that clears it ends on the ground."""
     heights = np.zeros((TEXELS, TEXELS))
     heights[:, 256:288] = 0.5  # x from 8 to 9
@@ -43,9 +43,6 @@ def test_what_is_nearer_hides_what_is_behind_it():
     assert abs(before - 9.1) < 0.05
     clear, _ = displaced(maps, 7.0, 3.0, 0.03, wo)
     assert abs(clear - 7.0) < 0.01
-
-
-def test_rays_of_the_fabric_plane_and_from_above_stay():
     fabric = woven("denim")
     ends, picks = fabric.weave.repeat
     x, y = (np.arange(64) + 0.5) * ends / 64, (np.arange(64) + 0.5) * picks / 64

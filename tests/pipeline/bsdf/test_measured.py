@@ -58,10 +58,16 @@ def test_a_table_that_cannot_be_used_is_refused_in_one_sentence(columns, sentenc
         read_bsdf(tmp_path / "rows.parquet")
 
 
-def test_one_row_is_one_pair(tmp_path):
+def test_one_row_is_one_pair_and_blocks_that_a_file_lacks_are_not_known(tmp_path):
     pq.write_table(table(), tmp_path / "rows.parquet")
     blocks = read_bsdf(tmp_path / "rows.parquet").bands["visible"]
     assert np.isfinite(blocks).sum() == 1 and blocks.shape == (2, 2, 41, 41)
+    write_klems(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
+    path.write_text(path.read_text().replace("Reflection Back", "Reflection Front"))
+    blocks = read_bsdf(path).bands["visible"]
+    assert np.isnan(blocks[SCATTERED.index("reflection"), FACES.index("back")]).all()
+    with pytest.raises(BadInput, match="no such file"):
+        read_bsdf(tmp_path / "none.xml")
 
 
 @pytest.mark.parametrize(
@@ -80,12 +86,3 @@ def test_an_xml_file_that_cannot_be_used_is_refused_in_one_sentence(old, new, se
     path.write_text(path.read_text().replace(old, new))
     with pytest.raises(BadInput, match=re.escape(sentence)):
         read_bsdf(path)
-
-
-def test_blocks_that_a_file_lacks_are_not_known(tmp_path):
-    write_klems(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
-    path.write_text(path.read_text().replace("Reflection Back", "Reflection Front"))
-    blocks = read_bsdf(path).bands["visible"]
-    assert np.isnan(blocks[SCATTERED.index("reflection"), FACES.index("back")]).all()
-    with pytest.raises(BadInput, match="no such file"):
-        read_bsdf(tmp_path / "none.xml")

@@ -38,7 +38,7 @@ def maps_of(pattern, sheen=SHEEN):
     return tabulate(level, MATERIAL, shown, sheen, SPECULAR, LEVEL_GROUND), normal, fibre
 
 
-def test_one_material_is_the_sum_of_its_lobes():
+def test_one_material_is_the_sum_of_its_lobes_and_passes_light_by_the_transmitted_colour():
     maps, normal, fibre = maps_of(np.full((8, 8), 0.75))
     frame = np.stack([fibre, np.cross(normal, fibre), normal])
     wi, wo = even_sky(64), np.array([0.3, -0.2, 0.9])
@@ -59,9 +59,6 @@ def test_one_material_is_the_sum_of_its_lobes():
     specular = (under * lobe[:, None] * f0 / f0.sum() + sheen[:, :2]) / SPECULAR
     base = under * ((1 - fresnel) * cosine)[:, None] * (0.3, 0.2) / math.pi + sheen[:, 2:]
     np.testing.assert_allclose(found, 0.75 * np.concatenate([specular, base], axis=1), rtol=2e-3)
-
-
-def test_light_from_behind_passes_by_the_transmitted_colour():
     maps, normal, _ = maps_of(np.ones((8, 8)), np.zeros(4))
     wi = np.array([[0.0, 0.6, -0.8]])
     found = answer(maps, Queries.round(*np.zeros((2, 1)), np.ones(1), wi, np.array([[0.0, 0.0, 1.0]])))

@@ -19,16 +19,13 @@ def test_maps_tile_without_a_seam(name):
         np.testing.assert_allclose(two, np.tile(one, (2, 2, *[1] * (one.ndim - 2))), atol=1e-5)
 
 
-def test_means_over_the_map_are_kept_by_every_level():
+def test_means_over_the_map_are_kept_by_every_level_and_coverage_is_the_area_of_the_yarns():
     level = planes(load_fabric("gauze"), layout(load_fabric("gauze"), 64), SHARE)
     means = [plane.mean(axis=(0, 1)) for plane in level]
     while level.coverage.size > 1:
         level = level.halved()
         for plane, mean in zip(level, means, strict=True):
             np.testing.assert_allclose(plane.mean(axis=(0, 1)), mean, rtol=1e-4, atol=1e-6)
-
-
-def test_coverage_is_the_area_of_the_yarns():
     fabric = load_fabric("gauze")
     level = planes(fabric, layout(fabric, 256), SHARE)
     open_area = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width)

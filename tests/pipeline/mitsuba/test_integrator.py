@@ -69,7 +69,7 @@ def test_first_footprints_are_those_of_the_gbuffer(scalar):
         np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=2e-2)
 
 
-def test_a_bounce_widens_the_footprint(scalar):
+def test_a_bounce_widens_the_footprint_and_a_rare_direction_no_more_than_an_even_one(scalar):
     """A ray straight down four units to a floor and up again two units to a ceiling of side 2, u from 0 to 1. Its cone
     is PIXEL * .01 wide for every unit of way; the bounce, of density 3, adds 2 / sqrt(4 pi 3)."""
     import drjit as dr
@@ -94,9 +94,6 @@ def test_a_bounce_widens_the_footprint(scalar):
         wanted = math.hypot(PIXEL * 0.06, widened) / 2.0
         found = Footprints.of(jacobian(met))
         np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=1e-3)
-
-
-def test_a_rare_direction_widens_no_more_than_an_even_one(scalar):
     import drjit as dr
 
     cone = _Cone(scalar, dr)

@@ -14,7 +14,7 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-def test_the_viewer_is_mitsubas_wi():
+def test_the_viewer_is_mitsubas_wi_and_a_turned_cloth_is_the_cloth_seen_from_elsewhere():
     """Cotton twill, whose twisted yarns tell light from viewer: swapped, the answer is another one."""
     viewer, light = unit(20.0, 15.0), unit(65.0, 130.0)
     cloth, bsdf = worn_of("cotton_twill"), PatchBSDF(load_fabric("cotton_twill"))
@@ -24,19 +24,16 @@ def test_the_viewer_is_mitsubas_wi():
     )
     np.testing.assert_allclose(value, right, rtol=1e-5)
     assert np.abs(right / swapped - 1.0).min() > 0.2
-
-
-VIEWER, LIGHT = unit(30.0, 40.0), unit(50.0, 200.0)[None]
-
-
-def test_a_turned_cloth_is_the_cloth_seen_from_elsewhere_and_left_handed_uv_count_v_backwards():
-    """Turned by 90 degrees, u runs along the warp's opposite: (u, v) is (v, -u) in yarns, and so are directions."""
+    # Turned by 90 degrees, u runs along the warp's opposite: (u, v) is (v, -u) in yarns, and so are directions.
     turned = worn_of("denim", turn=90.0).eval(hits_of(VIEWER), LIGHT)
     around = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1.0]])
     plain = worn_of("denim").eval(hits_of(around @ VIEWER, 1, uv=(0.0057, -0.0062)), LIGHT @ around.T)
     np.testing.assert_allclose(turned, plain, rtol=1e-4)
     left = worn_of("denim").eval(hits_of(VIEWER, uv=(0.0062, -0.0057), handed=np.array([-1.0])), LIGHT)
     np.testing.assert_allclose(left, worn_of("denim").eval(hits_of(VIEWER), LIGHT), rtol=1e-6)
+
+
+VIEWER, LIGHT = unit(30.0, 40.0), unit(50.0, 200.0)[None]
 
 
 def test_derivatives_are_in_yarns_of_both_sides_and_a_pixels_angle_stands_for_them():
@@ -90,7 +87,7 @@ def test_points_are_drawn_anew_for_each_direction():
     np.testing.assert_array_equal(one, cloth.eval(hits, first)[:, 1])
 
 
-def test_axes_are_singular_vectors_and_deviations_singular_values():
+def test_axes_are_singular_vectors_and_a_footprint_without_derivatives_is_the_largest():
     jacobian = np.random.default_rng(0).standard_normal((500, 2, 2))
     found = Footprints.of(jacobian)
     vectors, sizes, _ = np.linalg.svd(jacobian)
@@ -102,9 +99,6 @@ def test_axes_are_singular_vectors_and_deviations_singular_values():
     turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
     found = Footprints.of((turn @ np.diag([10.0, 1e-5]))[None])
     np.testing.assert_allclose([found.sigma[0], found.sigma_minor[0], found.angle[0]], [5.0, 5e-6, 0.3], rtol=1e-5)
-
-
-def test_a_footprint_without_derivatives_is_the_largest():
     for lost in (np.nan, np.inf, 1e30):
         assert Footprints.of(np.array([[[lost, 0.0], [0.0, 1.0]]])).sigma[0] == LARGEST_FOOTPRINT
     found = Footprints.round(np.array([0.5, 1e9, 0.0]))

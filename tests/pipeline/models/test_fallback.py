@@ -120,10 +120,21 @@ def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
     assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
 
 
-def test_yarns_unlike_those_trained_on_are_left_to_the_fallback():
+def test_yarns_and_steep_cloth_unlike_those_trained_on_are_left_to_the_fallback():
     fallback, queries = fallback_of(DENIM, {}), draw_queries(QueryOptions(sigma=(0.5, 1.0)), (4, 4), 3, 0, 20)
     assert not fallback.out_of_domain(DENIM, queries).any() and fallback.out_of_domain(ROUGH, queries).all()
     np.testing.assert_array_equal(fallback.predict(ROUGH, queries), fallback_answers(ROUGH, queries, 0))
+    # The scenes' drape bends up to 1 a yarn; `curved` knows up to .5, and refuses beyond.
+    about, options = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}, SMALL["curved"]
+    network = CurvedNetwork(options, DENIM.weave.repeat)
+    method = Curved({fingerprint(DENIM.optics()): network}, Domain.of(about, [DENIM]))
+    queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), DENIM.weave.repeat, 3, 0, 40)
+    fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
+    assert steep.any() and not steep.all()
+    np.testing.assert_array_equal(fallback.out_of_domain(DENIM, queries), steep)
+    answers = fallback.predict(DENIM, queries)
+    np.testing.assert_array_equal(answers[~steep], method.predict(DENIM, queries.take(~steep)))
+    np.testing.assert_array_equal(answers[steep], fallback_answers(DENIM, queries.take(steep), 0))
 
 
 @pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT_TURN, 0.03), (3.0 * FLAT_TURN, 0.1)])
@@ -175,17 +186,3 @@ def test_plain_queries_are_the_methods_alone(rows):
     np.testing.assert_array_equal(fallback.predict(fabric, queries), sums.predict(fabric, queries))
     assert (fallback.name, fallback.setting) == (sums.name, sums.setting)
     assert fallback.bytes_stored(fabric) == sums.bytes_stored(fabric)
-
-
-def test_cloth_steeper_than_was_taught_is_left_to_the_fallback():
-    """The scenes' drape bends up to 1 a yarn; `curved` knows up to .5, and refuses beyond."""
-    about, options = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}, SMALL["curved"]
-    network = CurvedNetwork(options, DENIM.weave.repeat)
-    method = Curved({fingerprint(DENIM.optics()): network}, Domain.of(about, [DENIM]))
-    queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), DENIM.weave.repeat, 3, 0, 40)
-    fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
-    assert steep.any() and not steep.all()
-    np.testing.assert_array_equal(fallback.out_of_domain(DENIM, queries), steep)
-    answers = fallback.predict(DENIM, queries)
-    np.testing.assert_array_equal(answers[~steep], method.predict(DENIM, queries.take(~steep)))
-    np.testing.assert_array_equal(answers[steep], fallback_answers(DENIM, queries.take(steep), 0))

@@ -85,7 +85,7 @@ def same(table, answers, rows=slice(None)):
         np.testing.assert_array_equal(table[name].to_numpy()[rows], column)
 
 
-def test_the_answers_are_those_of_estimate_and_other_columns_are_carried_along(case):
+def test_the_answers_are_those_of_estimate_and_a_result_read_alone_is_understood(case):
     columns = query_columns()
     tags = pa.array([f"tag {k % 3}" for k in range(ROWS)]).dictionary_encode()
     nested = pa.array([[k] if k % 2 else None for k in range(ROWS)])
@@ -96,9 +96,6 @@ def test_the_answers_are_those_of_estimate_and_other_columns_are_carried_along(c
     assert table.select(given.column_names).combine_chunks().cast(given.schema).equals(given)
     same(table, expected(columns))
     assert (summary.rows, summary.bad) == (ROWS, 0) and summary.points == table["count"].to_numpy().sum()
-
-
-def test_a_result_read_alone_is_understood(case):
     case.write(query_columns(3)).run()
     schema = case.result().schema
     about = json.loads(schema.metadata[b"twillight"])
@@ -197,7 +194,7 @@ def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, mo
     assert max(asked) == 16 and sum(asked) == ROWS + 2  # two for the compiler, outside the clock
 
 
-def test_single_precision_and_missing_columns_are_what_they_stand_for(case):
+def test_single_precision_and_missing_columns_are_what_they_stand_for_and_places_far_off_keep_their_digits(case):
     columns = query_columns()
     case.write(columns).run()
     table = case.result()
@@ -209,9 +206,6 @@ def test_single_precision_and_missing_columns_are_what_they_stand_for(case):
     # An own shape is no default.
     case.write(full | {"sigma_minor": single["sigma"] * 0.5, "angle": np.ones(ROWS)}).run()
     assert not case.result()["diffuse_warp"].equals(table["diffuse_warp"])
-
-
-def test_places_far_off_keep_their_digits_in_double_precision(case):
     columns = query_columns()
     columns["u"], columns["v"] = (np.round(columns[name] * 2**20) / 2**20 for name in ("u", "v"))
     case.write(columns).run()

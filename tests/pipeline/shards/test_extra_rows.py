@@ -26,7 +26,7 @@ def test_samples_are_the_truth_at_the_texels():
     assert np.ptp(answers.mean, axis=0).max() > 0.1 * answer.mean.max()
 
 
-def test_all_texels_of_a_fabric_are_seen_under_directions_of_their_own():
+def test_all_texels_are_seen_under_directions_of_their_own_that_fabric_and_seed_choose():
     lining, basket = (queries_of(SAMPLES.answer(fabric, 0, SAMPLES.count(fabric))) for fabric in (LINING, BASKET))
     rows, columns = SAMPLES.grid(LINING)
     assert SAMPLES.count(LINING) == 4 * rows * columns == 4 * 16
@@ -35,6 +35,9 @@ def test_all_texels_of_a_fabric_are_seen_under_directions_of_their_own():
         assert (by_sample == by_sample[:, :1]).all()
         assert len(np.unique(by_sample[:, 0], axis=0)) == 4
     assert not np.isin(lining.wi, basket.wi).any()
+    cases = (OPACITY, DENIM), (OPACITY, BASKET), (OPACITY.model_copy(update={"seed": 1}), DENIM)
+    drawn = [rows.answer(fabric, 0, 16)["sigma"] for rows, fabric in cases]
+    assert len(np.unique(np.concatenate(drawn))) == 48
 
 
 def test_rows_are_the_same_in_any_cut_and_for_any_number_of_samples():
@@ -73,9 +76,3 @@ def test_grazing_rows_are_mean_and_variance_of_cosines(footprint):
     limit = 5 * np.sqrt(2 / 64) * cosines.std(axis=1)
     assert (np.abs(column["grazing_mean"] - cosines.mean(axis=1)) < limit).all()
     assert column["grazing_variance"].mean() == pytest.approx(cosines.var(axis=1).mean(), rel=0.2)
-
-
-def test_fabrics_and_seeds_draw_other_queries():
-    cases = (OPACITY, DENIM), (OPACITY, BASKET), (OPACITY.model_copy(update={"seed": 1}), DENIM)
-    drawn = [rows.answer(fabric, 0, 16)["sigma"] for rows, fabric in cases]
-    assert len(np.unique(np.concatenate(drawn))) == 48

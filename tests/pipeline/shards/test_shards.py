@@ -51,12 +51,15 @@ def test_the_same_task_gives_the_same_bytes_and_the_same_rows_in_any_cut(folder)
         np.testing.assert_array_equal(whole[20:30], part)
 
 
-def test_a_shard_explains_itself(folder):
+def test_a_shard_explains_itself_and_splits_and_fabrics_draw_different_queries(folder):
     about = read_about(folder / "part-a.parquet")
     assert about["task"]["truth"]["normaliser"] == "visible"
     assert b"signed" in pq.read_schema(folder / "part-a.parquet").field("wi_z").metadata[b"meaning"]
     group = pq.read_metadata(folder / "part-a.parquet").row_group(0)
     assert {group.column(column).compression for column in range(group.num_columns)} == {"ZSTD"}
+    generate_shard(TASK.model_copy(update={"split": "train"}), folder / "train.parquet")
+    first, second = (read_shard(folder / name)[0] for name in ("part-a.parquet", "train.parquet"))
+    assert not np.intersect1d(first.u, second.u).size
 
 
 def test_identity_follows_optics_and_parameters_and_not_colours():
@@ -70,12 +73,6 @@ def test_identity_follows_optics_and_parameters_and_not_colours():
         assert task.model_copy(update={"fabric": rough}).identity() != task.identity()
         assert task.model_copy(update={"start": 1}).identity() != task.identity() and "version" in task.identity()
     assert len({json.dumps(task.identity()) for task in extra}) == len({task.split for task in extra}) == 3
-
-
-def test_splits_and_fabrics_draw_different_queries(folder):
-    generate_shard(TASK.model_copy(update={"split": "train"}), folder / "train.parquet")
-    first, second = (read_shard(folder / name)[0] for name in ("part-a.parquet", "train.parquet"))
-    assert not np.intersect1d(first.u, second.u).size
 
 
 def flipped(content, position):

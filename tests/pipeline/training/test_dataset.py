@@ -13,7 +13,7 @@ from tests.datasets import write_dataset
 from weaves.errors import BadInput
 
 
-def test_order_is_a_function_of_seed_and_step():
+def test_order_is_a_function_of_seed_and_step_and_few_rows_are_repeated():
     forwards = Order([[100], [50], [70]], batch=32, fabrics=2, seed=7)
     steps = [forwards.step(step) for step in range(40)]
     for step in (39, 0, 17):  # another order of asking, another object
@@ -21,6 +21,9 @@ def test_order_is_a_function_of_seed_and_step():
         np.testing.assert_array_equal(fabrics, steps[step][0])
         np.testing.assert_array_equal(rows, steps[step][1])
     assert not np.array_equal(Order([[100], [50], [70]], 32, 2, seed=8).step(0)[1], steps[0][1])
+    assert sorted(np.bincount(Order([[3]], batch=8, fabrics=1, seed=0).step(0)[1][0])) == [2, 3, 3]
+    order = Order([[10], [10]], batch=9, fabrics=8, seed=0)
+    assert (order.fabrics, order.each) == (2, 4)
 
 
 @pytest.mark.parametrize("windows", [[48], [16, 32], [16, 16, 16]])
@@ -38,12 +41,6 @@ def test_every_round_visits_every_fabric_and_every_epoch_every_row_once(windows)
         assert sorted(seen[0]) == sorted(seen[1]) == list(range(48))
         epochs += seen.values()
     assert len(set(map(tuple, epochs))) == 6
-
-
-def test_few_rows_are_repeated_and_no_more_fabrics_taken_than_there_are():
-    assert sorted(np.bincount(Order([[3]], batch=8, fabrics=1, seed=0).step(0)[1][0])) == [2, 3, 3]
-    order = Order([[10], [10]], batch=9, fabrics=8, seed=0)
-    assert (order.fabrics, order.each) == (2, 4)
 
 
 def test_batches_hold_the_rows_of_their_fabrics():
@@ -176,15 +173,12 @@ def test_the_order_is_that_of_the_files_or_of_the_seed_and_changes_with_each_pas
     assert sorted(rows_in(workers)) == sorted(expected(folder))
 
 
-def test_rows_are_shuffled_well_within_a_shard(folder):
+def test_rows_are_shuffled_well_within_a_shard_and_columns_are_tensors_of_their_own_type(folder):
     """The mean place of the first half of a shard's rows is that of all, within 5 standard errors."""
     (batch,) = stream(folder, names=NAMES[:1], rows=ROWS)
     order = {u: place for place, u in enumerate(Manifest.load(folder).read(folder, NAMES[0], "train")[0].u.tolist())}
     places = np.array([order[u] for u in batch["u"].tolist()])
     assert abs(places[: ROWS // 2].mean() - (ROWS - 1) / 2) < 5 * ROWS / np.sqrt(12 * ROWS / 2)
-
-
-def test_columns_are_tensors_of_their_own_type(folder):
     batch = next(iter(stream(folder, rows=7)))
     others = {name: values.dtype for name, values in batch.items() if values.dtype != torch.float32}
     assert others == {"fabric": torch.int64, "count": torch.int32}

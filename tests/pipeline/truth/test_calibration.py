@@ -29,7 +29,7 @@ def test_every_answer_has_a_stage_and_both_errors(estimator):
     assert (answers.transparency_bound >= answers.transparency_standard_error).all()
 
 
-def test_a_component_that_no_point_has_shown_has_an_error():
+def test_components_that_no_point_has_shown_and_points_that_agree_on_a_gap_have_an_error():
     """One family of yarns fills a narrow footprint: the other one may still have been missed."""
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=(0.05, 0.08), max_angle=30.0), fabric.weave.repeat, 5, 0, 60)
@@ -39,10 +39,7 @@ def test_a_component_that_no_point_has_shown_has_an_error():
     unseen = (raw.mean[:, :4] == 0.0) & (size > 0.0)
     assert unseen.sum() > 20
     assert (raw.error[:, :4] >= size / 64 * (1 - 1e-12))[unseen].all()
-
-
-def test_points_that_agree_on_a_gap_have_an_error():
-    """Four stratified points in each randomisation often agree although a corner of a gap was met by none."""
+    # Four stratified points in each randomisation often agree although a corner of a gap was met by none.
     fabric, options = load_fabric("gauze"), fixed(64, "owen")
     queries = draw_queries(QueryOptions(sigma=(0.05, 0.3), max_angle=60.0), fabric.weave.repeat, 5, 0, 400)
     answers, exact = estimate(fabric, queries, options, 1), estimate(fabric, queries, fixed(4096, "owen"), 3)

@@ -80,7 +80,7 @@ def test_points_converge_by_their_order(estimator, low, high):
     assert low < order(counts, errors) < high, errors
 
 
-def test_cut_rules_converge_faster_than_uncut_ones():
+def test_cut_rules_converge_faster_than_uncut_ones_and_tables_with_their_nodes():
     """Nodes an axis 4, 8, 16, 32: a shadow's edge on a line that is not cut there errs by a node, of order 1."""
     model, columns = cloth_side(ROUND, TruthOptions()), columns_of(ASKED)
     levels, errors = np.arange(1, 5), {}
@@ -93,10 +93,7 @@ def test_cut_rules_converge_faster_than_uncut_ones():
     nodes = 2.0 ** (levels + 1)
     assert 0.5 < order(nodes, errors[9]) < 1.6, errors
     assert order(nodes, errors[2]) > 1.7 and errors[2][-1] < 0.2 * errors[9][-1], errors
-
-
-def test_tables_converge_with_their_nodes():
-    """A border of a shadow is placed between two nodes by their margins: of order 1 at least, 2 at best."""
+    # A border of a shadow is placed between two nodes by their margins: of order 1 at least, 2 at best.
     cloth, columns, index = cloth_side(ROUND, TruthOptions()), columns_of(ASKED), np.arange(len(ASKED.u))
     counts, errors = [8, 16, 32, 64], []
     for count in counts:

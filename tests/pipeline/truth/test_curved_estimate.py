@@ -103,7 +103,7 @@ def test_estimates_match_brute_force(name, curvature, light, viewer):
     assert swapped is None or (np.abs(swapped.mean / answers.mean - 1) > 0.1).any()
 
 
-def test_flat_is_the_limit_of_a_small_curvature():
+def test_flat_is_the_limit_of_a_small_curvature_and_a_low_light_reaches_more_of_curved_cloth():
     fabric = load_fabric("denim")
     for light in (60.0, 10.0, -35.0):
         flat, bent = (
@@ -113,10 +113,7 @@ def test_flat_is_the_limit_of_a_small_curvature():
         assert flat.mean.max() > 1e-4
         np.testing.assert_allclose(bent.mean, flat.mean, rtol=1e-4, atol=1e-7)
         np.testing.assert_allclose(bent.transparency, flat.transparency, rtol=1e-4)
-
-
-def test_a_low_light_reaches_more_of_a_cloth_the_more_it_is_curved():
-    """Diffuse light of a sun 3 degrees above and below the tangent plane, opposite the viewer."""
+    # Diffuse light of a sun 3 degrees above and below the tangent plane, opposite the viewer.
     fabric, wo = load_fabric("polyester_lining"), _direction(70, 180)
     for elevation in (3, -3):
         light = _direction(elevation, 0)

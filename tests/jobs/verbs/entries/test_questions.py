@@ -54,7 +54,7 @@ def test_the_questions_are_those_of_the_shards_without_their_answers(folder, rec
         np.testing.assert_array_equal(table[name].to_numpy()[64:128], drawn[name])
 
 
-def test_a_folder_has_all_that_is_known_of_the_fabrics_and_no_other_file(folder):
+def test_a_folder_has_all_that_is_known_of_the_fabrics_a_form_to_be_filled_in_and_no_other_file(folder):
     names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     listed = json.loads((folder / "questions.json").read_text())
     assert names == listed["files"].keys() | {"questions.json"}
@@ -73,6 +73,11 @@ def test_a_folder_has_all_that_is_known_of_the_fabrics_and_no_other_file(folder)
     words = (folder / "README.md").read_text(encoding="utf-8")
     assert "f_P ALREADY CONTAINS" in words.replace("`", "") and "Ids are 0 to 255" in words
     assert all(f"`{key}`" in words for key in Yarn.model_fields) and "{" not in words
+    text = (folder / FORM).read_text(encoding="utf-8")
+    blank = tomllib.loads(text)
+    assert blank.keys() == EntryForm.model_fields.keys() and text.count("\n# ") >= len(blank)
+    with pytest.raises(BadInput, match=r"name.*more"):
+        validated(EntryForm, blank, FORM)
 
 
 def test_the_same_recipe_gives_the_same_bytes_and_other_files_are_refused(folder, recipe, refused, call, tmp_path):
@@ -85,11 +90,3 @@ def test_the_same_recipe_gives_the_same_bytes_and_other_files_are_refused(folder
     assert "is not empty" in refused("questions", recipe, "--to", tmp_path / "mine")
     (folder / "questions.csv").write_text("id\n")
     assert "was changed" in refused("questions", recipe, "--to", folder)
-
-
-def test_a_form_that_is_not_filled_in_is_refused_and_every_field_says_what_is_allowed(folder):
-    text = (folder / FORM).read_text(encoding="utf-8")
-    blank = tomllib.loads(text)
-    assert blank.keys() == EntryForm.model_fields.keys() and text.count("\n# ") >= len(blank)
-    with pytest.raises(BadInput, match=r"name.*more"):
-        validated(EntryForm, blank, FORM)

@@ -108,20 +108,6 @@ def test_footprints_at_an_angle(name, bound):
     assert colour_error(read_queries(table, rounded).components, truth) > 1.5 * wrong
 
 
-def test_long_footprints_and_low_viewers_are_cut():
-    """A footprint longer than LONGEST and narrow across, or a viewer in the plane, answers as the nearest known one."""
-    table, up = tabulate(load_fabric("denim")), [0.0, 0.0, 1.0]
-    for angle in (0.0, 0.3, math.pi / 2):
-        long = Queries.round([0.3] * 2, [0.4] * 2, [1e4, 48.0], [up] * 2, [[0.6, 0.0, 0.8]] * 2)
-        sums, _ = query_sums(table, long._replace(sigma_minor=np.float32([0.1, 0.1]), angle=np.float32([angle] * 2)))
-        assert np.isfinite(sums).all()
-        if angle != 0.3:
-            np.testing.assert_allclose(sums[0], sums[1], rtol=1e-4, atol=1e-6)
-    low = [[math.cos(x), 0.0, math.sin(x)] for x in (1e-5, 0.01745415)]
-    sums, _ = query_sums(table, Queries.round([0.3] * 2, [0.4] * 2, [0.1] * 2, [up] * 2, low))
-    np.testing.assert_allclose(sums[0], sums[1], rtol=1e-2, atol=1e-6)
-
-
 @pytest.mark.parametrize("width", [1.0, slow(0.7), slow(0.1)])
 def test_extremes_stay_finite_and_not_negative(width):
     fabric = woven("silk_charmeuse", roughness=0.01, bend=80.0, width=width)
@@ -177,9 +163,20 @@ def test_shadows_take_light_away(sigma):
         assert (sums[:, :, lit] >= 0.0).all() and (sums[:, :, lit] <= 1.001 * sums[:, :, whole] + 1e-7).all()
 
 
-def test_straight_from_above_the_whole_cloth_is_seen():
+def test_the_whole_cloth_is_seen_from_above_and_long_footprints_and_low_viewers_are_cut():
     """Under a wide footprint the projected area of all yarns is 1."""
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=SIZES["wide"]), fabric.weave.repeat, 6, 0, 100)
     sums, gaps = query_sums(tabulate(fabric), queries._replace(wo=np.tile(np.float32([0.0, 0.0, 1.0]), (100, 1))))
     np.testing.assert_allclose(sums[:, :, AREA].sum(axis=1) + gaps, 1.0, atol=1e-3)
+    # A footprint longer than LONGEST and narrow across, or a viewer in the plane, answers as the nearest known one.
+    table, up = tabulate(load_fabric("denim")), [0.0, 0.0, 1.0]
+    for angle in (0.0, 0.3, math.pi / 2):
+        long = Queries.round([0.3] * 2, [0.4] * 2, [1e4, 48.0], [up] * 2, [[0.6, 0.0, 0.8]] * 2)
+        sums, _ = query_sums(table, long._replace(sigma_minor=np.float32([0.1, 0.1]), angle=np.float32([angle] * 2)))
+        assert np.isfinite(sums).all()
+        if angle != 0.3:
+            np.testing.assert_allclose(sums[0], sums[1], rtol=1e-4, atol=1e-6)
+    low = [[math.cos(x), 0.0, math.sin(x)] for x in (1e-5, 0.01745415)]
+    sums, _ = query_sums(table, Queries.round([0.3] * 2, [0.4] * 2, [0.1] * 2, [up] * 2, low))
+    np.testing.assert_allclose(sums[0], sums[1], rtol=1e-2, atol=1e-6)

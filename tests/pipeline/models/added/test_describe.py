@@ -18,7 +18,7 @@ def path(tmp_path):
     return path
 
 
-def test_a_file_says_what_it_holds(path, monkeypatch):
+def test_a_file_says_what_it_holds_and_a_class_with_a_network_is_trained(path, monkeypatch):
     """A module of the current folder is its file."""
     found = describe(f"{path}:Theirs", {"rows": 9}, {"limit": 5.0})
     assert (found.name, found.stated, found.setting, found.kinds) == ("theirs", "2.1", "", {"stretch"})
@@ -27,9 +27,6 @@ def test_a_file_says_what_it_holds(path, monkeypatch):
     assert not list(path.parent.glob("__pycache__"))
     monkeypatch.chdir(path.parent)
     assert describe("theirs:Theirs", {"rows": 9}, {"limit": 5.0}) == found
-
-
-def test_a_class_with_a_network_is_trained(path):
     assert not describe(f"{path}:Theirs", {}, {}).learns
     path.write_text(METHOD + TRAINED)
     method = describe(f"{path}:Theirs", {}, {})

@@ -142,16 +142,13 @@ def test_weights_are_loaded_into_the_method(theirs):
     assert (method.name, method.domain, method.bytes_stored(CLOTHS[0])) == ("theirs", None, 16)
 
 
-def test_fabrics_come_back_from_the_card_without_their_colours(theirs):
+def test_fabrics_come_back_from_the_card_and_networks_of_one_fabric_answer_for_theirs(theirs):
     options = theirs("super().__init__()", "super().__init__(); self.seen = fabrics")
     network = build_added(options, CLOTHS)
     assert [cloth.optics() for cloth in network.network.seen] == [cloth.optics() for cloth in CLOTHS]
     assert network.network.seen[0].warp.diffuse != CLOTHS[0].warp.diffuse
     method = restore_added(options, [trained(network, CLOTHS, 3)])
     assert method.method.trained.seen == network.network.seen
-
-
-def test_networks_of_one_fabric_answer_for_theirs(theirs):
     options = theirs(has_one_fabric=True)
     parts = [trained(build_added(options, [cloth]), [cloth], index + 1) for index, cloth in enumerate(CLOTHS)]
     method = restore_added(options, parts)

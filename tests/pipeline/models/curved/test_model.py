@@ -70,15 +70,12 @@ def test_curvature_enters_as_asked(way):
         assert network._view(_view([0.01], 0.0))[0, -1] == 1.0  # flat: a ray never turns
 
 
-def test_neither_opacity_nor_offset_knows_the_light():
+def test_neither_opacity_nor_offset_knows_the_light_and_rays_below_every_yarn_have_hit_one():
     method, queries = _method(), _queries(50)
     other = queries._replace(wi=-queries.wi)
     np.testing.assert_array_equal(method.coverage(DENIM, queries), method.coverage(DENIM, other))
     assert (method.predict(DENIM, queries) != method.predict(DENIM, other)).any()
-
-
-def test_rays_that_sink_below_every_yarn_have_hit_one():
-    """tan^2 >= 2 kappa fall; on flat cloth any ray. A network with gaps knows no such thing."""
+    # tan^2 >= 2 kappa fall; on flat cloth any ray. A network with gaps knows no such thing.
     fall, curvature = 0.5, 0.1
     edge = math.sqrt(2 * curvature * fall)
     cosine = edge / math.sqrt(1 + edge * edge) * np.array([0.99, 1.01])

@@ -31,16 +31,13 @@ def test_no_other_choice_in_the_same_time_has_less_error(time):
         assert of_other[1] > seconds * (1 + 1e-12) or of_other[0] >= error * (1 - 1e-6)
 
 
-def test_the_wished_time_is_used_up_over_many_queries():
+def test_the_wished_time_is_used_up_over_many_queries_and_its_ends_give_the_cheapest_and_the_best():
     squares, kinds = drawn(20_000)
     least, most = SECONDS[kinds].min(axis=1).mean(), totals(squares, kinds, squares.argmin(axis=1))[1]
     for share in (0.1, 0.5, 0.9):
         time = least + share * (most - least)
         _, seconds = totals(squares, kinds, within_time(squares, kinds, SECONDS, time))
         assert 0.93 * time < seconds <= time
-
-
-def test_times_at_the_ends_give_the_cheapest_and_the_best_answers():
     squares, kinds = drawn(100)
     cheapest = within_time(squares, kinds, SECONDS, SECONDS[kinds, 0].mean())
     np.testing.assert_array_equal(cheapest, np.zeros(100))

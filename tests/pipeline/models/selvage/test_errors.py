@@ -25,10 +25,12 @@ from weaves.population import Population, population_fabrics
 DENIM = load_fabric("denim")
 
 
-def test_the_table_has_a_row_for_every_case_and_answer():
+def test_the_table_has_a_row_for_every_case_and_answer_and_the_fallback_is_the_last():
     table = json.loads(ERROR_TABLE.read_text())
     assert [len(rows) for rows in table] == [5, 5, 4, 4] and len(table) == CASES
     assert {len(row) for rows in table for row in rows} == {TERMS + (NUMBERS - 1) * len(OF_CLOTH)}
+    queries = probes(DENIM, False, False, 16)
+    np.testing.assert_allclose(colours(DENIM, queries)[:, 4], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)
 
 
 def test_numbers_of_a_cloth_are_differences_of_its_answers():
@@ -100,8 +102,3 @@ def test_expected_errors_are_calibrated_on_cloth_never_seen(curved):
         for wished, parts in true.items():
             ratio = np.concatenate(parts).mean() / np.concatenate(expected[wished]).mean()
             assert 0.8 < np.sqrt(max(ratio, 0.0)) < 1.25, (behind, wished)
-
-
-def test_the_fallback_is_the_last_answer():
-    queries = probes(DENIM, False, False, 16)
-    np.testing.assert_allclose(colours(DENIM, queries)[:, 4], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)

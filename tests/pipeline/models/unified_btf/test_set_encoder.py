@@ -35,10 +35,21 @@ def encoded(model: SetEncoder, samples: Texels, chosen: np.ndarray | slice = sli
     return latents
 
 
-def test_angles_tell_light_from_viewer():
+def test_angles_tell_light_from_viewer_and_rows_become_samples_by_texels():
     wi, wo = torch.tensor([0.6, 0.0, 0.8]), torch.tensor([0.0, -0.8, 0.6])
     torch.testing.assert_close(angles_of(wi, wo, "disc"), torch.tensor([0.6, 0.0, 0.0, -0.8]))
     torch.testing.assert_close(angles_of(wi, wo, "stereographic"), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
+    # A 6 x 8 repeat, so that no mistake of order can hide; half precision rounds by 2^-11.
+    columns = SMALL.angular_samples.answer(SHANTUNG, 0, SMALL.angular_samples.count(SHANTUNG))
+    queries, answers = rows_of(columns)
+    samples = read_texels(SHANTUNG, SMALL, columns)
+    assert samples.shape == (2 * SHANTUNG.weave.repeat[1], 2 * SHANTUNG.weave.repeat[0])
+    sample, row, column = 2, 3, 9
+    angles = angles_of(torch.from_numpy(queries.wi), torch.from_numpy(queries.wo), SMALL.angles)
+    alike = (angles == samples.angles[sample]).all(dim=1).numpy()
+    (found,) = np.flatnonzero((queries.u == column / 2 + 0.25) & (queries.v == row / 2 + 0.25) & alike)
+    read = samples.values[sample, row * samples.shape[1] + column]
+    np.testing.assert_allclose(read, answers.mean[found], rtol=2**-11, atol=2**-24)
 
 
 @torch.inference_mode()
@@ -75,20 +86,6 @@ def test_averaged_latents_are_the_latent_of_the_averaged_texel():
         expected = encoded(model, together)[0]
         torch.testing.assert_close(encoded(model, samples).mean(dim=0), expected, rtol=1e-5, atol=1e-5)
         assert (expected > 0).all() == (offset > 0)
-
-
-def test_rows_become_samples_by_texels():
-    """A 6 x 8 repeat, so that no mistake of order can hide; half precision rounds by 2^-11."""
-    columns = SMALL.angular_samples.answer(SHANTUNG, 0, SMALL.angular_samples.count(SHANTUNG))
-    queries, answers = rows_of(columns)
-    samples = read_texels(SHANTUNG, SMALL, columns)
-    assert samples.shape == (2 * SHANTUNG.weave.repeat[1], 2 * SHANTUNG.weave.repeat[0])
-    sample, row, column = 2, 3, 9
-    angles = angles_of(torch.from_numpy(queries.wi), torch.from_numpy(queries.wo), SMALL.angles)
-    alike = (angles == samples.angles[sample]).all(dim=1).numpy()
-    (found,) = np.flatnonzero((queries.u == column / 2 + 0.25) & (queries.v == row / 2 + 0.25) & alike)
-    read = samples.values[sample, row * samples.shape[1] + column]
-    np.testing.assert_allclose(read, answers.mean[found], rtol=2**-11, atol=2**-24)
 
 
 def test_samples_in_use_are_not_computed_again():

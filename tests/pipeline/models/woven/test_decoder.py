@@ -27,7 +27,7 @@ def test_periodic_blob_sums_to_one_and_does_not_see_whole_turns(deviation):
         torch.testing.assert_close(periodic_blob(x + turns, deviation, 8), blob, rtol=0, atol=1e-12)
 
 
-def test_periodic_blob_is_the_integral_of_a_wrapped_gaussian():
+def test_blobs_are_integrals_of_a_gaussian_wrapped_or_over_each_bin():
     """The series ends at m = 7; at the deviation 1/8 what is left out is e^{-2 pi^2} = 3e-9."""
     x, deviation = torch.rand(16, dtype=torch.float64), 1 / 8
     edges = np.linspace(0, 1, 9)
@@ -37,10 +37,7 @@ def test_periodic_blob_is_the_integral_of_a_wrapped_gaussian():
     deviations = torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64)
     alone = [periodic_blob(number, float(width), 8) for number, width in zip(x[:3], deviations, strict=True)]
     torch.testing.assert_close(periodic_blob(x[:3], deviations, 8), torch.stack(alone))
-
-
-def test_plain_blob_holds_the_integral_of_a_gaussian_over_each_bin():
-    """Half of it is lost at an edge."""
+    # Half of it is lost at an edge.
     x = np.array([[0.0], [0.3], [1.0]])
     expected = np.diff(norm.cdf(np.linspace(0, 1, 9), loc=x, scale=1 / 8))
     np.testing.assert_allclose(one_blob(torch.tensor([0.0, 0.3, 1.0]), 8), expected, atol=1e-6)

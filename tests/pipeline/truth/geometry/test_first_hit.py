@@ -57,15 +57,12 @@ def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
         assert slope < 1e-6
 
 
-def test_a_ray_along_the_normal_meets_what_is_seen_from_above():
+def test_a_ray_along_the_normal_meets_what_is_seen_from_above_and_others_walls_where_floats_end():
     field = height_field(load_fabric("voile"))
     down, along, _ = sinking(ray(0.0, 0.0, 1.0, 0.0), field.highest, 0.1)
     met = {first_hit(field, x, y, field.highest, down).what for x in np.linspace(0.0, 1.9, 20) for y in (0.02, 0.5)}
     assert along == 0.0 and met == {ON_YARN, MISSED}
-
-
-def test_rays_meet_walls_where_floats_end():
-    """Of denim, where the step between two floats faces the viewer; none along yarns that never end."""
+    # Of denim, where the step between two floats faces the viewer; none along yarns that never end.
     shares = []
     for fabric in (load_fabric("denim"), cylinders()):
         field = height_field(fabric)

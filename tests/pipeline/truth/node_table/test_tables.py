@@ -34,16 +34,13 @@ def test_other_models_than_the_default_are_unknown(options):
     assert not _table().knows(cloth_side(DENIM, TruthOptions(parallax=False, **options)), _columns()).any()
 
 
-def test_curved_cloth_and_tiny_footprints_are_unknown():
+def test_curved_cloth_and_tiny_footprints_are_unknown_and_rotated_ones_up_to_a_ratio():
     columns = _columns()
     bent, narrow = np.where(np.arange(6) == 1, 0.1, 0.0), np.where(np.arange(6) == 4, 0.01, 1.0)
     changed = columns._replace(curvature=bent, sigma=np.ones(6), sigma_minor=narrow)
     found = _table().knows(cloth_side(DENIM, TruthOptions()), changed)
     np.testing.assert_array_equal(found, [True, False, True, True, False, True])
-
-
-def test_rotated_footprints_are_known_up_to_what_the_mixture_resolves():
-    """At 45 degrees an ellipse with axes a and b has the correlation (a^2 - b^2) / (a^2 + b^2)."""
+    # At 45 degrees an ellipse with axes a and b has the correlation (a^2 - b^2) / (a^2 + b^2).
     columns = _columns(2)._replace(angle=np.full(2, np.pi / 4), sigma=np.full(2, 50.0))
     cloth = cloth_side(DENIM, TruthOptions())
     for line in (COARSE_LINE, FINE_LINE):

@@ -50,13 +50,10 @@ def test_areas_of_nodes_and_walls_sum_to_the_cosine(cloth):
     assert max(of_walls) > 0.05
 
 
-def test_cylinders_side_by_side_have_no_walls():
+def test_cylinders_side_by_side_have_no_walls_and_a_straight_one_has_the_height_of_its_step():
     _, table = _table(cylinders(), nodes=8, azimuths=8)
     assert len(table.walls.height) == 0
-
-
-def test_a_straight_wall_has_the_height_of_its_step():
-    """Straight warps of half the width, one spacing apart: beside each, its edge stands over the straight weft."""
+    # Straight warps of half the width, one spacing apart: beside each, its edge stands over the straight weft.
     _, table = _table(woven("denim", ("##", "##"), {"width": 0.5, "bend": 0.0}, {"width": 1.0, "bend": 0.0}), 8, 8)
     walls = table.walls
     assert math.isclose(float(walls.evenly.sum()), 2.0, rel_tol=1e-5)
