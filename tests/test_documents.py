@@ -115,11 +115,8 @@ def test_what_a_document_names_exists(path):
         check(path)
 
 
-def test_every_verb_is_in_the_readme():
+def test_every_verb_and_every_room_of_work_is_in_the_readme():
     assert {tokens[0] for tokens in commands_of(ROOT / "README.md", "twillight")} == VERBS
-
-
-def test_every_room_of_work_has_a_readme():
     rooms = ["weaves", *(f"pipeline/{name}" for name in ("truth", "shards", "models", "scenes")), "jobs", "reports"]
     readme = text_of(ROOT / "README.md")
     assert [room for room in rooms if f"({room}/README.md)" not in readme] == []
@@ -159,11 +156,8 @@ def test_estimators_kinds_of_rows_scenes_and_recipes_are_listed():
     assert set(recipe_names()) <= {*listed("jobs", "[^|]+"), *extra}
 
 
-def test_the_changelog_begins_with_the_package_version():
+def test_changelog_and_citations_have_the_package_version():
     assert re.search(r"^## (\S+)", text_of(ROOT / "CHANGELOG.md"), re.M)[1] == PROJECT["version"]
-
-
-def test_twillight_is_cited_alike_in_both_forms():
     cited = yaml.safe_load(text_of(ROOT / "CITATION.cff"))
     entry = text_of(ROOT / "BIBLIOGRAPHY.bib").partition("@software{Twillight,")[2].partition("\n}")[0]
     fields = {name: value.strip("{}").replace("}", "") for name, value in re.findall(r"(\w+) += \{(.*)\}", entry)}

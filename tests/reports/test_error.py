@@ -40,12 +40,18 @@ def test_bootstrap_agrees_with_the_normal_formula_for_many_rows():
     assert by_bootstrap == squared_error(values, np.zeros_like(values), np.zeros_like(values))
 
 
-def test_colour_error_uses_the_colours():
+def test_colour_error_uses_the_colours_and_components_stay_apart():
     """An error of 1 in S_weft alone, seen through colour (.2, 0, .4): <e^2> = (.04 + .16) / 3."""
     truth = answers(np.ones((5, 4)), np.zeros((5, 4)))
     values = np.ones((5, 4)) + np.array([0, 1, 0, 0])
     colours = np.array([[1, 1, 1], [0.2, 0, 0.4], [1, 0, 0], [0, 1, 0]])
     assert colour_error(values, truth, colours).value == pytest.approx(0.2 / 3)
+    truth = answers(np.tile([1, 2, 4, 0], (6, 1)), np.zeros((6, 4)))
+    values = truth.mean + np.array([0.1, 0.1, 0.1, 0])
+    found = [error.relative_rmse for error in component_errors(values, truth)]
+    assert found[:3] == pytest.approx([0.1, 0.05, 0.025], rel=1e-5) and math.isnan(found[3])
+    noise = colour_noise(answers(np.ones((1, 4)), [[3, 4, 0, 0]]), np.ones((4, 3)))
+    assert noise == pytest.approx(np.full((1, 3), 5.0))
 
 
 def test_colour_measure_is_the_prototypes():
@@ -62,18 +68,6 @@ def test_error_of_99_per_cent_leaves_the_largest_errors_out():
     values = truth.mean + off[:, None] * np.array([0, 0, 1, 0])
     assert most_error(values, truth).value == pytest.approx(0.2**2 - 0.1**2, rel=1e-6)
     assert most_error(values, truth).count == 198 and colour_error(values, truth, COLOUR_WEIGHTS).value > 1.0
-
-
-def test_colour_noise_adds_in_squares():
-    noise = colour_noise(answers(np.ones((1, 4)), [[3, 4, 0, 0]]), np.ones((4, 3)))
-    assert noise == pytest.approx(np.full((1, 3), 5.0))
-
-
-def test_components_stay_apart():
-    truth = answers(np.tile([1, 2, 4, 0], (6, 1)), np.zeros((6, 4)))
-    values = truth.mean + np.array([0.1, 0.1, 0.1, 0])
-    found = [error.relative_rmse for error in component_errors(values, truth)]
-    assert found[:3] == pytest.approx([0.1, 0.05, 0.025], rel=1e-5) and math.isnan(found[3])
 
 
 def test_ratio_has_the_delta_methods_interval():

@@ -30,14 +30,11 @@ def test_numbers_of_other_subjects_are_no_pair(change):
     assert join({"A": [MSE], "B": [other]}).records == [MSE, other]
 
 
-def test_equal_machines_are_numbered():
+def test_equal_machines_are_numbered_and_records_of_several_not_joined_again():
     machine = this_machine(1)
     names = names_of([machine, machine.model_copy(update={"cores": machine.cores + 1}), machine])
     assert len(set(names)) == 3 and names[0].endswith("(1)") and names[2].endswith("(2)")
     assert machine.cpu in names[1] and f"{machine.cores + 1} cores" in names[1]
-
-
-def test_records_of_several_machines_are_not_joined_again():
     joined = join({"A": [MSE, TIME], "B": [TIME]})
     assert refusal(refuse_several, joined.records, "file").startswith("file: holds Records of several machines")
     assert refusal(join, {"C": joined.records}).startswith("C: holds")

@@ -24,25 +24,16 @@ RECORDS = [
 ]
 
 
-def test_trainings_are_counted_by_their_seeds():
+def test_trainings_are_counted_by_their_seeds_and_their_numbers_become_means_of_one_subject():
     assert trainings(RECORDS) == {("a", ""): 3, ("b", ""): 1, ("points", ""): 0}
-
-
-def test_numbers_of_several_trainings_become_their_mean():
     mean, *others = mean_over_seeds(RECORDS)
     assert (mean.value, mean.standard_error, mean.low, mean.high) == pytest.approx((2.0, 0.2, 1.5, 2.2))
     assert mean.curve == ((0.1, 2.0), (0.2, 2.0))
     assert others == RECORDS[3:], "other numbers are as they were"
-
-
-def test_the_first_training_is_that_of_the_least_seed():
     found = first_training(RECORDS[::-1])
     assert [one.value for one in found if one.method == "a" and one.metric == "mse"] == [3.0, 1.0]
     assert [one.curve for one in found if one.curve] == [RECORDS[0].curve]
-
-
-def test_numbers_of_different_subjects_are_not_mixed():
-    """The data set and the machine are part of what a number is of."""
+    # The data set and the machine are part of what a number is of.
     other = [trained("a", seed, value=9.0) for seed in (7, 8)]
     moved = [one.model_copy(update={"provenance": one.provenance.model_copy(update={"dataset": "z"})}) for one in other]
     assert [one.value for one in mean_over_seeds([*RECORDS[:3], *moved])] == [2.0, 9.0]

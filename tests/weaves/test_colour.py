@@ -4,10 +4,13 @@ import pytest
 from weaves.colour import Spectrum, delta_e, encoded, linear_rgb
 
 
-def test_hex_is_decoded_by_the_srgb_curve():
+def test_hex_is_decoded_by_the_srgb_curve_which_encoding_inverts():
     """IEC 61966-2-1: below 0.04045 a line, above it ((c + 0.055)/1.055)^2.4."""
     assert linear_rgb("#000000") == (0, 0, 0) and linear_rgb("#FFFFFF") == pytest.approx((1, 1, 1))
     assert linear_rgb("#0a80ff") == pytest.approx((10 / 255 / 12.92, ((128 / 255 + 0.055) / 1.055) ** 2.4, 1))
+    codes = [f"#{code:02x}{code:02x}{code:02x}" for code in range(256)]
+    linear = np.array([linear_rgb(code) for code in codes])
+    assert np.allclose(encoded(linear), np.arange(256)[:, None] / 255, atol=1e-7)
 
 
 @pytest.mark.parametrize("level", [0.0, 0.18, 1.0])
@@ -22,12 +25,6 @@ def test_a_spectrum_rising_to_the_red_is_red_and_saturated_ones_are_clipped_to_t
     assert red > 3 * green > 0 and green >= blue
     rgb = linear_rgb(Spectrum(wavelengths=(500, 505, 515, 520), values=(0, 1, 1, 0)))
     assert min(rgb) == 0 and max(rgb) <= 1
-
-
-def test_encoding_inverts_the_srgb_curve():
-    codes = [f"#{code:02x}{code:02x}{code:02x}" for code in range(256)]
-    linear = np.array([linear_rgb(code) for code in codes])
-    assert np.allclose(encoded(linear), np.arange(256)[:, None] / 255, atol=1e-7)
 
 
 SHARMA = """

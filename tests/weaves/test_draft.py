@@ -88,12 +88,9 @@ def test_canonical_form_ignores_shift_mirror_and_repetition(matrix, ends, picks,
     assert same.canonical() == draft.canonical()
 
 
-def test_canonical_form_tells_cloths_apart():
+def test_canonical_form_tells_cloths_apart_and_is_that_of_a_loom_tied_up_for_a_twill():
     weaves = [Plain(), Twill(over=2, under=2), Twill(over=3, under=1), Twill(over=1, under=3)]
     assert len({weave.build().canonical() for weave in weaves}) == 4
-
-
-def test_loom_weaves_the_twill_it_is_tied_up_for():
     tie_up = [[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1], [1, 0, 0, 1]]
     woven = Loom(threading=[1, 2, 3, 4], tie_up=tie_up, treadling=[1, 2, 3, 4]).build()
     assert woven.canonical() == Twill(over=2, under=2).build().canonical()

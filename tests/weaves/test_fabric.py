@@ -72,14 +72,11 @@ def test_published_bend_and_twist_of_the_presets():
         assert (fabric.warp.bend, fabric.weft.bend, fabric.warp.twist, fabric.weft.twist) == (warp, weft, twist, twist)
 
 
-def test_the_physical_size_is_left_out_where_it_is_unknown():
+def test_the_physical_size_is_left_out_where_unknown_and_follows_from_counts_and_sett():
     assert "yarns_per_cm" not in denim.model_dump() and "yarns_per_cm" not in denim.to_toml()
     sized = Fabric.model_validate(denim.model_dump() | {"yarns_per_cm": [24, 19.5]})
     assert sized.yarns_per_cm == (24.0, 19.5) and sized.optics() == denim.optics()
-
-
-def test_counts_and_sett_give_widths():
-    """Peirce's diameter of cotton, 1 / (28 sqrt(Ne)) inches; tex and Ne of one yarn; and area = mass / density."""
+    # Peirce's diameter of cotton, 1 / (28 sqrt(Ne)) inches; tex and Ne of one yarn; and area = mass / density.
     table = denim.model_dump(mode="json")
     for yarn, count in (("warp", {"ne": 24}), ("weft", {"tex": 40, "fibre_density": 1.3, "packing": 0.7})):
         del table[yarn]["width"]

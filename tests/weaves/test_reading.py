@@ -40,14 +40,11 @@ def test_json_that_would_take_too_much_is_one_sentence(tmp_path, content, words)
     assert words in refusal(read_json, tmp_path / "a.json", 1 << 24, "a file")
 
 
-def test_an_object_may_be_wide_where_it_is_said(tmp_path):
-    wide = {str(index): 0 for index in range(MOST_KEYS + 1)}
-    (tmp_path / "a.json").write_text(f'{{"a": {str(wide).replace(chr(39), chr(34))}}}')
-    assert read_json(tmp_path / "a.json", 1 << 20, "a file", {"a": MOST_KEYS + 1}) == {"a": wide}
-
-
-def test_a_sentence_is_one_short_line():
+def test_a_sentence_is_one_short_line_and_an_object_may_be_wide_where_it_is_said(tmp_path):
     assert one_line("a\x1b[2J\nb\tc") == "a·[2J b c"
     assert one_line("abcdef", 4) == "abc…" and one_line("abcdef", 4, keep="end") == "…def"
     assert len(one_line("x" * 10**6)) == 300
     assert len(str(BadInput("w" * 10**5, "k" * 10**5, ["v" * 10**5] * 100, "a" * 10**5))) == 300
+    wide = {str(index): 0 for index in range(MOST_KEYS + 1)}
+    (tmp_path / "a.json").write_text(f'{{"a": {str(wide).replace(chr(39), chr(34))}}}')
+    assert read_json(tmp_path / "a.json", 1 << 20, "a file", {"a": MOST_KEYS + 1}) == {"a": wide}

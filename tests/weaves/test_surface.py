@@ -185,16 +185,7 @@ def test_a_quarter_turn_of_the_cloth_turns_what_is_seen(name):
     assert np.allclose(np.abs(along), 1, atol=1e-10)
 
 
-def test_relief_scales_height_and_slope():
-    flat, raised = cloth(), cloth(warp={"relief": 0.5}, weft={"relief": 0.5})
-    x, y = random_points(flat, 500)
-    one, half = surface_at(flat, x, y), surface_at(raised, x, y)
-    assert np.allclose(half.height, one.height / 2)
-    slope = one.normal[:, :2] / one.normal[:, 2:]
-    assert np.allclose(half.normal[:, :2] / half.normal[:, 2:], slope / 2)
-
-
-def test_widths_decide_what_shows():
+def test_widths_decide_what_shows_and_relief_scales_height_and_slope():
     """Areas in plain weave: a warp of width g covers g of its cells; the gaps are (1 - g_warp)(1 - g_weft)."""
     seen = surface_maps(cloth({"family": "plain"}, {"width": 0.75}, {"width": 0.5}), 64)
     assert np.isclose((seen.yarn == GAP).mean(), 0.25 * 0.5)
@@ -202,6 +193,12 @@ def test_widths_decide_what_shows():
     assert np.isclose(((seen.yarn == WARP) & seen.under).mean(), 0.5 * 0.5 * 0.75)
     under, height, normal, tangent = (column[seen.yarn == GAP] for column in seen[1:])
     assert (height == -np.inf).all() and (normal == [0, 0, 1]).all() and not under.any() and not tangent.any()
+    flat, raised = cloth(), cloth(warp={"relief": 0.5}, weft={"relief": 0.5})
+    x, y = random_points(flat, 500)
+    one, half = surface_at(flat, x, y), surface_at(raised, x, y)
+    assert np.allclose(half.height, one.height / 2)
+    slope = one.normal[:, :2] / one.normal[:, 2:]
+    assert np.allclose(half.normal[:, :2] / half.normal[:, 2:], slope / 2)
 
 
 def test_flat_floats():

@@ -1,15 +1,14 @@
 import pytest
 
 from jobs.plan.part import Part
-from weaves.errors import BadInput
+from tests.refusals import refusal
 
 NO_PARTS = ["0/1000", "1001/1000", "x/y", "5/0", "", "3", "1/2/3", "-1/2", "1.0/2", "01/2", " 1/2", "1/2\n", "٣/٤"]
 
 
 @pytest.mark.parametrize("text", [*NO_PARTS, f"1/{10**9}", "9" * 5000 + "/1"])
 def test_a_text_that_names_no_part_is_bad_input(text):
-    with pytest.raises(BadInput, match="must be a number, a slash and the number of parts"):
-        Part.read(text)
+    assert "must be a number, a slash and the number of parts" in refusal(Part.read, text)
 
 
 @pytest.mark.parametrize("stage", ["generate", "train", "bench"])

@@ -1,7 +1,5 @@
 """Files of measured BSDFs: what is written is read, and faults are named in one sentence."""
 
-import re
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -10,6 +8,7 @@ import pytest
 from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Scattering
 from pipeline.bsdf.klems_xml import LayerFacts, write_klems
 from pipeline.bsdf.measured import read_bsdf
+from tests.refusals import refusal
 from weaves.errors import BadInput
 
 QUARTER = BASES["LBNL/Klems Quarter"]
@@ -66,8 +65,7 @@ def test_one_row_is_one_pair_and_blocks_that_a_file_lacks_are_not_known(tmp_path
     path.write_text(path.read_text().replace("Reflection Back", "Reflection Front"))
     blocks = read_bsdf(path).bands["visible"]
     assert np.isnan(blocks[SCATTERED.index("reflection"), FACES.index("back")]).all()
-    with pytest.raises(BadInput, match="no such file"):
-        read_bsdf(tmp_path / "none.xml")
+    assert "no such file" in refusal(read_bsdf, tmp_path / "none.xml")
 
 
 @pytest.mark.parametrize(
@@ -84,5 +82,4 @@ def test_one_row_is_one_pair_and_blocks_that_a_file_lacks_are_not_known(tmp_path
 def test_an_xml_file_that_cannot_be_used_is_refused_in_one_sentence(old, new, sentence, tmp_path):
     write_klems(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
     path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(BadInput, match=re.escape(sentence)):
-        read_bsdf(path)
+    assert sentence in refusal(read_bsdf, path)

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
-from weaves.errors import BadInput
+from tests.refusals import refusal
 
 EDGES, NAMES = (0.0, 0.3, 1.0), ("small", "middle", "large")
 
@@ -44,5 +44,4 @@ def test_stretched_footprints_keep_their_ratio_and_area_and_classes_of_size_sum_
     assert sum(found.sizes.values()) == pytest.approx(1.0)
     # Log-uniform: each class has the share of its width in the logarithm.
     assert found.sizes["small"] == pytest.approx(np.log(0.3 / 0.05) / np.log(32 / 0.05), abs=0.03)
-    with pytest.raises(BadInput, match="no cloth that is lit"):
-        required(QueryOptions(), count=0)
+    assert "no cloth that is lit" in refusal(required, QueryOptions(), count=0)

@@ -18,6 +18,7 @@ from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from tests.presets import slow
+from tests.refusals import refusal
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -149,8 +150,7 @@ def test_what_stops_a_thread_stops_everything(case):
     case.options = OPTIONS.model_copy(update={"estimator": "node_table"})
     columns = query_columns()
     columns["sigma"] = np.where(np.isin(np.arange(ROWS), [150, 250]), 0.001, 32.0)
-    with pytest.raises(BadInput, match="row 150"):
-        case.write(columns).run(chunk=10, threads=4)
+    assert "row 150" in refusal(case.write(columns).run, chunk=10, threads=4)
     assert not list(case.out.parent.iterdir())
 
 
@@ -288,8 +288,7 @@ def test_files_that_are_not_whole_are_refused_and_leave_nothing(case):
     for damaged in (b"u,v\n1,2\n", b"", cut, bytes(content)):
         case.queries.write_bytes(damaged)
         assert "not a whole Parquet file" in case.refused()
-    with pytest.raises(BadInput, match="not a whole Parquet file"):
-        case.run(skip_bad=True)
+    assert "not a whole Parquet file" in refusal(case.run, skip_bad=True)
     assert not list(case.out.parent.iterdir())
 
 

@@ -13,6 +13,7 @@ from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.store import read_about, read_columns, rows_of, write_columns
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.shards.extra import GRAZING, OPACITY, SAMPLES
+from tests.refusals import refusal
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -97,11 +98,9 @@ def test_damage_is_named(folder):
     position = column.data_page_offset + column.total_compressed_size - 20
     for content in (flipped(sound, position), sound[: len(sound) // 2]):
         path.write_bytes(content)
-        with pytest.raises(BadInput, match="not a whole Parquet file"):
-            read_shard(path)
+        assert "not a whole Parquet file" in refusal(read_shard, path)
     path.unlink()
-    with pytest.raises(BadInput, match="does not exist"):
-        read_shard(path)
+    assert "does not exist" in refusal(read_shard, path)
     assert "does not exist" in check_shard(folder, entry, manifest)[0]
 
 
@@ -116,8 +115,7 @@ def test_manifest_round_trip_reads_rows_in_stream_order(folder):
     before = (folder / "manifest.json").read_bytes()
     loaded.save(folder)
     assert (folder / "manifest.json").read_bytes() == before
-    with pytest.raises(BadInput, match="no rows"):
-        loaded.read(folder, "denim", "train")
+    assert "no rows" in refusal(loaded.read, folder, "denim", "train")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", json.dumps({"name": "x"})])
@@ -125,8 +123,7 @@ def test_a_broken_manifest_is_one_sentence(tmp_path, text):
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(BadInput, match=r"manifest is needed|not a manifest"):
         Manifest.load(tmp_path)
-    with pytest.raises(BadInput, match="does not exist"):
-        Manifest.load(tmp_path / "nowhere")
+    assert "does not exist" in refusal(Manifest.load, tmp_path / "nowhere")
 
 
 def _extra(folder, extra):
@@ -152,8 +149,7 @@ def test_extra_rows_are_shards_like_all_others(folder, extra):
     assert read.keys() == whole.keys()
     for name, column in whole.items():
         np.testing.assert_array_equal(read[name], column)
-    with pytest.raises(BadInput, match="no rows"):
-        manifest.columns(folder, "denim", set_name(SAMPLES.model_copy(update={"samples": 5})))
+    assert "no rows" in refusal(manifest.columns, folder, "denim", set_name(SAMPLES.model_copy(update={"samples": 5})))
 
 
 def test_damaged_extra_rows_are_named(folder):

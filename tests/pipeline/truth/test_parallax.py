@@ -17,7 +17,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.scattering.thread_colours import component_colours
 from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, direction, equal_queries, woven
 from tests.presets import slow
-from weaves.errors import BadInput
+from tests.refusals import refusal
 from weaves.validation import validated
 
 COLOUR = np.array([0.2, 0.2, 0.5, 0.5])
@@ -91,10 +91,8 @@ def test_with_rims_no_place_weighs_less(walls):
     {"estimator": "quadrature"}, {"estimator": "quadrature", "walls": "left_out", "footprint": "box"},
 ])  # fmt: skip
 def test_rays_need_the_ply_model_estimators_of_rays_and_a_viewer_not_too_low(options):
-    with pytest.raises(BadInput, match="parallax"):
-        validated(TruthOptions, options, "recipe.toml")
-    with pytest.raises(BadInput, match="89 degrees"):
-        _answers(LOPSIDED, equal_queries(direction(20.0, 0.0), direction(89.5, 50.0)))
+    assert "parallax" in refusal(validated, TruthOptions, options, "recipe.toml")
+    assert "89 degrees" in refusal(_answers, LOPSIDED, equal_queries(direction(20.0, 0.0), direction(89.5, 50.0)))
 
 
 @pytest.mark.parametrize("walls", [slow("left_out"), "rim"])

@@ -22,15 +22,12 @@ def exr(rgb, alpha):
     return Exr({**{c: rgb[..., i] for i, c in enumerate("RGB")}, "A": np.asarray(alpha, np.float32)}, {})
 
 
-def test_tone_mapping_is_exposure_and_the_srgb_curve():
+def test_tone_mapping_is_exposure_and_the_srgb_curve_and_difference_is_blue_where_dark():
     """Linear .21404 is sRGB 127.5/255 by IEC 61966-2-1; 0 stays 0, what is too bright is cut, no cloth is clear."""
     linear = np.array([[[0.21404 / tiles.EXPOSURE] * 3, [0.0] * 3, [9.0] * 3, [1.0] * 3]])
     shown = decoded(tiles.picture(exr(linear, [[1, 1, 1, 0]])))[0, :: tiles.SCALE]
     assert shown[0, :3].tolist() in ([127] * 3, [128] * 3) and shown[1].tolist() == [0, 0, 0, 255]
     assert shown[2].tolist() == [255, 255, 255, 255] and shown[3].tolist() == [0, 0, 0, 0]
-
-
-def test_difference_is_blue_where_dark_and_red_where_bright():
     truth = exr(np.full((1, 4, 3), 0.5), [[1, 1, 1, 0]])
     shown = exr(np.array([[[0.5] * 3, [0.2] * 3, [0.9] * 3, [5.0] * 3]]), [[1, 1, 1, 0]])
     same, dark, bright, outside = decoded(tiles.difference(shown, truth))[0, :: tiles.SCALE]
@@ -43,7 +40,7 @@ def centres(pixels, rows, columns, top=0, left=0):
     return found[:, (left + np.arange(columns)) * SIDE + SIDE // 2, :3]
 
 
-def test_a_draft_shows_the_loom_that_weaves_its_drawdown_in_the_colours_of_the_threads():
+def test_a_draft_shows_the_loom_in_the_colours_of_the_threads_and_the_largest_one_fits():
     """Threading, tie-up and treadling, read from the picture, lift what the drawdown shows; first end left, below."""
     fabric = load_fabric("houndstooth")
     pixels, count = decoded(draft.draft(fabric)), 16
@@ -57,10 +54,7 @@ def test_a_draft_shows_the_loom_that_weaves_its_drawdown_in_the_colours_of_the_t
     lifted = treadling @ tie_up.T @ threading > 0
     assert (lifted[::-1] == np.tile(fabric.weave.warp_over, (4, 4))).all()
     assert (cells == np.where(lifted, warp, weft)).all() and warp[0].tolist() == [1, 1, 1, 1, 0, 0, 0, 0] * 2
-
-
-def test_floats_have_outlines_and_the_largest_draft_fits():
-    """In a draft of one colour, lines run along the thread on top; 256 ends and shafts are three pixels each."""
+    # In a draft of one colour, lines run along the thread on top; 256 ends and shafts are three pixels each.
     plain = load_fabric("voile")
     white = plain.model_copy(update={"warp": plain.weft})
     pixels = decoded(draft.drawdown(white))[..., 0]

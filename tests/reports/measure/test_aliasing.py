@@ -7,17 +7,14 @@ X = np.arange(96)
 Y = np.arange(64)[:, None]
 
 
-def test_variances_of_pixels_average_to_the_variance():
+def test_variances_of_pixels_average_to_the_variance_and_flicker_is_that_of_a_known_sinusoid():
     random = np.random.default_rng(5)
     shown, noise = random.random((4, 6, 7)), 0.1 * random.random((4, 6, 7))
     variances = temporal_variances(shown, noise)
     assert variances.shape == (6, 7) and variances.mean() == pytest.approx(temporal_variance(shown, noise), rel=1e-12)
     # Two frames that differ by d have the variance d^2 / 2.
     assert temporal_variances(np.array([[1.0, 2.0], [1.0, 5.0]]), 0.5) == pytest.approx([-0.25, 4.5 - 0.25])
-
-
-def test_flicker_of_a_known_sinusoid():
-    """L = 2 + a cos(2 pi f / 8 + phase): over 8 frames the variance is a^2/2 · 8/7; the truth stands still at 2."""
+    # L = 2 + a cos(2 pi f / 8 + phase): over 8 frames the variance is a^2/2 · 8/7; the truth stands still at 2.
     moving = 2 + 0.3 * np.cos(2 * np.pi * np.arange(8)[:, None] / 8 + np.linspace(0, 6, 50))
     still = np.full_like(moving, 2.0)
     assert flicker(moving, still) == pytest.approx(0.3**2 / 2 * 8 / 7 / 4)

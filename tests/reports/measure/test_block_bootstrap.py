@@ -26,15 +26,12 @@ def test_intervals_cover_under_correlated_noise():
     assert by_blocks >= 170 and by_pixels < 100
 
 
-def test_independent_pixels_have_the_usual_standard_error():
+def test_independent_pixels_have_the_usual_standard_error_and_equal_values_none():
     """Its own relative error is 1 / sqrt(2 · 90 blocks) = 7 % and that of 500 draws 3 %: 25 % allowed."""
     rows = np.random.default_rng(1).standard_normal(DISC.sum())
     spread, low, high = block_interval(rows, DISC, ImageOptions())
     assert spread == pytest.approx(1 / np.sqrt(rows.size), rel=0.25)
     assert high - low == pytest.approx(2 * 1.96 * spread, rel=0.2)
-
-
-def test_blocks_part_the_mask_and_equal_values_have_an_interval_of_no_width():
     mask = np.ones((64, 96), dtype=bool)
     mask[:, :16] = False
     assert np.bincount(blocks(mask, 16)).tolist() == [256] * (4 * 5)
@@ -50,17 +47,14 @@ HARD = RANDOM.standard_normal((*SIZE, 3)) * np.linspace(0.1, 3.0, SIZE[1])[:, No
 OPTIONS = ImageOptions(block=8, resamples=300)
 
 
-def test_it_is_the_difference_of_both_mean_squared_errors():
+def test_it_is_the_difference_of_both_mean_squared_errors_without_what_both_err_alike():
     """Exactly, whatever the noise of the truth is: it enters linearly, and has no bias."""
     a, b = TRUTH + 0.1 * HARD, TRUTH + 0.2 * HARD
     difference, low, high = mse_difference(a, b, TRUTH, MASK, OPTIONS)
     assert difference == pytest.approx((0.04 - 0.01) * np.mean(HARD[MASK] ** 2), rel=1e-12)
     assert low < difference < high and mse_difference(b, a, TRUTH, MASK, OPTIONS)[0] == -difference
     assert mse_difference(a, a, TRUTH, MASK, OPTIONS) == (0.0, 0.0, 0.0)
-
-
-def test_what_both_err_alike_does_not_widen_the_interval():
-    """Both are off by the same pattern; b by a little more. The pattern varies, the difference hardly does."""
+    # Both are off by the same pattern; b by a little more. The pattern varies, the difference hardly does.
     a = TRUTH + 1.0
     a[:, :32] += 1.0
     b = a + 0.01

@@ -53,15 +53,12 @@ def rendered(tmp_path_factory):
     return path
 
 
-def test_the_file_holds_the_edge_and_the_truth_finds_it(rendered):
+def test_the_file_holds_the_edge_which_the_truth_finds_and_a_flat_method_does_not(rendered):
     truth, found = true_edge(DENIM, TINY), read_edge(rendered)
     np.testing.assert_allclose(found.coverage, truth.coverage, atol=1e-7)
     np.testing.assert_allclose(found.light, truth.light, rtol=1e-6, atol=1e-9)
     values = [record.value for record in measure_silhouette(Truth(), DENIM, TINY, rendered)]
     assert values == pytest.approx([0.0, 0.0, 0.0], abs=1e-7)
-
-
-def test_a_flat_method_covers_everything_and_is_asked_flat(rendered):
     method, truth = flat(), read_edge(rendered)
     records = measure_silhouette(method, DENIM, TINY, rendered)
     assert {(r.method, r.fabric) for r in records} == {("fake", "denim")}

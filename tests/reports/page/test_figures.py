@@ -11,12 +11,16 @@ from reports.tables.number_format import NAMES
 SCHEMES = pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=lambda scheme: scheme.name)
 
 
-def test_rows_of_a_method_stand_together_under_its_name(made_up):
+def test_rows_of_a_method_stand_together_and_of_its_spectra_the_last_is_drawn(made_up):
     mixed = summary.error_table(made_up).iloc[::-1].reset_index(drop=True)
     figure = figures.errors(LIGHT, mixed, summary.fabric_table(made_up))
     labels = [label.get_text().replace("\u00a0", " ") for label in figure.axes[0].get_yticklabels()]
     assert labels == ["points, k = 64", "k = 16", "k = 4", "k = 2", "k = 1", "NeuMIP", "woven"]
     assert [b - a for a, b in pairwise(figure.axes[0].get_yticks())] == [1, 1, 1, 1, 1.5, 1]
+    (axes,) = figures.spectra(LIGHT, summary.spectra(made_up)).axes
+    labels = {text.get_text().replace("\u00a0", " ") for text in axes.texts}
+    assert {"points, k = 2", "points, k = 64", "woven", "NeuMIP", "truth"} <= labels
+    assert "points, k = 16" not in labels and "points, k = 1" not in labels
 
 
 def test_ticks_of_both_signs_are_powers_of_ten_and_few():
@@ -30,13 +34,6 @@ def test_ticks_of_both_signs_are_powers_of_ten_and_few():
 def test_labels_keep_apart(count):
     places = figures._apart([0.1 * (index // 3) for index in range(count)], 0.2, 3.0)
     assert all(b - a >= 0.2 - 1e-9 for a, b in pairwise(places)) and places[-1] <= 3.0
-
-
-def test_of_a_method_with_knobs_the_last_spectrum_and_the_baselines_are_drawn(made_up):
-    (axes,) = figures.spectra(LIGHT, summary.spectra(made_up)).axes
-    labels = {text.get_text().replace("\u00a0", " ") for text in axes.texts}
-    assert {"points, k = 2", "points, k = 64", "woven", "NeuMIP", "truth"} <= labels
-    assert "points, k = 16" not in labels and "points, k = 1" not in labels
 
 
 @SCHEMES

@@ -23,7 +23,7 @@ def costs(table):
     return table[table["role"] == "seen"].set_index(["method", "setting"])["ns"]
 
 
-def test_the_front_and_the_settings_of_methods_are_curves(table, costs):
+def test_settings_of_methods_are_curves_and_flicker_is_its_distance_from_the_truths(table, costs):
     """Made up: points of k cost 400 k and err 1/k, woven and NeuMIP lie at k = 9 like points: all are on the front
     but NeuMIP, which costs more than woven at the same error."""
     figure = front_figures.error_against_time(LIGHT, table)
@@ -35,10 +35,7 @@ def test_the_front_and_the_settings_of_methods_are_curves(table, costs):
     assert {text.get_text() for text in figure.axes[0].texts} == {"1", "2", "64", ""}  # 2 is the baseline, "" the arrow
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     assert names == ["woven", "NeuMIP", "points", "woven in its paper: 2.0× lower at 0.83× the time"]
-
-
-def test_flicker_is_drawn_as_its_distance_from_the_truths(table, costs):
-    """Made up: points flicker by .3 / k at 400 k ns; woven, whose flicker is -.001, is on the front at k = 9's time."""
+    # Made up: points flicker by .3 / k at 400 k ns; woven, whose flicker is -.001, is on the front at k = 9's time.
     figure = front_figures.aliasing_against_time(LIGHT, table)
     band = dict(zip(*(figure.axes[0].lines[0].get_xydata().T), strict=True))
     assert band[costs["woven", ""]] == pytest.approx(1e-3)

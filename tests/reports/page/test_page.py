@@ -206,7 +206,7 @@ def test_every_picture_has_its_size_and_what_is_not_seen_at_first_can_be_opened(
     assert all("summary" in title["within"] for title in page.all("h2") if title["text"] == "Energy")
 
 
-def test_headings_and_landmarks(page):
+def test_headings_landmarks_and_names_of_everything(page):
     levels = [int(heading["tag"][1]) for heading in page.all("h1", "h2", "h3", "h4", "h5", "h6")]
     assert levels[0] == 1 and levels.count(1) == 1
     assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
@@ -217,10 +217,7 @@ def test_headings_and_landmarks(page):
     assert page.all("html")[0]["lang"] == "en" and page.all("title")[0]["text"]
     first, (main,) = page.all("a")[0], page.all("main")
     assert first["href"] == f"#{main['id']}" and first["class"] == "skip" and main["tabindex"] == "-1"
-
-
-def test_everything_has_a_name(page):
-    """Headings, links, pictures, tables, and what scrolls; a link round a picture has the words of the picture."""
+    # Headings, links, pictures, tables, and what scrolls; a link round a picture has the words of the picture.
     assert all(heading["text"].strip() for heading in page.all("h1", "h2", "h3", "caption"))
     assert all(link["text"].strip() or link["pictures"] for link in page.all("a", "button", "summary"))
     sources = {}
@@ -237,17 +234,14 @@ def test_everything_has_a_name(page):
             assert element["tabindex"] == "0" and element["role"] == "region" and element["aria-label"].strip()
 
 
-def test_pictures_are_enlarged_in_a_dialog_without_other_files(page):
+def test_pictures_are_enlarged_in_a_dialog_and_the_style_takes_its_colours_from_the_schemes(page):
     (dialog,) = page.all("dialog")
     assert dialog["aria-label"] and any("data-close" in button for button in page.all("button"))
     enlarged = {link["href"] for link in page.all("a") if link.get("class") == "enlarge"}
     for stem in ("denim-sphere-truth", "denim-plane-woven", "scene-attic-woven", "denim-drawdown"):
         assert f"figures/{stem}.png" in enlarged
     assert "http" not in "".join(element["text"] for element in page.all("script", "style"))
-
-
-def test_the_style_has_no_motion_and_takes_its_colours_from_the_schemes(page):
-    """Smooth scrolling is the only motion, and stands within its media query; contrast is tested in test_colours.py."""
+    # Smooth scrolling is the only motion, and stands within its media query; contrast is tested in test_colours.py.
     style = page.all("style")[0]["text"]
     assert not re.search(r"animation|transition", style)
     outside = re.sub(r"@media \(prefers-reduced-motion: no-preference\) \{.*?\} \}", "", style)

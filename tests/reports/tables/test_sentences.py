@@ -112,13 +112,10 @@ def test_several_unseen_fabrics_have_a_geometric_mean_and_an_interval(mean, low,
     assert text.endswith(f"on the 9 unseen fabrics (geometric mean, 95 % interval over fabrics {ends}).")
 
 
-def test_headline_says_only_what_was_measured():
+def test_headline_says_only_what_was_measured_bounded_where_that_was():
     assert told.headline("woven", "", *tables(math.nan, 1.0)) == ""
     assert "its time" not in told.headline("woven", "", *tables(3.0), paper=False)
     assert "on one unseen fabric" in told.headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
-
-
-def test_the_headline_is_of_what_is_learnt_and_bounded_where_that_was_measured():
     methods = [("point_sampled", "k = 1"), ("point_sampled", "k = 2"), ("woven", ""), ("neumip", "")]
     methods += [("woven", "bounded"), ("curved", ""), ("curved", "eager-bf16")]
     errors = pd.DataFrame(methods, columns=["method", "setting"])
@@ -131,15 +128,6 @@ def of(*shares):
     return [Record(method=f"m{k}").of("waited", share, 20) for k, share in enumerate(shares)]
 
 
-def test_the_median_over_methods_is_said():
-    assert told.waited(of(0.0, 0.25, 0.9)) == 0.25
-    none = pd.DataFrame()
-    assert {"waited": "25.0 %", "busy": "25.0 %"}.items() <= told.facts(of(0.0, 0.25, 0.9), none).items()
-    quiet = told.facts(of(0.001), none)
-    assert quiet["waited"] == "0.1 %" and "busy" not in quiet
-    assert told.facts([], none) == {} and math.isnan(told.waited([]))
-
-
 @pytest.mark.parametrize(
     ("a", "b", "words"), [(0.0, 0.0, ""), (0.0, 0.3, "B waited 30 %"), (0.4, 0.3, "A waited 40 %")]
 )
@@ -149,7 +137,7 @@ def test_a_comparison_warns_of_busy_machines_alone(a, b, words):
     assert told.busy(of(told.QUIET), []) and told.busy([], []) == []
 
 
-def test_facts_name_trainings_unseen_fabrics_and_the_energy_bound():
+def test_facts_name_trainings_unseen_fabrics_the_energy_bound_and_the_median_over_methods():
     errors = pd.DataFrame({"method": ["woven", "neumip", "soft_nodes"], "setting": "", "zero_answers": 0.0})
     errors = errors.assign(role="unseen", fabrics=[9, 1, 1])
     values = told.facts([], errors.assign(seeds=[1, 3, 0]))
@@ -157,6 +145,12 @@ def test_facts_name_trainings_unseen_fabrics_and_the_energy_bound():
     assert values["unseen_fabrics"] == 9 and "one_unseen" not in values and "bounded" not in values
     values = told.facts([], errors.assign(seeds=0, fabrics=1, setting=told.BOUNDED))
     assert values["one_unseen"] == "One" and values["bounded"] and "once" not in values and "several" not in values
+    assert told.waited(of(0.0, 0.25, 0.9)) == 0.25
+    none = pd.DataFrame()
+    assert {"waited": "25.0 %", "busy": "25.0 %"}.items() <= told.facts(of(0.0, 0.25, 0.9), none).items()
+    quiet = told.facts(of(0.001), none)
+    assert quiet["waited"] == "0.1 %" and "busy" not in quiet
+    assert told.facts([], none) == {} and math.isnan(told.waited([]))
 
 
 def test_a_measure_that_was_not_installed_is_known_where_scenes_were_measured():

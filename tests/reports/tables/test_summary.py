@@ -58,30 +58,13 @@ def test_unseen_fabrics_have_geometric_means():
     assert summary.summary_table([*RECORDS, *more]).loc[("woven", ""), "× lower, unseen"] == pytest.approx(5.0)
 
 
-def test_errors_are_means_over_fabrics():
+def test_errors_are_means_over_fabrics_which_pictures_name():
     woven = row(summary.error_table(RECORDS), method="woven", role="seen")
     assert (woven.fabrics, woven.queries) == (2, 200) and woven.mse == pytest.approx(2.0)
     assert woven.standard_error == pytest.approx(0.05 / 2)  # sqrt(.03^2 + .04^2) / 2
     assert (woven.low, woven.high) == pytest.approx((2 - 1.96 * 0.025, 2 + 1.96 * 0.025))
     assert woven.noise_share == pytest.approx(0.5 / 2.5) and woven.ratio == pytest.approx(8.0 / 2.0)
     assert woven.ratio_low < 4 < woven.ratio_high
-
-
-def test_a_ratio_compares_the_fabrics_that_both_cover():
-    """NeuMIP answers for denim alone: there 2 points have 6, not the 8 of both fabrics."""
-    table = summary.error_table(RECORDS)
-    assert row(table, method="neumip").ratio == pytest.approx(3.0)
-    assert row(table, method="woven", role="unseen").ratio == pytest.approx(2.5)
-
-
-def test_without_the_baseline_or_below_the_noise_there_is_no_ratio():
-    alone = [record for record in RECORDS if record.setting != "k = 2" or record.fabric != "basket"]
-    assert math.isnan(row(summary.error_table(alone), method="woven", role="seen").ratio)
-    table = summary.error_table([*error("m", "", "denim", "seen", -0.1), *error("p", "k = 2", "denim", "seen", 1.0)])
-    assert math.isnan(row(table, method="m").ratio)
-
-
-def test_fabrics_and_pictures():
     by_fabric = summary.fabric_table(RECORDS)
     assert by_fabric["fabric"].tolist() == ["denim", "basket", "twill_4_4"]
     assert by_fabric["point_sampled k = 2"].tolist() == [6.0, 10.0, 5.0] and math.isnan(by_fabric["neumip"][1])
@@ -89,7 +72,18 @@ def test_fabrics_and_pictures():
     assert pictures[["scene", "mse"]].to_numpy().tolist() == [["sphere", 0.5], ["plane", 0.7]]
 
 
-def test_aliasing_and_timing():
+def test_a_ratio_compares_the_fabrics_that_both_cover_above_the_noise():
+    """NeuMIP answers for denim alone: there 2 points have 6, not the 8 of both fabrics."""
+    table = summary.error_table(RECORDS)
+    assert row(table, method="neumip").ratio == pytest.approx(3.0)
+    assert row(table, method="woven", role="unseen").ratio == pytest.approx(2.5)
+    alone = [record for record in RECORDS if record.setting != "k = 2" or record.fabric != "basket"]
+    assert math.isnan(row(summary.error_table(alone), method="woven", role="seen").ratio)
+    table = summary.error_table([*error("m", "", "denim", "seen", -0.1), *error("p", "k = 2", "denim", "seen", 1.0)])
+    assert math.isnan(row(table, method="m").ratio)
+
+
+def test_aliasing_and_timing_and_mean_spectra():
     alias = row(summary.aliasing_table(RECORDS), method="woven")
     assert (alias.fabrics, alias.flicker, alias.excess_energy) == pytest.approx((2, 0.2, -0.2))
     timing = summary.timing_table(RECORDS)
@@ -99,9 +93,6 @@ def test_aliasing_and_timing():
     # 400 ns a query are .83 s a frame of 1920 by 1080.
     assert woven.frame_ms == pytest.approx(829.44)
     assert math.isnan(woven.most_threads_ns) and math.isnan(woven.prepare_ms) and math.isnan(woven.memory)
-
-
-def test_spectra_are_averaged():
     curves = [((0.1, 1.0), (0.2, 2.0)), ((0.1, 3.0), (0.2, 4.0))]
     records = [Record(method="m", metric="spectrum", fabric=f"f{i}", curve=curve) for i, curve in enumerate(curves)]
     assert summary.spectra(records) == {("m", ""): [(0.1, 2.0), (0.2, 3.0)]}

@@ -35,14 +35,11 @@ def test_the_table_compares_what_answers_for_the_same_fabrics():
     }
 
 
-def test_the_cheapest_within_an_error():
+def test_the_cheapest_within_an_error_and_an_empty_table_of_nothing():
     seen = tradeoff_table(ERRORS, TIMING).query("role == 'seen'")
     best = [cheapest(seen, "ns", error=limit) for limit in (0.25, 0.1, 0.05)]
     assert [(row.method, row.setting) for row in best] == [("fast", "k = 1"), ("fast", "k = 2"), ("slow", "")]
     assert cheapest(seen, "ns", error=0.005) is None
-
-
-def test_nothing_measured_gives_an_empty_table():
     for errors, timing in ((ERRORS[:0], TIMING), (ERRORS, TIMING[:0])):
         table = tradeoff_table(errors, timing)
         assert table.empty and "front" in table

@@ -232,14 +232,11 @@ def test_a_malformed_file_is_one_sentence_that_names_its_section(read):
         assert named in refusal(read, content, suffix), case
 
 
-def test_a_fiberworks_file_by_hand(read):
+def test_a_fiberworks_file_by_hand_and_a_weavepoint_file_without_yarns_per_inch(read):
     draft = read(DTX + "@@Treadling\n1 2\n", ".dtx")
     assert draft.warp_over.tolist() == [[True, False], [False, True]]
     assert draft.ends.colours == ("#010203",) * 2 and draft.picks.colours == ("#040506",) * 2
     assert [("default" in remark) for remark in draft.remarks] == [True, True]
-
-
-def test_a_weavepoint_file_without_yarns_per_inch(read):
     content = bytearray(SAMPLES[next(name for name in VALID if name.endswith("two color liftplan.wpo"))].read_bytes())
     content[9] = content[10] = 0
     assert read(bytes(content), ".wpo").ends.per_cm is None
