@@ -110,13 +110,18 @@ def test_the_silhouette_is_measured_where_the_cloth_is_curved(files, tasks):
     assert_changed(after, again, "edge|errors|^report")
 
 
-def test_models_of_one_kind_are_told_apart_on_the_page(files):
+def test_settings_are_measured_on_scenes_one_by_one_and_models_of_one_kind_are_told_apart(files):
     files.exchange('model = "neumip"', 'model = "neumip"\n\n[[models]]\nmodel = "neumip"\nname = "fine"')
     page = files.plan()[-1]
     notes = {note.name: note for note in page.models}
     assert notes["fine"].kind == "neumip" and notes["fine"].about.startswith("neumip: ")
     assert {"neumip", "fine"} <= {picture.method for picture in page.pictures}
     assert len({(p.fabric, p.scene, p.method, p.setting) for p in page.pictures}) == len(page.pictures)
+    # With one more number of points what was there stays, but what is about all of them.
+    before = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["curtain"] }').plan()
+    after = files.exchange("counts = [1, 2]", "counts = [1, 2, 128]").plan()
+    assert ids(after).keys() - ids(before).keys() == {"bench scene errors of point_sampled, curtain, k = 128"}
+    assert_changed(before, after, "(errors|extremes) of point_sampled(?!, curtain)|frame time|timing|^report")
 
 
 def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tasks):
@@ -156,14 +161,6 @@ def test_random_unseen_fabrics_are_measured_by_general_models_alone(files, tasks
 def test_the_largest_plan_is_paper_sized():
     tasks = plan(load_recipe("full_transmission"))
     assert sum(task.rows for task in tasks if task.stage == "generate") > 50_000_000
-
-
-def test_settings_are_measured_on_scenes_one_by_one(files):
-    """With one more number of points what was there stays, but what is about all of them."""
-    before = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["curtain"] }').plan()
-    after = files.exchange("counts = [1, 2]", "counts = [1, 2, 128]").plan()
-    assert ids(after).keys() - ids(before).keys() == {"bench scene errors of point_sampled, curtain, k = 128"}
-    assert_changed(before, after, "(errors|extremes) of point_sampled(?!, curtain)|frame time|timing|^report")
 
 
 BTF = '\n[[models]]\nmodel = "unified_btf"\ntexels_per_yarn = 2\nsamples = 60\n'

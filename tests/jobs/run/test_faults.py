@@ -71,7 +71,7 @@ def test_a_manifest_of_either_data_set_is_compared_and_a_folder_or_a_larger_file
     assert ledger.discard(other) == [other.products[0]]
 
 
-def test_products_of_an_earlier_version_are_outdated(tmp_path, monkeypatch):
+def test_products_of_an_earlier_version_are_outdated_and_what_a_stopped_task_leaves_is_known(tmp_path, monkeypatch):
     path = made_up.write_recipe(tmp_path, "other", "neumip")
     with monkeypatch.context() as patch:
         patch.setattr(versions, "TRAINING", versions.TRAINING - 1)
@@ -85,8 +85,5 @@ def test_products_of_an_earlier_version_are_outdated(tmp_path, monkeypatch):
     # What no network is part of is not touched by it.
     assert {stage for stage, _ in found} == {"train", "bench", "report"}
     assert len(found) < sum(task.stage != "generate" for task in tasks)
-
-
-def test_what_a_stopped_task_leaves_is_known_by_name():
     assert all(map(is_leftover, (CHECKPOINT, f"0123-{ROWS}", ".tmp-card.json")))
     assert not any(map(is_leftover, ("model.safetensors", "part-0.parquet", "notes.txt")))

@@ -67,11 +67,14 @@ def test_what_lies_beyond_the_general_domain_counts_as_the_fallbacks(require, mo
     assert 0.1 < seen["woven"] < 0.9 and seen["woven"] == seen["neumip"] and seen["point_sampled"] == 0.0
 
 
-def test_a_wish_that_nothing_meets_names_the_nearest_points(require):
+def test_a_wish_that_nothing_meets_names_the_nearest_points_and_the_general_recipe_may_run_first(require, monkeypatch):
     told = require.refused("--error", ".01", "--time", ".001")
     assert "no method meets them" in told and "point_sampled k = 2" in told
     told = require.refused("--method", "woven", "--error", ".01")
     assert "woven: " in told and "point_sampled" not in told
+    ran = []
+    monkeypatch.setattr(verb, "work", lambda recipe, stages, *_: ran.append((recipe, stages)))
+    assert require("--run")[0] == 0 and ran == [("wide.toml", verb.STAGES)]
 
 
 def test_a_method_that_was_not_measured_or_that_only_an_old_page_has_is_refused(require, tmp_path):
@@ -84,9 +87,3 @@ def test_a_method_that_was_not_measured_or_that_only_an_old_page_has_is_refused(
     assert "the page of wide: method = 'sums'" in require.refused() and require("--method", "point_sampled")[0] == 0
     path.unlink()
     assert "no page of the recipe wide with Records: `twillight run wide.toml` must run first" in require.refused()
-
-
-def test_the_general_recipe_may_run_first(require, monkeypatch):
-    ran = []
-    monkeypatch.setattr(verb, "work", lambda recipe, stages, *_: ran.append((recipe, stages)))
-    assert require("--run")[0] == 0 and ran == [("wide.toml", verb.STAGES)]

@@ -60,11 +60,18 @@ def test_shadows_converge_with_points(blend):
         assert 0.8 < -slope < 1.7, by_points
 
 
-def test_soft_shadows_converge_with_the_nodes_across():
+def test_soft_shadows_converge_with_the_nodes_across_and_the_seen_area_is_the_projected_one():
     """From k = 2 to 4 a yarn has twice as many, and narrower ramps: order 1/2 at least. Others change nothing."""
     errors = np.array([shadow_errors(methods.soft_nodes, 0.5, 1.2, level=level) for level in (1, 2, 4, 8)])
     np.testing.assert_allclose(errors[[0, 2]], errors[[1, 3]], atol=5e-4)
     assert (errors[2] < errors[1] / math.sqrt(2.0)).all(), errors
+    # Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle.  Its
+    # table is linear between angles and azimuths; no wall is there to be left out.
+    fabric = cloth()
+    queries = draw_queries(QueryOptions(sigma=(6.0, 8.0), max_angle=80.0), fabric.weave.repeat, 3, 0, 60)
+    sums, gaps = query_sums(tabulate(fabric, rims=False), queries)
+    assert not gaps.any()
+    assert np.abs(sums[:, :, AREA].sum(axis=1) / queries.wo[:, 2] - 1.0).mean() < 0.01
 
 
 @pytest.mark.parametrize("depth", [0.05, 0.4, 2.0])
@@ -95,18 +102,6 @@ def test_white_cloth_returns_no_more_light_than_it_gets(method):
             method is methods.averaged_normals
         )
         assert returned.mean() > 0.5
-
-
-def test_the_seen_area_of_a_closed_surface_is_the_projected_one():
-    """Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle.
-
-    Its table is linear between angles and azimuths; no wall is there to be left out.
-    """
-    fabric = cloth()
-    queries = draw_queries(QueryOptions(sigma=(6.0, 8.0), max_angle=80.0), fabric.weave.repeat, 3, 0, 60)
-    sums, gaps = query_sums(tabulate(fabric, rims=False), queries)
-    assert not gaps.any()
-    assert np.abs(sums[:, :, AREA].sum(axis=1) / queries.wo[:, 2] - 1.0).mean() < 0.01
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def test_few_rays_and_the_table_are_near_the_truth(name):
         assert abs(errors.mean()) < 0.01
 
 
-def test_closed_form_along_half_cylinders():
+def test_closed_form_along_half_cylinders_and_rows_answered_one_by_one():
     """Along the warps: the share of a period whose height exceeds 1/2 - depth, by rays and by the table. The share is
     an interval, whose two ends lie in two of 32 strata."""
     depth = np.array([0.02, 0.1, 0.3, 0.49])
@@ -55,9 +55,6 @@ def test_closed_form_along_half_cylinders():
             if size == 4.0:
                 np.testing.assert_allclose(truth, share, atol=0.005)
             np.testing.assert_allclose(quick_coverage(CORDUROY, asked), truth, atol=allowed)
-
-
-def test_rows_are_answered_one_by_one_and_some_need_no_ray():
     fabric = load_fabric("denim")
     asked = looks(fabric, 40, (0.1, 9.0), (0.01, 1.0))
     assert (quick_coverage(fabric, asked._replace(curvature=np.zeros(40, np.float32))) == 1).all()

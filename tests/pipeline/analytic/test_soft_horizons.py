@@ -51,7 +51,7 @@ def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction_and_a_qu
     assert 0 <= low < soft.AZIMUTHS and 0.0 <= turn <= 1.0
 
 
-def test_azimuths_even_in_the_angle_are_read_to_second_order():
+def test_azimuths_are_read_to_second_order_and_what_two_see_together_lies_between_the_bounds():
     """Linear interpolation: the error falls by four with twice the azimuths."""
     t = np.arange(soft.AZIMUTHS) * 4.0 / soft.AZIMUTHS
     y = np.where(t <= 2.0, 1.0 - t, t - 3.0)
@@ -61,10 +61,7 @@ def test_azimuths_even_in_the_angle_are_read_to_second_order():
         even = np.sin(2.0 * np.pi * np.arange(count) / count + 0.3)[:, None]
         errors.append(np.abs(soft.from_even(even)[:, 0] - np.sin(angle + 0.3)).max())
     assert -2.2 < np.polyfit(np.log(counts), np.log(errors), 1)[0] < -1.7, errors
-
-
-def test_what_two_directions_see_together_is_between_the_least_and_the_most_that_is_possible():
-    """Frechet's bounds; it is symmetric, and all of what one sees if the other sees everything."""
+    # Frechet's bounds; it is symmetric, and all of what one sees if the other sees everything.
     random = np.random.default_rng(7)
     for first, second, *xy in random.random((200, 6)).astype(np.float32):
         ways = soft.azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in xy))

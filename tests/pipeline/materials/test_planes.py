@@ -19,7 +19,7 @@ def test_maps_tile_without_a_seam(name):
         np.testing.assert_allclose(two, np.tile(one, (2, 2, *[1] * (one.ndim - 2))), atol=1e-5)
 
 
-def test_means_over_the_map_are_kept_by_every_level_and_coverage_is_the_area_of_the_yarns():
+def test_means_are_kept_by_every_level_coverage_is_an_area_and_yarns_numbered_ends_first():
     level = planes(load_fabric("gauze"), layout(load_fabric("gauze"), 64), SHARE)
     means = [plane.mean(axis=(0, 1)) for plane in level]
     while level.coverage.size > 1:
@@ -31,9 +31,6 @@ def test_means_over_the_map_are_kept_by_every_level_and_coverage_is_the_area_of_
     open_area = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width)
     assert level.coverage.mean() == pytest.approx(1.0 - open_area, abs=0.02)
     assert np.isfinite(level.height).all()
-
-
-def test_yarns_are_numbered_ends_first():
     fabric = load_fabric("denim")
     found = layout(fabric, 64)
     numbers = yarn_ids(fabric, found)

@@ -51,7 +51,7 @@ def gbuffer():
     return GBuffer(mask, np.flatnonzero(mask), *shapes, np.array([UP, SIDE, UP]), *queries)
 
 
-def test_queries_repeat_their_places_as_they_are_seen_at_a_silhouette(gbuffer):
+def test_queries_repeat_their_places_and_lights_add_up_over_what_is_seen_through(gbuffer):
     queries = gbuffer.queries((4, 4))
     assert queries.u.tolist() == [3.0, 0.0, 3.0] and queries.v.tolist() == [3.0, 0.0, 3.0]
     assert queries.sigma_minor.tolist() == [0.5, 1.5, 0.5]
@@ -69,9 +69,6 @@ def test_queries_repeat_their_places_as_they_are_seen_at_a_silhouette(gbuffer):
     (look,) = zip(*seen.rims((4, 4)), strict=True)
     assert look[0] == 1.0 and look[4] == pytest.approx(low[0]) and look[3] == pytest.approx(low[0])
     assert seen.coverage([0.25]).tolist() == [1.0, 1.0, 0.25]
-
-
-def test_lights_add_up_over_what_is_seen_through(gbuffer):
     rgb = np.array([[0.1, 0.1, 0.1], [0.2, 0.4, 0.6], [0.01, 0.02, 0.03]])
     background = np.arange(18.0).reshape(2, 3, 3)
     picture = compose(gbuffer, rgb, background, transparency=[0.0, 0.5, 0.25])

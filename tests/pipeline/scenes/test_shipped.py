@@ -20,7 +20,7 @@ def shown(request):
     return loaded, *(render(loaded, frame, (WIDTH, WIDTH * height // width)) for frame in (0.0, 1.0, 23.0))
 
 
-def test_every_fabric_is_seen_and_lit_in_legal_queries(shown):
+def test_every_fabric_is_seen_and_lit_in_legal_queries_and_frames_move_by_less_than_a_pixel(shown):
     loaded, *frames = shown
     for frame in frames:
         for key, (_, fabric) in loaded.cloths.items():
@@ -30,12 +30,9 @@ def test_every_fabric_is_seen_and_lit_in_legal_queries(shown):
             assert not faults(gbuffer.looks(fabric.weave.repeat))
             assert (gbuffer.irradiance >= 0).all() and np.isfinite(gbuffer.irradiance).all()
         assert np.isfinite(frame.backdrop).all() and (frame.backdrop >= 0).all()
-
-
-def test_frames_move_by_less_than_a_pixel(shown):
-    """A pixel's new place, measured in the ellipse of its old footprint, in pixels of the full picture. |J^-1 d| is the
-    length of d along the ellipse's axes over its standard deviations, times pixel_sigma. The median bounds the motion;
-    pixels that pass an edge see another fold."""
+    # A pixel's new place, measured in the ellipse of its old footprint, in pixels of the full picture. |J^-1 d|
+    # is the length of d along the ellipse's axes over its standard deviations, times pixel_sigma. The median
+    # bounds the motion; pixels that pass an edge see another fold.
     loaded, first, second, _ = shown
     assert loaded.scene.frames >= 24
     for key in loaded.cloths:

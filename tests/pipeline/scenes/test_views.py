@@ -25,13 +25,18 @@ def derivative(gbuffer):
 
 
 @pytest.mark.parametrize("scene", ["sphere", "plane"])
-def test_directions_are_unit_and_in_front(scene):
+def test_directions_are_unit_and_in_front_and_frames_slide_the_cloth_by_less_than_a_pixel(scene):
     gbuffer = view(scene, 64, 48)
     for directions in (gbuffer.wi, gbuffer.wo):
         assert np.linalg.norm(directions, axis=1) == pytest.approx(1.0, abs=1e-12)
         assert (directions[:, 2] > 0).all()
     assert gbuffer.wo[:, 2].min() >= math.cos(math.radians(ViewOptions().largest_angle))
     assert (gbuffer.sigma > 0).all() and not (gbuffer.lit & ~gbuffer.mask).any()
+    still, moved = (view(scene, 48, 40, frame=frame, options=FLAT) for frame in (0, 2))
+    slide, heading = 2 * FLAT.step / 6, math.radians(HEADING)
+    np.testing.assert_allclose(still.u - moved.u, slide * math.cos(heading), rtol=1e-6)
+    np.testing.assert_allclose(still.v - moved.v, slide * math.sin(heading), rtol=1e-6)
+    assert FLAT.step < 1 and (still.lit == moved.lit).all() and (still.wi == moved.wi).all()
 
 
 def test_the_centre_of_the_sphere_and_a_turn_of_light_and_coordinates_together():
@@ -85,7 +90,7 @@ def test_the_plane_goes_from_resolved_yarns_to_many_repeats_and_ends_with_a_whol
     assert sphere.lit.sum() == len(sphere.u) < sphere.mask.sum()
 
 
-def test_plane_camera_sees_along_the_ray():
+def test_the_plane_camera_sees_along_the_ray_and_queries_are_reduced_in_float64_first():
     """Oracle: the angle of a pixel's view below the horizontal is pitch plus its angle in the picture."""
     gbuffer = view("plane", 101, 81, options=ViewOptions(turn=0.0, horizon=0.1))
     wo = spread(gbuffer, gbuffer.wo)
@@ -94,19 +99,7 @@ def test_plane_camera_sees_along_the_ray():
     for row in (30, 40, 80):
         below = pitch + math.atan((row + 0.5 - 40.5) / focal)
         assert wo[row, 50] == pytest.approx([0, -math.cos(below), math.sin(below)], abs=1e-12)
-
-
-@pytest.mark.parametrize("scene", ["sphere", "plane"])
-def test_frames_slide_the_cloth_by_less_than_a_pixel(scene):
-    still, moved = (view(scene, 48, 40, frame=frame, options=FLAT) for frame in (0, 2))
-    slide, heading = 2 * FLAT.step / 6, math.radians(HEADING)
-    np.testing.assert_allclose(still.u - moved.u, slide * math.cos(heading), rtol=1e-6)
-    np.testing.assert_allclose(still.v - moved.v, slide * math.sin(heading), rtol=1e-6)
-    assert FLAT.step < 1 and (still.lit == moved.lit).all() and (still.wi == moved.wi).all()
-
-
-def test_queries_are_reduced_in_float64_first():
-    """Near the horizon, 1e5 yarns away, float32 would have lost the position within the repeat."""
+    # Near the horizon, 1e5 yarns away, float32 would have lost the position within the repeat.
     gbuffer = view("plane", 640, 480, options=ViewOptions(plane_pixels_per_yarn=0.01, largest_angle=89.0))
     assert np.abs(gbuffer.v).max() > 1e5
     queries = gbuffer.queries((3, 8))

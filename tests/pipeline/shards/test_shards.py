@@ -63,7 +63,7 @@ def test_a_shard_explains_itself_and_splits_and_fabrics_draw_different_queries(f
     assert not np.intersect1d(first.u, second.u).size
 
 
-def test_identity_follows_optics_and_parameters_and_not_colours():
+def test_a_manifest_is_written_as_json_writes_it_and_identity_follows_optics_and_parameters():
     extra = [ExtraShardTask(fabric=TASK.fabric, extra=extra, start=0, rows=8) for extra in EXTRA]
     for task in (TASK, *extra):
         dyed, rough = (
@@ -74,6 +74,12 @@ def test_identity_follows_optics_and_parameters_and_not_colours():
         assert task.model_copy(update={"fabric": rough}).identity() != task.identity()
         assert task.model_copy(update={"start": 1}).identity() != task.identity() and "version" in task.identity()
     assert len({json.dumps(task.identity()) for task in extra}) == len({task.split for task in extra}) == 3
+    facts = {"fabric": 'a "cloth" –,\n {}', "split": "test", "rows": 2, "sha256": ""}
+    entries = [ShardEntry(file=f"part-{start}.parquet", start=start, **facts) for start in (4, 2, 0)]
+    for shards in ([], entries):
+        manifest = _manifest(*shards)
+        expected = manifest.model_copy(update={"shards": shards[::-1]}).model_dump(mode="json")
+        assert manifest.encoded().decode() == json.dumps(expected, indent=1, sort_keys=True) + "\n"
 
 
 def flipped(content, position):
@@ -164,12 +170,3 @@ def test_damaged_extra_rows_are_named(folder):
     # One kind read as another is refused, never misread.
     misread = entry.model_copy(update={"kind": "components"})
     assert "must be schema version" in check_shard(folder, misread, manifest)[-1]
-
-
-def test_a_manifest_is_written_as_json_writes_it():
-    facts = {"fabric": 'a "cloth" –,\n {}', "split": "test", "rows": 2, "sha256": ""}
-    entries = [ShardEntry(file=f"part-{start}.parquet", start=start, **facts) for start in (4, 2, 0)]
-    for shards in ([], entries):
-        manifest = _manifest(*shards)
-        expected = manifest.model_copy(update={"shards": shards[::-1]}).model_dump(mode="json")
-        assert manifest.encoded().decode() == json.dumps(expected, indent=1, sort_keys=True) + "\n"

@@ -14,7 +14,7 @@ from tests.refusals import refusal
 from weaves.errors import BadInput
 
 
-def test_order_is_a_function_of_seed_and_step_and_few_rows_are_repeated():
+def test_order_is_a_function_of_seed_and_step_and_batches_hold_the_rows_of_their_fabrics():
     forwards = Order([[100], [50], [70]], batch=32, fabrics=2, seed=7)
     steps = [forwards.step(step) for step in range(40)]
     for step in (39, 0, 17):  # another order of asking, another object
@@ -25,6 +25,17 @@ def test_order_is_a_function_of_seed_and_step_and_few_rows_are_repeated():
     assert sorted(np.bincount(Order([[3]], batch=8, fabrics=1, seed=0).step(0)[1][0])) == [2, 3, 3]
     order = Order([[10], [10]], batch=9, fabrics=8, seed=0)
     assert (order.fabrics, order.each) == (2, 4)
+    # Each row holds its fabric in column 0 and its number within the fabric in column 1.
+    counts = [30, 20, 40]
+    table = np.zeros((90, COLUMNS), np.float32)
+    table[:, 0], table[:, 1] = np.repeat(range(3), counts), np.concatenate([np.arange(count) for count in counts])
+    rows = TrainingRows(table, counts)
+    order = Order(rows.windows, batch=12, fabrics=2, seed=3)
+    batch = Batches(rows, order, torch.device("cpu")).step(5)
+    fabrics, numbers = order.step(5)
+    np.testing.assert_array_equal(batch.fabric, fabrics)
+    np.testing.assert_array_equal(batch.u, np.repeat(fabrics[:, None], 6, axis=1))
+    np.testing.assert_array_equal(batch.v, numbers)
 
 
 @pytest.mark.parametrize("windows", [[48], [16, 32], [16, 16, 16]])
@@ -42,20 +53,6 @@ def test_every_round_visits_every_fabric_and_every_epoch_every_row_once(windows)
         assert sorted(seen[0]) == sorted(seen[1]) == list(range(48))
         epochs += seen.values()
     assert len(set(map(tuple, epochs))) == 6
-
-
-def test_batches_hold_the_rows_of_their_fabrics():
-    """Each row holds its fabric in column 0 and its number within the fabric in column 1."""
-    counts = [30, 20, 40]
-    table = np.zeros((90, COLUMNS), np.float32)
-    table[:, 0], table[:, 1] = np.repeat(range(3), counts), np.concatenate([np.arange(count) for count in counts])
-    rows = TrainingRows(table, counts)
-    order = Order(rows.windows, batch=12, fabrics=2, seed=3)
-    batch = Batches(rows, order, torch.device("cpu")).step(5)
-    fabrics, numbers = order.step(5)
-    np.testing.assert_array_equal(batch.fabric, fabrics)
-    np.testing.assert_array_equal(batch.u, np.repeat(fabrics[:, None], 6, axis=1))
-    np.testing.assert_array_equal(batch.v, numbers)
 
 
 def test_columns_are_where_batches_look_for_them(tmp_path):
@@ -164,7 +161,7 @@ def test_every_row_comes_once(rows, folder):
     assert max(len(batch["u"]) for batch in batches) == min(rows, 512)
 
 
-def test_the_order_is_that_of_the_files_or_of_the_seed_and_changes_with_each_pass(folder):
+def test_the_order_is_that_of_the_files_or_of_the_seed_well_shuffled(folder):
     assert rows_in(stream(folder, seed=None, rows=1000)) == expected(folder)
     one, other = stream(folder, seed=3), stream(folder, seed=4)
     first, second = rows_in(one), rows_in(one)
@@ -172,10 +169,7 @@ def test_the_order_is_that_of_the_files_or_of_the_seed_and_changes_with_each_pas
     assert rows_in(stream(folder, seed=3)) == first != rows_in(other)
     workers = DataLoader(stream(folder, seed=None), batch_size=None, num_workers=2)
     assert sorted(rows_in(workers)) == sorted(expected(folder))
-
-
-def test_rows_are_shuffled_well_within_a_shard_and_columns_are_tensors_of_their_own_type(folder):
-    """The mean place of the first half of a shard's rows is that of all, within 5 standard errors."""
+    # The mean place of the first half of a shard's rows is that of all, within 5 standard errors.
     (batch,) = stream(folder, names=NAMES[:1], rows=ROWS)
     order = {u: place for place, u in enumerate(Manifest.load(folder).read(folder, NAMES[0], "train")[0].u.tolist())}
     places = np.array([order[u] for u in batch["u"].tolist()])

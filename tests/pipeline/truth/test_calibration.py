@@ -11,26 +11,11 @@ from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
-def test_a_hidden_patch_has_no_error():
+def test_a_hidden_patch_has_no_error_and_components_or_gaps_that_few_points_show_have_one():
     nothing = np.zeros((5, 5))
     error, bound = calibrate(Raw(nothing, nothing, np.ones(5, np.int64), np.arange(5)), np.zeros(5, np.bool_))
     assert not error.any() and not bound.any()
-
-
-@pytest.mark.parametrize("estimator", [slow(name) if name == "r2" else name for name in ESTIMATORS])
-def test_every_answer_has_a_stage_and_both_errors(estimator):
-    fabric = load_fabric("denim")
-    known = QueryOptions(sigma=(1.0, 32.0), max_angle=75.0) if estimator == "node_table" else QueryOptions()
-    queries = draw_queries(known, fabric.weave.repeat, 5, 0, 40)
-    raw, answers = (call(fabric, queries, answering(estimator, max_count=1024), 1) for call in (uncalibrated, estimate))
-    assert np.isin(raw.stage, list(FRONT_FACTORS)).all()
-    np.testing.assert_array_equal(answers.mean, raw.mean[:, :4].astype(np.float32))
-    assert (answers.bound >= answers.standard_error).all()
-    assert (answers.transparency_bound >= answers.transparency_standard_error).all()
-
-
-def test_components_that_no_point_has_shown_and_points_that_agree_on_a_gap_have_an_error():
-    """One family of yarns fills a narrow footprint: the other one may still have been missed."""
+    # One family of yarns fills a narrow footprint: the other one may still have been missed.
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(sigma=(0.05, 0.08), max_angle=30.0), fabric.weave.repeat, 5, 0, 60)
     raw = uncalibrated(fabric, queries, fixed(64, "mc"), 1)
@@ -46,3 +31,15 @@ def test_components_that_no_point_has_shown_and_points_that_agree_on_a_gap_have_
     wrong = np.abs(answers.transparency - exact.transparency)
     beyond = wrong > answers.transparency_bound + 3.0 * exact.transparency_standard_error
     assert stats.binomtest(int(beyond.sum()), len(wrong), 0.003, alternative="greater").pvalue > 0.001
+
+
+@pytest.mark.parametrize("estimator", [slow(name) if name == "r2" else name for name in ESTIMATORS])
+def test_every_answer_has_a_stage_and_both_errors(estimator):
+    fabric = load_fabric("denim")
+    known = QueryOptions(sigma=(1.0, 32.0), max_angle=75.0) if estimator == "node_table" else QueryOptions()
+    queries = draw_queries(known, fabric.weave.repeat, 5, 0, 40)
+    raw, answers = (call(fabric, queries, answering(estimator, max_count=1024), 1) for call in (uncalibrated, estimate))
+    assert np.isin(raw.stage, list(FRONT_FACTORS)).all()
+    np.testing.assert_array_equal(answers.mean, raw.mean[:, :4].astype(np.float32))
+    assert (answers.bound >= answers.standard_error).all()
+    assert (answers.transparency_bound >= answers.transparency_standard_error).all()

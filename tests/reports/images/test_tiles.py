@@ -22,7 +22,7 @@ def exr(rgb, alpha):
     return Exr({**{c: rgb[..., i] for i, c in enumerate("RGB")}, "A": np.asarray(alpha, np.float32)}, {})
 
 
-def test_tone_mapping_is_exposure_and_the_srgb_curve_and_difference_is_blue_where_dark():
+def test_tones_are_those_of_the_page_or_of_reinhard_and_a_difference_is_blue_where_dark():
     """Linear .21404 is sRGB 127.5/255 by IEC 61966-2-1; 0 stays 0, what is too bright is cut, no cloth is clear."""
     linear = np.array([[[0.21404 / tiles.EXPOSURE] * 3, [0.0] * 3, [9.0] * 3, [1.0] * 3]])
     shown = decoded(tiles.picture(exr(linear, [[1, 1, 1, 0]])))[0, :: tiles.SCALE]
@@ -32,6 +32,13 @@ def test_tone_mapping_is_exposure_and_the_srgb_curve_and_difference_is_blue_wher
     shown = exr(np.array([[[0.5] * 3, [0.2] * 3, [0.9] * 3, [5.0] * 3]]), [[1, 1, 1, 0]])
     same, dark, bright, outside = decoded(tiles.difference(shown, truth))[0, :: tiles.SCALE]
     assert np.ptp(same[:3]) < 4 and dark[2] > dark[0] and bright[0] > bright[2] and outside[3] == 0
+    # Grey of luminance L becomes L / (1 + L): 1 becomes a half, and no grey becomes 1.
+    linear = np.linspace(0.0, 1.0, 60).reshape(4, 5, 3)
+    np.testing.assert_array_equal(displayed(linear), encoded(EXPOSURE * linear))
+    grey = np.array([1.0, 1.0, 1.0]) / EXPOSURE
+    np.testing.assert_array_equal(displayed(grey, "reinhard"), encoded(np.full(3, 0.5)))
+    bright = displayed(1e3 * grey, "reinhard", -3.0), displayed(1e3 * grey, "srgb", -3.0)
+    assert bright[0].max() < 255 == bright[1].max()
 
 
 def centres(pixels, rows, columns, top=0, left=0):
@@ -82,13 +89,3 @@ def test_a_stop_doubles_the_light(tone):
     linear = np.geomspace(1e-3, 0.4, 30).reshape(10, 3)
     for stops in (1.0, -2.0):
         np.testing.assert_array_equal(displayed(linear, tone, stops), displayed(2.0**stops * linear, tone))
-
-
-def test_the_default_is_the_page_and_reinhard_keeps_the_hue_and_never_ends():
-    """Grey of luminance L becomes L / (1 + L): 1 becomes a half, and no grey becomes 1."""
-    linear = np.linspace(0.0, 1.0, 60).reshape(4, 5, 3)
-    np.testing.assert_array_equal(displayed(linear), encoded(EXPOSURE * linear))
-    grey = np.array([1.0, 1.0, 1.0]) / EXPOSURE
-    np.testing.assert_array_equal(displayed(grey, "reinhard"), encoded(np.full(3, 0.5)))
-    bright = displayed(1e3 * grey, "reinhard", -3.0), displayed(1e3 * grey, "srgb", -3.0)
-    assert bright[0].max() < 255 == bright[1].max()

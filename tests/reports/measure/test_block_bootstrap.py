@@ -26,7 +26,7 @@ def test_intervals_cover_under_correlated_noise():
     assert by_blocks >= 170 and by_pixels < 100
 
 
-def test_independent_pixels_have_the_usual_standard_error_and_equal_values_none():
+def test_intervals_are_those_of_the_difference_and_of_independent_pixels():
     """Its own relative error is 1 / sqrt(2 · 90 blocks) = 7 % and that of 500 draws 3 %: 25 % allowed."""
     rows = np.random.default_rng(1).standard_normal(DISC.sum())
     spread, low, high = block_interval(rows, DISC, ImageOptions())
@@ -37,18 +37,7 @@ def test_independent_pixels_have_the_usual_standard_error_and_equal_values_none(
     assert np.bincount(blocks(mask, 16)).tolist() == [256] * (4 * 5)
     assert np.bincount(blocks(mask[:20, 16:], 16)).tolist() == [25] * (4 * 16)  # a quarter of 20 is 5
     assert block_interval(np.full(DISC.sum(), 0.5), DISC, ImageOptions()) == (0, 0.5, 0.5)
-
-
-RANDOM = np.random.default_rng(5)
-SIZE = (48, 64)
-MASK = RANDOM.random(SIZE) < 0.8
-TRUTH = RANDOM.random((*SIZE, 3)) + 0.5
-HARD = RANDOM.standard_normal((*SIZE, 3)) * np.linspace(0.1, 3.0, SIZE[1])[:, None]
-OPTIONS = ImageOptions(block=8, resamples=300)
-
-
-def test_it_is_the_difference_of_both_mean_squared_errors_without_what_both_err_alike():
-    """Exactly, whatever the noise of the truth is: it enters linearly, and has no bias."""
+    # Exactly, whatever the noise of the truth is: it enters linearly, and has no bias.
     a, b = TRUTH + 0.1 * HARD, TRUTH + 0.2 * HARD
     difference, low, high = mse_difference(a, b, TRUTH, MASK, OPTIONS)
     assert difference == pytest.approx((0.04 - 0.01) * np.mean(HARD[MASK] ** 2), rel=1e-12)
@@ -62,3 +51,11 @@ def test_it_is_the_difference_of_both_mean_squared_errors_without_what_both_err_
     assert difference == pytest.approx(0.03, rel=0.1)
     # By itself, a picture's MSE is 1 in one half and 4 in the other.
     assert low > 0.0 and high - low < 0.02
+
+
+RANDOM = np.random.default_rng(5)
+SIZE = (48, 64)
+MASK = RANDOM.random(SIZE) < 0.8
+TRUTH = RANDOM.random((*SIZE, 3)) + 0.5
+HARD = RANDOM.standard_normal((*SIZE, 3)) * np.linspace(0.1, 3.0, SIZE[1])[:, None]
+OPTIONS = ImageOptions(block=8, resamples=300)

@@ -30,7 +30,7 @@ class Truth(FakeMethod):
         return coverage(fabric, looks, TINY.truth, TINY.seed)[0]
 
 
-def test_pixels_see_the_cylinder_as_the_camera_does():
+def test_pixels_see_the_cylinder_and_a_flat_method_is_black_where_the_light_is_behind():
     queries = edge_queries(TINY, (4, 4))
     assert len(queries.u) == 5 * 6
     distance = 10.0 - 0.025 * (np.arange(6)[::-1] + 0.5)
@@ -44,6 +44,10 @@ def test_pixels_see_the_cylinder_as_the_camera_does():
     np.testing.assert_allclose((queries.wi * queries.wo).sum(axis=1), expected, atol=1e-6)
     # Light from the edge's side: straight into the normal where the normal is turned to it.
     assert (queries.wi[:, 2] > 0.7).all()
+    lit_from_behind = TINY.model_copy(update={"light": (-120.0, 0.0)})
+    method = flat()
+    edge = edge_of(method, DENIM, lit_from_behind)
+    assert len(method.asked[0].u) == 0 and (edge.light == 0).all() and (edge_of(method, DENIM, TINY).light > 0).all()
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +72,3 @@ def test_the_file_holds_the_edge_which_the_truth_finds_and_a_flat_method_does_no
     assert values["displacement"] == pytest.approx(0.15 * (1 - truth.coverage.mean()))
     wrong = edge_of(flat(), DENIM, TINY).light - truth.light
     assert values["light"] == pytest.approx(np.sqrt((wrong**2).mean())) and (method.asked[0].curvature == 0).all()
-
-
-def test_a_flat_method_is_black_where_the_light_is_behind():
-    lit_from_behind = TINY.model_copy(update={"light": (-120.0, 0.0)})
-    method = flat()
-    edge = edge_of(method, DENIM, lit_from_behind)
-    assert len(method.asked[0].u) == 0 and (edge.light == 0).all() and (edge_of(method, DENIM, TINY).light > 0).all()

@@ -23,11 +23,21 @@ def test_rows_of_a_method_stand_together_and_of_its_spectra_the_last_is_drawn(ma
     assert "points, k = 16" not in labels and "points, k = 1" not in labels
 
 
-def test_ticks_of_both_signs_are_powers_of_ten_and_few():
+def test_ticks_are_few_powers_of_ten_and_names_keep_their_colours_for_good():
     assert figures._signed_decades([0.02, -0.0005], 1e-3) == pytest.approx([0, 1e-3, 1e-2])
     ticks = figures._signed_decades([-0.3, 2.0, 1e-5], 1e-5)
     assert len(ticks) <= 7 and 0.0 in ticks and 1.0 in ticks and -0.1 in ticks
     assert figures._signed_decades([], 1e-5) == [0.0]
+    # Two models of one kind differ, and a plot of the second alone shows it as the plot of both does.
+    page = LIGHT.naming(["truth", "woven", "wide", "deep"])
+    assert page.colours(["deep"])["deep"] == page.colours(["wide", "deep"])["deep"]
+    assert page.colours(["deep"])["deep"] not in (page.colours(["wide"])["wide"], page.methods["woven"])
+    assert LIGHT.colours(["deep"])["deep"] != page.colours(["deep"])["deep"]
+    assert len({page.marker(name) for name in ("deep", "wide", "woven", "point_sampled")}) == 4
+    # Two dozen unknown names are told apart by colour and mark.
+    names = [f"variant_{index}" for index in range(24)]
+    page = LIGHT.naming(["truth", "woven", *names])
+    assert len({(page.methods[name], page.marker(name)) for name in names}) == len(names)
 
 
 @pytest.mark.parametrize("count", [1, 5, 40])
@@ -45,16 +55,3 @@ def test_every_method_has_a_colour_and_a_mark_of_its_own(scheme):
     assert scheme.colours(["woven", "woven"]) == {"woven": colours["woven"]}
     assert {*CLASSES, *NAMES} <= set(scheme.methods)
     assert len(set(scheme.methods.values()) | set(scheme.others)) == len(scheme.methods) + len(scheme.others)
-
-
-def test_a_page_gives_names_their_colours_for_good():
-    """Two models of one kind differ, and a plot of the second alone shows it as the plot of both does."""
-    page = LIGHT.naming(["truth", "woven", "wide", "deep"])
-    assert page.colours(["deep"])["deep"] == page.colours(["wide", "deep"])["deep"]
-    assert page.colours(["deep"])["deep"] not in (page.colours(["wide"])["wide"], page.methods["woven"])
-    assert LIGHT.colours(["deep"])["deep"] != page.colours(["deep"])["deep"]
-    assert len({page.marker(name) for name in ("deep", "wide", "woven", "point_sampled")}) == 4
-    # Two dozen unknown names are told apart by colour and mark.
-    names = [f"variant_{index}" for index in range(24)]
-    page = LIGHT.naming(["truth", "woven", *names])
-    assert len({(page.methods[name], page.marker(name)) for name in names}) == len(names)

@@ -119,7 +119,7 @@ def test_like_is_compared_with_like_and_nothing_in_common_is_bad_input():
     assert "share no measurement" in refusal(compare, [error_of("m", 1.0, 0.1)], [error_of("n", 1.0, 0.1)])
 
 
-def test_what_else_differs_is_said():
+def test_what_else_differs_is_said_and_holm_is_that_of_its_textbook():
     a = time_of("m", [1.0, 2.0], note="512 queries a fabric", provenance=Provenance(dataset="a"))
     b = time_of("m", [1.0, 2.0], note="1024 queries a fabric", provenance=Provenance(dataset="b", version=1))
     assert compare([a], [a]).unlike == []
@@ -127,6 +127,8 @@ def test_what_else_differs_is_said():
     once = "one training in A and B: another training of net may differ by more than is marked here"
     assert compare(trained([1.0], 0.1), trained([2.0], 0.1)).unlike == [once]
     assert compare(trained([1.0], 0.1), trained([2.0, 2.1], 0.1)).unlike == []
+    # Four p-values .01, .04, .03, .005 at their ranks: .005 x 4, .01 x 3, .03 x 2, and .04 no less than that.
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02]) and holm([]) == []
 
 
 @pytest.mark.parametrize("change", [{"cpu": "another"}, {"cores": 99}, {"threads": 7}])
@@ -140,11 +142,6 @@ def test_another_machine_is_refused_unless_asked_for(change):
     assert str(value) in sentence
     later = here.model_copy(update={"date": "2000-01-01T00:00:00+00:00", "packages": {}})
     assert refuse_other_machine(here, later) == []
-
-
-def test_holm_on_its_textbook_example():
-    """Four p-values .01, .04, .03, .005 at their ranks: .005 x 4, .01 x 3, .03 x 2, and .04 no less than that."""
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02]) and holm([]) == []
 
 
 @given(st.lists(st.floats(0, 1) | st.just(math.nan), max_size=12))

@@ -90,7 +90,7 @@ def test_records_without_the_baseline_are_refused_and_without_two_random_points_
     assert "\n\n\n" not in page, "a section without sentences has no empty paragraph"
 
 
-def test_the_file_says_where_its_numbers_come_from(made_up):
+def test_the_file_says_where_its_numbers_come_from_and_a_block_is_replaced_alone(made_up):
     rate = Record(method="truth", setting="everything").of("rate", 4.5e8, 1).model_copy(update={"unit": "points/s"})
     about = {"recipe": "standard", "recipe_fingerprint": "0123456789abcdef" * 4}
     page = results_page(named([*made_up, rate], **about), MACHINE, "file")
@@ -102,16 +102,13 @@ def test_the_file_says_where_its_numbers_come_from(made_up):
     assert "## Scenes" not in page, "what was not measured has no section"
     for table in page.split("\n\n"):
         assert len({line.count("|") for line in table.splitlines() if line.startswith("|")}) <= 1, table
+    assert block(TEXT, "speeds", "file") == "old\n"
+    assert documents.with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
+    assert documents.with_block(TEXT, "speeds", "old", "file") == TEXT
 
 
 FIRST, LAST = markers("speeds")
 TEXT = f"before\n{FIRST}\nold\n{LAST}\nafter\n"
-
-
-def test_a_block_is_replaced_and_nothing_else():
-    assert block(TEXT, "speeds", "file") == "old\n"
-    assert documents.with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
-    assert documents.with_block(TEXT, "speeds", "old", "file") == TEXT
 
 
 @pytest.mark.parametrize("text", ["nothing", f"{FIRST}\nno end", f"{LAST}\n{FIRST}\n"])

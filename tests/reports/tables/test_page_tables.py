@@ -104,7 +104,7 @@ def attic(records):
     return table
 
 
-def test_a_scene_has_the_range_over_trainings_beside_its_interval():
+def test_numbers_of_a_scene_have_intervals_and_ranges_and_the_last_row_is_the_truths_noise():
     several = [
         one.model_copy(update={"value": factor * one.value, "provenance": Provenance(model="net", seed=factor)})
         for one in RECORDS[:4]
@@ -118,9 +118,6 @@ def test_a_scene_has_the_range_over_trainings_beside_its_interval():
     assert ranges["MSE"] == "[2.00 … 6.00]e−3" and ranges["PSNR, dB"] == "[31.2 … 93.8]"
     assert ranges["colour"] == "[0 … 0]" and ranges["ms a frame"] == "" and ranges["flicker"] == "[−6.00 … −2.00]e−3"
     assert not any(cell.range for cell in cells_of(attic(records), "points, k = 2").values())
-
-
-def test_numbers_of_a_scene_have_their_intervals_and_the_last_row_is_the_truths_noise():
     table = attic(RECORDS)
     shown = {title: (cell.text, cell.interval) for title, cell in cells_of(table, "woven").items()}
     assert shown["MSE"] == ("2.00e−3", "(1.80 … 2.30)e−3") and shown["PSNR, dB"] == ("31.2", "(30.1 … 32.9)")

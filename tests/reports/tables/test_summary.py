@@ -48,7 +48,7 @@ def row(table, **keys):
     return found
 
 
-def test_unseen_fabrics_have_geometric_means():
+def test_errors_are_means_and_those_of_unseen_fabrics_geometric():
     """The baseline errs 5 and 8, woven 2 and .8: ratios 2.5 and 10, colour errors sqrt(2) and sqrt(.8)."""
     more = [*error("woven", "", "crepe", "unseen", 0.8), *error("point_sampled", "k = 2", "crepe", "unseen", 8.0)]
     table = summary.error_table([*RECORDS, *more])
@@ -56,9 +56,6 @@ def test_unseen_fabrics_have_geometric_means():
     assert woven.fabrics == 2 and woven.ratio == pytest.approx(13.0 / 2.8)
     assert (woven.ratio_fabrics, woven.mse_fabrics) == pytest.approx((5.0, math.sqrt(1.6)))
     assert summary.summary_table([*RECORDS, *more]).loc[("woven", ""), "× lower, unseen"] == pytest.approx(5.0)
-
-
-def test_errors_are_means_over_fabrics_which_pictures_name():
     woven = row(summary.error_table(RECORDS), method="woven", role="seen")
     assert (woven.fabrics, woven.queries) == (2, 200) and woven.mse == pytest.approx(2.0)
     assert woven.standard_error == pytest.approx(0.05 / 2)  # sqrt(.03^2 + .04^2) / 2
@@ -83,7 +80,7 @@ def test_a_ratio_compares_the_fabrics_that_both_cover_above_the_noise():
     assert math.isnan(row(table, method="m").ratio)
 
 
-def test_aliasing_and_timing_and_mean_spectra():
+def test_summary_is_one_row_a_method_with_aliasing_timing_and_mean_spectra():
     alias = row(summary.aliasing_table(RECORDS), method="woven")
     assert (alias.fabrics, alias.flicker, alias.excess_energy) == pytest.approx((2, 0.2, -0.2))
     timing = summary.timing_table(RECORDS)
@@ -96,6 +93,11 @@ def test_aliasing_and_timing_and_mean_spectra():
     curves = [((0.1, 1.0), (0.2, 2.0)), ((0.1, 3.0), (0.2, 4.0))]
     records = [Record(method="m", metric="spectrum", fabric=f"f{i}", curve=curve) for i, curve in enumerate(curves)]
     assert summary.spectra(records) == {("m", ""): [(0.1, 2.0), (0.2, 3.0)]}
+    table = summary.summary_table(RECORDS)
+    assert list(table.index) == [("woven", ""), ("neumip", ""), ("point_sampled", "k = 1"), ("point_sampled", "k = 2")]
+    assert table.loc[("woven", ""), "× lower, seen"] == pytest.approx(4.0)
+    assert table.loc[("woven", ""), "× time"] == pytest.approx(0.8)
+    assert math.isnan(table.loc[("neumip", ""), "MSE unseen"]) and summary.summary_table([]).empty
 
 
 def test_the_table_of_extremes_keeps_the_worst_and_lustrous_cloth_apart():
@@ -112,14 +114,6 @@ def test_the_table_of_extremes_keeps_the_worst_and_lustrous_cloth_apart():
     assert (row[error_name(1e-4)], row[error_name(1.0)], row["lustrous"]) == (0.5, 0.2, 0.9)
     assert math.isnan(row[error_name(1e4)]) and math.isnan(row["rounding"])
     assert (row["not_finite"], row["answers"], row["negative"]) == (4, 180, 0)
-
-
-def test_summary_is_one_row_a_method():
-    table = summary.summary_table(RECORDS)
-    assert list(table.index) == [("woven", ""), ("neumip", ""), ("point_sampled", "k = 1"), ("point_sampled", "k = 2")]
-    assert table.loc[("woven", ""), "× lower, seen"] == pytest.approx(4.0)
-    assert table.loc[("woven", ""), "× time"] == pytest.approx(0.8)
-    assert math.isnan(table.loc[("neumip", ""), "MSE unseen"]) and summary.summary_table([]).empty
 
 
 def test_energy_is_the_worst_and_silhouettes_are_the_mean_over_fabrics():

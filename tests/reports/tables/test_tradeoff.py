@@ -22,7 +22,7 @@ TIMING = pd.DataFrame(
 )  # fmt: skip
 
 
-def test_the_table_compares_what_answers_for_the_same_fabrics():
+def test_the_table_compares_what_answers_for_the_same_fabrics_and_names_the_cheapest():
     """A method of a single fabric has an easier mean; one below the noise has no error; what lacks a time is out."""
     found = {(row.role, row.method, row.setting): row.front for row in tradeoff_table(ERRORS, TIMING).itertuples()}
     assert found == {
@@ -33,9 +33,6 @@ def test_the_table_compares_what_answers_for_the_same_fabrics():
         ("seen", "lost", ""): False,
         ("unseen", "fast", "k = 1"): True,
     }
-
-
-def test_the_cheapest_within_an_error_and_an_empty_table_of_nothing():
     seen = tradeoff_table(ERRORS, TIMING).query("role == 'seen'")
     best = [cheapest(seen, "ns", error=limit) for limit in (0.25, 0.1, 0.05)]
     assert [(row.method, row.setting) for row in best] == [("fast", "k = 1"), ("fast", "k = 2"), ("slow", "")]

@@ -72,10 +72,17 @@ def test_the_largest_draft_reads_back_from_its_fabric_file(imported, tmp_path):
     assert load_fabric(tmp_path / "large.toml") == found.fabric
 
 
-def test_stripes_in_the_ends_alone(imported):
+def test_stripes_in_the_ends_alone_and_a_shipped_twill_of_four_and_four(imported):
     fabric = imported(wif(WARP_COLORS=numbered([1, 1, 1, 2] * 2))).fabric
     assert fabric.colours.ends == (("colour_1", 3), ("colour_2", 1)) and fabric.colours.picks == ()
     assert fabric.warp.diffuse == fabric.colours.palette["colour_1"].diffuse != fabric.weft.diffuse
+    path = PRESETS.parent / "examples" / "houndstooth.wif"
+    fabric = fabric_of(read_draft(path), denim, "houndstooth", "houndstooth.wif", NOTHING).fabric
+    assert fabric.weave.rows() == ["..##", ".##.", "##..", "#..#"]
+    assert fabric.colours is not None and fabric.yarns_per_cm == (18.0, 16.0)
+    order = [name for name, count in fabric.colours.ends for _ in range(count // 4)]
+    brown, cream, red = dict.fromkeys(order)
+    assert order == [brown, cream, brown, cream, brown, red] and fabric.colours.picks == fabric.colours.ends
 
 
 def test_colours_that_would_make_light_are_dimmed_alike_and_leave_none_to_go_through(imported):
@@ -135,13 +142,3 @@ MANY = numbered([f"{k % 256},{k // 256},0" for k in range(300)])
 )  # fmt: skip
 def test_what_is_no_cloth_is_refused(imported, change, named):
     assert named in refusal(imported, wif(**change))
-
-
-def test_the_shipped_houndstooth_is_a_twill_of_four_and_four():
-    path = PRESETS.parent / "examples" / "houndstooth.wif"
-    fabric = fabric_of(read_draft(path), denim, "houndstooth", "houndstooth.wif", NOTHING).fabric
-    assert fabric.weave.rows() == ["..##", ".##.", "##..", "#..#"]
-    assert fabric.colours is not None and fabric.yarns_per_cm == (18.0, 16.0)
-    order = [name for name, count in fabric.colours.ends for _ in range(count // 4)]
-    brown, cream, red = dict.fromkeys(order)
-    assert order == [brown, cream, brown, cream, brown, red] and fabric.colours.picks == fabric.colours.ends

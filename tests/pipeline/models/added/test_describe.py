@@ -79,12 +79,6 @@ def test_code_that_is_no_method_gets_a_sentence(path, old, new, sentence):
         describe(f"{path}:Theirs", {}, {})
 
 
-def test_a_file_of_gigabytes_is_refused_unread(path):
-    with path.open("r+b") as file:
-        file.truncate(3 << 30)
-    assert "the file theirs.py has more than 16,777,216 bytes" in refusal(describe, f"{path}:Theirs", {}, {})
-
-
 def test_options_that_it_does_not_have_and_code_that_ends_its_process_get_a_sentence(path, monkeypatch):
     for options, sentence in (
         ({"row": 5}, "has no option 'row'; did you mean 'rows'"),
@@ -138,11 +132,14 @@ largest.unit, largest.version = "1/sr", 2
 '''
 
 
-def test_a_function_is_a_metric(path):
+def test_a_function_is_a_metric_and_a_file_of_gigabytes_is_refused_unread(path):
     path.write_text(METRIC)
     found = describe(f"{path}:largest", {}, {})
     assert (found.name, found.title, found.definition) == ("largest", "largest", "Largest error of any component.")
     assert (found.unit, found.better, found.stated) == ("1/sr", "lower", "2")
+    with path.open("r+b") as file:
+        file.truncate(3 << 30)
+    assert "the file theirs.py has more than 16,777,216 bytes" in refusal(describe, f"{path}:Theirs", {}, {})
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def test_silhouettes_are_learnt(options):
     assert target.std() > 0.3 and error < 0.35 * target.std()
 
 
-def test_loss_adds_the_silhouettes_to_the_components():
+def test_loss_adds_the_silhouettes_and_those_at_extremes_are_shares():
     network = untrained(CURVED, DENIM).eval()
     batch = batch_of(_queries(64), torch.rand(64, 4))
     both = network.loss(batch, np.random.default_rng(1))
@@ -138,9 +138,6 @@ def test_loss_adds_the_silhouettes_to_the_components():
     network.silhouettes = None
     alone = network.loss(batch, np.random.default_rng(1))
     torch.testing.assert_close(both, alone + CURVED.silhouette_weight * edge)
-
-
-def test_silhouettes_at_extremes_are_shares_and_what_was_not_taught_is_refused():
     method = _method()
     for behind in (False, True):
         queries = _queries(40, behind=behind)

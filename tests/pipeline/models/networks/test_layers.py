@@ -7,7 +7,7 @@ from pipeline.models.networks.layers import component_error, perceptron, to_comp
 from pipeline.models.options import ComponentLossOptions
 
 
-def test_it_is_linear_layers_with_a_relu_between_each_two_and_biases_of_0():
+def test_layers_are_linear_with_a_relu_between_and_network_space_is_undone():
     network = perceptron(3, 8, 2, 5)
     linear = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     assert [tuple(layer.weight.shape) for layer in linear] == [(8, 3), (8, 8), (5, 8)]
@@ -18,9 +18,6 @@ def test_it_is_linear_layers_with_a_relu_between_each_two_and_biases_of_0():
     for layer in linear[:-1]:
         expected = (expected @ layer.weight.t() + layer.bias).clamp_min(0.0)
     torch.testing.assert_close(network(x), expected @ linear[-1].weight.t() + linear[-1].bias)
-
-
-def test_network_space_is_undone_and_squeezes_the_specular_pair_and_weights_apply_to_means_of_pairs():
     assert to_network(torch.tensor([0.1, 0.0, 0.3, 0.4]), 10.0).tolist() == pytest.approx([math.log(2), 0, 0.3, 0.4])
     assert to_components(torch.full((3, 4), -0.7), 10.0).min() == 0
     components = torch.rand(64, 4) * 20

@@ -9,7 +9,7 @@ from pipeline.truth.query import Queries
 from tests.pipeline.models.stand_ins import SMALL, batch_of, descend
 
 
-def test_a_texture_is_read_bilinearly_and_wraps_and_its_pyramid_halves_down_to_one_texel():
+def test_textures_are_read_bilinearly_wrap_halve_and_blur_as_a_gaussian():
     assert level_shapes(4, 0, (5, 2)) == [(8, 20), (4, 10), (2, 5), (1, 3), (1, 2), (1, 1)]
     assert level_shapes(4, 2, (5, 2)) == [(8, 20), (4, 10)]
     texture = torch.arange(12.0).reshape(1, 3, 4)
@@ -19,9 +19,6 @@ def test_a_texture_is_read_bilinearly_and_wraps_and_its_pyramid_halves_down_to_o
     v = torch.full((4,), 1.5 / 3)
     expected = [[5.0], [5.5], [(7 + 4) / 2], [(7 + 4) / 2]]
     torch.testing.assert_close(read_texture([texture], u, v, level), torch.tensor(expected))
-
-
-def test_blur_keeps_the_mean_and_spreads_as_a_gaussian_by_the_texels_of_each_level():
     texture = torch.zeros(1, 64, 64, dtype=torch.float64)
     texture[0, 32, 32] = 1.0
     smooth = blurred(texture, 2.0)[0]

@@ -7,7 +7,7 @@ from tests.pipeline.models.stand_ins import SMALL
 NEUMIP = SMALL["neumip"]
 
 
-def test_footprint_chooses_the_levels_and_offset_shifts_along_the_view():
+def test_footprint_chooses_the_levels_offset_shifts_along_the_view_and_blur_halves():
     """sigma_0 = half a finest texel reads level 0, twice it level 1, the geometric mean both equally."""
     network = NeumipNetwork(NEUMIP.model_copy(update={"offset": False}), (2, 2)).eval()
     for index, level in enumerate(network.levels):
@@ -30,9 +30,6 @@ def test_footprint_chooses_the_levels_and_offset_shifts_along_the_view():
     (u, v), depth = seen[1], 0.1 * 1.5
     torch.testing.assert_close(u, torch.tensor([0.5 + depth * 0.6 / 0.8 * 2 / 4, 0.5]))
     torch.testing.assert_close(v, torch.tensor([0.5, 0.5 + depth * 0.96 / 0.6 * 2 / 1]))
-
-
-def test_blur_halves_and_the_offset_freezes_and_textures_learn_faster():
     changes = {"blur": 8.0, "blur_halving": 0.1, "offset_frozen": 0.5}
     network = NeumipNetwork(NEUMIP.model_copy(update=changes), (2, 2))
     network.schedule(0.2)

@@ -25,7 +25,7 @@ def expected(selvage, queries, chosen):
     return np.sqrt(np.mean(np.square(errors, dtype=np.float64)))
 
 
-def test_every_query_gets_the_answer_that_is_chosen_by_the_query_alone(selvage, queries):
+def test_every_query_gets_the_answer_chosen_by_itself_and_more_time_has_less_error(selvage, queries):
     chosen = selvage.choose(DENIM, queries, error=0.012)
     answers = selvage.predict(DENIM, queries, 5, error=0.012)
     assert len(np.unique(chosen)) >= 4
@@ -40,11 +40,8 @@ def test_every_query_gets_the_answer_that_is_chosen_by_the_query_alone(selvage, 
     part = selvage.choose(DENIM, queries.take(slice(7, 20)), error=0.012)
     np.testing.assert_array_equal(whole[7:20], part)
     np.testing.assert_array_equal(Selvage(0.012).choose(DENIM, queries), whole)
-
-
-def test_the_expected_error_is_the_wished_one_and_more_time_has_less_error(selvage, queries):
-    """Over other queries of the distribution that prices are found on, to chance; a smaller wish hardly ever has a
-    cheaper answer."""
+    # Over other queries of the distribution that prices are found on, to chance; a smaller wish hardly ever has a
+    # cheaper answer.
     queries = probes(DENIM, False, False, 2000, 8, ("projected_disc",))
     last = None
     for wished in (0.02, 0.015, 0.012, 0.01):
@@ -58,12 +55,17 @@ def test_the_expected_error_is_the_wished_one_and_more_time_has_less_error(selva
     np.testing.assert_array_equal(selvage.choose(DENIM, queries, time=1e-2), best)
 
 
-def test_light_from_behind_and_curved_cloth_are_answered(selvage):
+def test_light_from_behind_and_curved_cloth_are_answered_and_all_cores_pass_a_wish_on(selvage, queries):
     mixed = probes(DENIM, True, True, 40)
     answers = selvage.predict(DENIM, mixed)
     assert (selvage.choose(DENIM, mixed, error=1e-6) < 4).all(), "soft nodes alone"
     assert np.isfinite(answers).all() and (answers >= 0).all()
     assert "viewers in front" in refusal(selvage.predict, DENIM, mixed._replace(wo=-mixed.wo))
+    options = SelvageOptions(errors=[0.1, 0.025])
+    assert [method.setting for method in options.methods()] == ["error 10 %", "error 2.5 %"]
+    assert not options.learns and options.single()[1].settings == (0.025,)
+    found = AllCores(selvage, 2).predict(DENIM, queries, error=0.012)
+    np.testing.assert_array_equal(found, selvage.predict(DENIM, queries, error=0.012))
 
 
 def test_another_meaning_of_walls_has_no_fallback(queries):
@@ -96,11 +98,3 @@ def test_wishes_that_cannot_be_kept_get_a_sentence(selvage, queries, wish, says)
 @pytest.mark.parametrize("wish", [{"error": 0.05}, {"time": 1e-4}])
 def test_other_methods_refuse_wishes(queries, wish):
     assert "only selvage answers within a wished" in refusal(AllCores(SoftNodes(1)).predict, DENIM, queries, **wish)
-
-
-def test_each_wished_error_is_a_method_of_its_own_and_all_cores_pass_a_wish_on(selvage, queries):
-    options = SelvageOptions(errors=[0.1, 0.025])
-    assert [method.setting for method in options.methods()] == ["error 10 %", "error 2.5 %"]
-    assert not options.learns and options.single()[1].settings == (0.025,)
-    found = AllCores(selvage, 2).predict(DENIM, queries, error=0.012)
-    np.testing.assert_array_equal(found, selvage.predict(DENIM, queries, error=0.012))

@@ -23,7 +23,7 @@ def test_decoder_has_the_published_weights(latent, published):
     assert NetworkMethod(UnifiedBtfNetwork(BTF)).bytes_stored(LINING) == 4 * (32 * (16 + 4 + 1) + weights)
 
 
-def test_pyramid_is_averaged_down_to_one_texel_and_footprint_and_place_choose_level_and_texel():
+def test_the_pyramid_is_averaged_and_read_and_what_differs_from_place_to_place_is_learnt():
     latents = torch.rand(6, 10, 3)
     pyramid = averaged(latents)
     assert [tuple(level.shape) for level in pyramid] == [(3, 6, 10), (3, 3, 5), (3, 2, 3), (3, 1, 2), (3, 1, 1)]
@@ -39,10 +39,7 @@ def test_pyramid_is_averaged_down_to_one_texel_and_footprint_and_place_choose_le
     centre_of_row_1_column_4 = torch.tensor([4.5 / 6]), torch.tensor([1.5 / 4])
     found = model.read(averaged(latents), *centre_of_row_1_column_4, torch.tensor([1e-3]))
     assert found.item() == pytest.approx(latents[1, 4, 0].item())
-
-
-def test_it_learns_what_differs_from_place_to_place_by_a_loss_of_its_random_numbers():
-    """A target that follows which yarn of a plain weave is on top: four fifths of its variance are explained."""
+    # A target that follows which yarn of a plain weave is on top: four fifths of its variance are explained.
     model = untrained(BTF.model_copy(update={"texels_per_yarn": 4}), LINING).train()
     queries = draw_queries(QueryOptions(sigma=(0.1, 0.1)), LINING.weave.repeat, 3, 0, 256)
     warp = torch.from_numpy(np.sin(np.pi * queries.u) * np.sin(np.pi * queries.v))

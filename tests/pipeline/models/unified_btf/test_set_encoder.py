@@ -35,7 +35,7 @@ def encoded(model: SetEncoder, samples: Texels, chosen: np.ndarray | slice = sli
     return latents
 
 
-def test_angles_tell_light_from_viewer_and_rows_become_samples_by_texels():
+def test_rows_become_samples_by_texels_and_those_in_use_are_not_computed_again():
     wi, wo = torch.tensor([0.6, 0.0, 0.8]), torch.tensor([0.0, -0.8, 0.6])
     torch.testing.assert_close(angles_of(wi, wo, "disc"), torch.tensor([0.6, 0.0, 0.0, -0.8]))
     torch.testing.assert_close(angles_of(wi, wo, "stereographic"), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
@@ -50,6 +50,10 @@ def test_angles_tell_light_from_viewer_and_rows_become_samples_by_texels():
     (found,) = np.flatnonzero((queries.u == column / 2 + 0.25) & (queries.v == row / 2 + 0.25) & alike)
     read = samples.values[sample, row * samples.shape[1] + column]
     np.testing.assert_allclose(read, answers.mean[found], rtol=2**-11, atol=2**-24)
+    held = texels_of(LINING, SMALL)
+    assert texels_of(LINING.model_copy(update={"name": "other"}), SMALL) is held
+    assert texels_of(LINING, SMALL.model_copy(update={"latent": 4})) is held
+    assert texels_of(LINING, SMALL.model_copy(update={"max_angle": 60.0})) is not held
 
 
 @torch.inference_mode()
@@ -86,10 +90,3 @@ def test_averaged_latents_are_the_latent_of_the_averaged_texel():
         expected = encoded(model, together)[0]
         torch.testing.assert_close(encoded(model, samples).mean(dim=0), expected, rtol=1e-5, atol=1e-5)
         assert (expected > 0).all() == (offset > 0)
-
-
-def test_samples_in_use_are_not_computed_again():
-    held = texels_of(LINING, SMALL)
-    assert texels_of(LINING.model_copy(update={"name": "other"}), SMALL) is held
-    assert texels_of(LINING, SMALL.model_copy(update={"latent": 4})) is held
-    assert texels_of(LINING, SMALL.model_copy(update={"max_angle": 60.0})) is not held

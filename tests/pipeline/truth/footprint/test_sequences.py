@@ -23,7 +23,7 @@ def _uniforms(key, count, dimension):
     return numbers
 
 
-def test_mix_is_splitmix64_and_uniform_numbers_pass_a_chi_square_test_in_pairs():
+def test_sequences_are_those_published_uniform_in_pairs_and_nets_in_every_aligned_run():
     # The first outputs of SplitMix64 seeded with 0, as its authors publish them.
     weyl = 0x9E3779B97F4A7C15
     outputs = [int(mix(np.uint64((n * weyl) % 2**64))) for n in (1, 2, 3)]
@@ -33,9 +33,6 @@ def test_mix_is_splitmix64_and_uniform_numbers_pass_a_chi_square_test_in_pairs()
     for a, b in ((first, second), (first[:-1], first[1:])):
         counts = np.histogram2d(a, b, bins=32, range=((0, 1), (0, 1)))[0]
         assert stats.chisquare(counts.ravel()).pvalue > LEVEL
-
-
-def test_every_aligned_run_is_a_net_and_a_point_is_uniform_over_keys():
     for m in range(1, 11):
         # (0, m, 2)-net: every dyadic box of area 2^-m holds exactly one point.
         points = _pairs(np.uint64(derive(np.uint64(11), m)), 3 * 2**m)

@@ -19,22 +19,13 @@ def _columns(rows=6):
     return columns_of(draw_queries(QueryOptions(sigma=(0.5, 32.0), max_angle=60.0), DENIM.weave.repeat, 5, 0, rows))
 
 
-def test_a_table_is_built_once_and_again_only_for_light_from_behind():
+def test_a_table_is_built_once_and_knows_neither_curved_cloth_nor_tiny_footprints():
     cloth, table = cloth_side(DENIM, TruthOptions()), _table(nodes=4)
     front = table.table(cloth, False)
     assert table.table(cloth, False) is front
     both = table.table(cloth, True)
     assert len(both.slope_behind) == 4
     assert table.table(cloth, False) is both
-
-
-@pytest.mark.parametrize("options", [{"frame": "macro"}, {"shadows": False}], ids=str)
-def test_other_models_than_the_default_are_unknown(options):
-    assert _table().knows(cloth_side(DENIM, TruthOptions()), _columns()).all()
-    assert not _table().knows(cloth_side(DENIM, TruthOptions(parallax=False, **options)), _columns()).any()
-
-
-def test_curved_cloth_and_tiny_footprints_are_unknown_and_rotated_ones_up_to_a_ratio():
     columns = _columns()
     bent, narrow = np.where(np.arange(6) == 1, 0.1, 0.0), np.where(np.arange(6) == 4, 0.01, 1.0)
     changed = columns._replace(curvature=bent, sigma=np.ones(6), sigma_minor=narrow)
@@ -49,3 +40,9 @@ def test_curved_cloth_and_tiny_footprints_are_unknown_and_rotated_ones_up_to_a_r
         np.testing.assert_array_equal(found, [False, True])
     boxes = cloth_side(DENIM, TruthOptions(footprint="box"))
     assert not _table().knows(boxes, columns._replace(sigma_minor=np.full(2, 20.0))).any()
+
+
+@pytest.mark.parametrize("options", [{"frame": "macro"}, {"shadows": False}], ids=str)
+def test_other_models_than_the_default_are_unknown(options):
+    assert _table().knows(cloth_side(DENIM, TruthOptions()), _columns()).all()
+    assert not _table().knows(cloth_side(DENIM, TruthOptions(parallax=False, **options)), _columns()).any()

@@ -45,7 +45,7 @@ def _exact_transmission(i, o, t, alpha, thickness):
     return float(flakes * crossing / (4 * (s_o * c_i - s_i * c_o)))
 
 
-def test_specular_matches_50_digits():
+def test_specular_and_transmission_match_50_digits_and_at_equal_lambda_the_limit():
     for alpha in [0.01, 0.1, 0.5, 1.0]:
         for thickness in [0.001, 2.0, 100.0]:
             worst = 0.0
@@ -58,6 +58,25 @@ def test_specular_matches_50_digits():
                 worst = max(worst, abs(ours - exact) / exact)
             # i, o, t are unit to 1e-16 only; alpha = .01 magnifies what the matrix form makes of that by alpha^-2.
             assert worst < 1e-12 / alpha
+    for alpha in [0.01, 0.1, 0.5, 1.0]:
+        for thickness in [0.001, 2.0, 100.0]:
+            worst = 0.0
+            for i, o, t in _crossing_pairs(60):
+                flakes, *sigmas = density(*(i + o), *t, alpha), sigma(*i, *t, alpha), sigma(*o, *t, alpha)
+                ours = transmission(flakes, *sigmas, i[2], -o[2], thickness)
+                exact = _exact_transmission(i, o, t, alpha, thickness)
+                if exact > 1e-300:
+                    worst = max(worst, abs(ours - exact) / exact)
+                else:
+                    assert 0.0 <= ours < 1.1e-300
+            # As for reflection: i, o, t are unit to 1e-16 only, which the matrix form magnifies by up to alpha^-2.
+            assert worst < 1e-12 / alpha
+    for thickness in [0.001, 2.0, 100.0]:
+        for degrees in [0.0, 45.0, 89.9]:
+            flakes, size, cosine = 0.7, 0.3, math.cos(math.radians(degrees))
+            limit = flakes * thickness * math.exp(-thickness * size / cosine) / (4 * cosine * cosine)
+            found = transmission(flakes, size, size, cosine, cosine, thickness)
+            assert found == pytest.approx(limit, rel=1e-14, abs=1e-300)
 
 
 def test_round_flakes_equal_the_slab_transmission_is_reciprocal_and_white_flakes_make_no_light():
@@ -89,28 +108,6 @@ def _crossing_pairs(count):
             o = i * [-1, -1, 1] + 10 ** RNG.uniform(-12, 0) * RNG.uniform(-0.3, 0.3, 3)
             o /= np.linalg.norm(o)
         yield i, o * [1, 1, -math.copysign(1, o[2])], t
-
-
-def test_transmission_matches_50_digits_and_at_equal_lambda_its_limit():
-    for alpha in [0.01, 0.1, 0.5, 1.0]:
-        for thickness in [0.001, 2.0, 100.0]:
-            worst = 0.0
-            for i, o, t in _crossing_pairs(60):
-                flakes, *sigmas = density(*(i + o), *t, alpha), sigma(*i, *t, alpha), sigma(*o, *t, alpha)
-                ours = transmission(flakes, *sigmas, i[2], -o[2], thickness)
-                exact = _exact_transmission(i, o, t, alpha, thickness)
-                if exact > 1e-300:
-                    worst = max(worst, abs(ours - exact) / exact)
-                else:
-                    assert 0.0 <= ours < 1.1e-300
-            # As for reflection: i, o, t are unit to 1e-16 only, which the matrix form magnifies by up to alpha^-2.
-            assert worst < 1e-12 / alpha
-    for thickness in [0.001, 2.0, 100.0]:
-        for degrees in [0.0, 45.0, 89.9]:
-            flakes, size, cosine = 0.7, 0.3, math.cos(math.radians(degrees))
-            limit = flakes * thickness * math.exp(-thickness * size / cosine) / (4 * cosine * cosine)
-            found = transmission(flakes, size, size, cosine, cosine, thickness)
-            assert found == pytest.approx(limit, rel=1e-14, abs=1e-300)
 
 
 @pytest.mark.parametrize("thickness", [0.001, 2.0, 100.0])

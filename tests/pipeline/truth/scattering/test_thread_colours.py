@@ -22,7 +22,7 @@ def queries(u, v, sigma, wi, wo=(0.0, 0.0, 1.0), minor=None, angle=0.0):
     return found._replace(sigma_minor=np.full(rows, minor, np.float32), angle=np.full(rows, angle, np.float32))
 
 
-def test_a_footprint_on_one_thread_has_its_colour_and_a_cloth_without_an_order_those_of_its_yarns():
+def test_colours_of_threads_add_up_and_one_thread_or_no_order_has_its_own():
     fabric = coloured("denim", ends=[["red", 3], ["blue", 5]])
     picks = fabric.weave.warp_over[:, 1].argmax() + 0.5  # ends 1, 5 and 9 are on top there
     found = component_colours(fabric, queries([1.5, 5.5, 9.5], [picks] * 3, 0.02, (0.3, 0.2, 0.93)), EXACT, 1)
@@ -36,10 +36,7 @@ def test_a_footprint_on_one_thread_has_its_colour_and_a_cloth_without_an_order_t
     names, yarns = ("specular_rgb", "diffuse_transmission_rgb"), (denim.warp, denim.weft)
     assert found.mean[0].tolist() == [list(getattr(yarn, name)) for name in names for yarn in yarns]
     assert (found.standard_error == 0).all()
-
-
-def test_exchanged_colours_add_up_to_both():
-    """The same points weigh both, so that the sum is exact whatever the noise."""
+    # The same points weigh both, so that the sum is exact whatever the noise.
     runs = [["red", 2], ["blue", 1], ["red", 1], ["blue", 3]]
     exchanged = [["blue" if name == "red" else "red", count] for name, count in runs]
     asked = queries([0.3, 2.2, 5.0], [0.1, 1.2, 2.9], 1.1, (0.5, -0.3, 0.81), (-0.6, 0.0, 0.8))

@@ -28,7 +28,7 @@ def values(picture, truth=CLOTH):
     return perceived | {"mse": errors.mse.value, "mse_relative": errors.mse_relative.value}
 
 
-def test_equal_pictures_have_no_error_and_constant_ones_known_psnr_and_ssim():
+def test_known_errors_of_constant_pictures_of_colours_and_of_a_factor():
     exact = dict.fromkeys(("mse", "mse_relative", "flip_ldr", "flip_hdr", "delta_e"), 0)
     assert values(CLOTH) == exact | {"psnr": math.inf, "ssim": pytest.approx(1, abs=1e-12)}
     # Codes 102 and 128 of 255 differ by 26/255 everywhere; the exposure cancels what the values were divided by.
@@ -37,14 +37,9 @@ def test_equal_pictures_have_no_error_and_constant_ones_known_psnr_and_ssim():
     found = values(*(flat(*linear_rgb(code)) / 1.6 for code in ("#666666", "#808080")))
     assert found["psnr"] == pytest.approx(-20 * math.log10(b - a), abs=1e-9)
     assert found["ssim"] == pytest.approx((2 * a * b + 1e-4) / (a**2 + b**2 + 1e-4), abs=1e-9)
-
-
-def test_flip_of_green_and_blue_delta_e_of_black_and_white_and_relative_mse_of_a_factor():
-    """FLIP scales colour differences so that the one between the display's green and blue is its largest, 1.
-
-    L* are 0 and 100, mean 50: S_L = 1, so Delta E = 100. m = 1.1 t, t = 1 and 3 in halves: ((.1 t)^2 / (t^2 + eps 4))
-    averaged.
-    """
+    # FLIP scales colour differences so that the one between the display's green and blue is its largest, 1.  L*
+    # are 0 and 100, mean 50: S_L = 1, so Delta E = 100. m = 1.1 t, t = 1 and 3 in halves: ((.1 t)^2 / (t^2 + eps
+    # 4)) averaged.
     assert values(flat(0.0, 1.0, 0.0), flat(0.0, 0.0, 1.0))["flip_ldr"] == pytest.approx(1, abs=1e-5)
     assert values(flat(1.0, 1.0, 1.0), flat(1e-9, 1e-9, 1e-9))["delta_e"] == pytest.approx(100, abs=1e-3)
     truth = np.where(X[..., None] < 32, 1.0, 3.0) * np.ones(3)
