@@ -9,7 +9,8 @@ from pipeline.truth.calibration import COARSE_TABLE, FINE_TABLE, REFINED, SAMPLE
 from pipeline.truth.estimator import estimate, uncalibrated
 from pipeline.truth.options import EstimatorName, TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.truth.cloths import answering, direction, equal_queries, fixed, woven
+from tests.directions import unit
+from tests.pipeline.truth.cloths import answering, equal_queries, fixed, woven
 from tests.presets import PRESETS
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -21,7 +22,7 @@ def test_diffuse_matches_a_mitsuba_rendering_of_the_geometry():
     C_weft with w_d = 1 at polar angles 30/30, azimuth 30/210 degrees, repeat average. The rendering's own error is 0.05
     % rms; twice that is allowed."""
     fabric = woven("polyester_lining", None, {"bend": 22.0}, {"bend": 16.0}, blend=1.0, width=1.0, relief=1.0)
-    queries = equal_queries(direction(30, 30), direction(30, 210), 20.0)
+    queries = equal_queries(unit(30, 30), unit(30, 210), 20.0)
     answer = estimate(fabric, queries, fixed(1 << 20, walls="left_out"), 1)
     np.testing.assert_allclose(answer.mean[0, 2:], [0.099296, 0.109176], rtol=1e-3)
 
