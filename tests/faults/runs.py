@@ -23,8 +23,6 @@ TIMEOUT = 900.0  # the first run compiles
 
 
 class End(NamedTuple):
-    """End of a run: its exit code and the lines on stderr."""
-
     code: int
     stderr: str
 

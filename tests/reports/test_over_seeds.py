@@ -8,7 +8,6 @@ from reports.record import Provenance, Record
 
 
 def trained(method, seed, metric="mse", value=1.0, fabric="denim", **numbers):
-    """A Record of a network."""
     provenance = Provenance(model=f"{method}{seed}", seed=seed)
     return Record(method=method, fabric=fabric, metric=metric, value=value, provenance=provenance, **numbers)
 

@@ -58,7 +58,6 @@ class ShortShard(Shard):
     group: ClassVar = "short"
 
     def run(self, out: Path, progress: Progress) -> None:
-        """Write the file."""
         for path in self.products:
             (out / path).parent.mkdir(parents=True, exist_ok=True)
             (out / path).write_text(self.id)

@@ -20,7 +20,6 @@ NOTE = f"ledger/{TASK.id}.json"
 
 @pytest.fixture
 def done(tmp_path):
-    """A ledger in which TASK is done."""
     fake.done(tmp_path, TASK)
     return Ledger(tmp_path)
 

@@ -77,7 +77,6 @@ def test_records_of_two_machines_are_joined_and_shown(call, refused, write, tmp_
 
 @pytest.fixture
 def results(twillight, tmp_path):
-    """Run `twillight results` on a made-up page."""
     subject = Record(method="point_sampled", setting="k = 2", provenance=Provenance(recipe="smoke"))
     records = [subject.of("time", 500.0, 25, low=490.0, high=510.0), subject.of("bytes_stored", 2000.0, 2)]
     for fabric, role in (("denim", "seen"), ("twill_4_4", "unseen")):

@@ -65,7 +65,6 @@ class Runs:
         return self
 
     def finish(self, task, seconds=1.0):
-        """Write the receipt of a task whose products are there."""
         files = {Path(path).name: Product.of(self.out / path) for path in task.products}
         Ledger(self.out).finish(task, files, seconds)
 

@@ -49,7 +49,6 @@ def bsdf_of(name):
 
 
 def lobes_of(bsdf, name, count):
-    """Return the lobes of `count` equal looks, which are found once."""
     return Lobes(*(np.repeat(rows, count, axis=0) for rows in bsdf.lobes(looks_of(name, 1))))
 
 

@@ -21,8 +21,6 @@ def flat():
 
 
 class Truth(FakeMethod):
-    """The truth as a method."""
-
     def predict(self, fabric, queries, seed=0):
         return estimate(fabric, queries, TINY.truth, TINY.seed).mean
 

@@ -99,7 +99,6 @@ RECORDS = [
 
 
 def attic(records):
-    """Return the table of the attic."""
     (table,) = sections_of(records)["scenes"]
     return table
 

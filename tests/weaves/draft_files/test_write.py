@@ -21,8 +21,6 @@ PALETTE = {"a": {"diffuse": "#102030"}, "b": {"diffuse": "#e88000"}, "c": {"diff
 
 @pytest.fixture
 def again(tmp_path):
-    """Return a fabric written to a draft file and read back."""
-
     def call(fabric):
         path = tmp_path / "cloth.wif"
         path.write_text(wif_text(fabric), encoding="utf-8", newline="")
@@ -32,7 +30,6 @@ def again(tmp_path):
 
 
 def levels(fabric):
-    """Return the colours of ends and picks in 8 bits."""
     return [np.rint(255 * encoded(threads.diffuse)).astype(int) for threads in fabric.thread_colours()]
 
 

@@ -26,7 +26,6 @@ def out(tmp_path, recipe):
 
 
 def measured(recipe, folder, out):
-    """Measure an entry alone; return its Records."""
     (task,) = (one for one in plan(load_recipe(recipe, [str(folder / "entry.toml")])) if isinstance(one, OfAnswers))
     task.run(out, lambda share: None)
     assert all((out / path).is_file() for path in task.products)

@@ -51,7 +51,6 @@ def test_a_fabric_that_was_exported_is_imported(twillight, tmp_path):
 
 
 def read_ply(path):
-    """Return places, colours and triangles of a binary PLY."""
     assert path.read_bytes().startswith(b"ply\nformat binary_little_endian 1.0\n")
     mesh = trimesh.load(path, process=False)
     return mesh.vertices.astype(np.float32), mesh.visual.vertex_colors, mesh.faces
