@@ -13,14 +13,9 @@ from weaves.yarn import Yarn
 
 def cloth(draft=None, warp=None, weft=None):
     """Return a fabric whose yarns differ in everything."""
-    return Fabric.model_validate(
-        {
-            "name": "cloth",
-            "draft": draft or {"family": "twill", "over": 3, "under": 1},
-            "warp": {"bend": 30, "twist": -25, "roughness": 0.3, **(warp or {})},
-            "weft": {"bend": 40, "twist": 15, "roughness": 0.3, **(weft or {})},
-        }
-    )
+    table = {"name": "cloth", "draft": draft or {"family": "twill", "over": 3, "under": 1}}
+    table["warp"] = {"bend": 30, "twist": -25, "roughness": 0.3, **(warp or {})}
+    return Fabric.model_validate(table | {"weft": {"bend": 40, "twist": 15, "roughness": 0.3, **(weft or {})}})
 
 
 NARROW = {"width": 0.6, "relief": 0.7}

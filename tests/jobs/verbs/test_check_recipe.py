@@ -88,7 +88,7 @@ def test_a_folder_in_the_place_of_a_shard_is_replaced_and_a_foreign_file_named_a
     assert run("--repair")[0] == 2 and foreign.exists()
 
 
-def test_a_page_or_shard_that_is_outdated_or_odd_and_many_faults_are_counted(run):
+def test_a_page_of_other_measurements_is_outdated_and_values_that_were_never_right_are_odd(run):
     page = run.of(Page)
     (run.out / "ledger" / f"{page.id}.json").unlink()
     code, _, told = run()
@@ -103,6 +103,9 @@ def test_a_page_or_shard_that_is_outdated_or_odd_and_many_faults_are_counted(run
     Ledger(run.out).finish(shard, {path.name: made_up.Product.of(path)}, 1.0)
     code, _, told = run()
     assert code == 2 and f"{path}: odd: column diffuse_warp spans [-1.0" in told
+
+
+def test_many_faults_are_counted(run):
     struck = [path for place in ("records/*", "models/*/*", "datasets/*/*.parquet") for path in run.out.glob(place)]
     for path in struck:
         flip(path)

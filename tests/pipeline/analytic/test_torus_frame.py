@@ -22,19 +22,12 @@ def test_frames_are_those_of_the_height_field(field, kind, rtol):
     picks, ends = np.nonzero(field.top == heights.WARP)
     for pick, end in zip(picks[:4], ends[:4], strict=True):
         own, yarn = field.floats[pick, end, heights.TOP], field.yarn[heights.WARP]
+        radius, ring = yarn[heights.RADIUS], own[heights.BEND_RADIUS]
         for across, along in random.uniform(-0.45, 0.45, (20, 2)):
-            x, y = end + 0.5 + across * 2 * yarn[heights.RADIUS], pick + 0.5 + along
+            x, y = end + 0.5 + across * 2 * radius, pick + 0.5 + along
             _, _, _, *expected = heights.surface_at(field, x, y, end, pick)
-            sin_v = (x - end - 0.5) / yarn[heights.RADIUS]
-            limit = own[heights.HALF_LENGTH] / own[heights.BEND_RADIUS]
-            numbers = (
-                sin_v,
-                math.sqrt(1 - sin_v**2),
-                yarn[heights.RADIUS],
-                along + own[heights.OFFSET],
-                1 / own[heights.BEND_RADIUS],
-                limit,
-            )
+            sin_v, limit = (x - end - 0.5) / radius, own[heights.HALF_LENGTH] / ring
+            numbers = (sin_v, math.sqrt(1 - sin_v**2), radius, along + own[heights.OFFSET], 1 / ring, limit)
             angles, _ = bend(*(kind(number) for number in numbers))
             fibre = Fibre(*(kind(yarn[column]) for column in (heights.SIN_TWIST, heights.COS_TWIST, heights.BETA)))
             angles = Angles(*(kind(number) for number in angles))

@@ -28,14 +28,7 @@ def test_a_file_that_was_written_is_read_again(basis, tmp_path):
 
 
 def table(**columns):
-    rows = {
-        "kind": "reflection",
-        "side": "front",
-        "theta_in": 0.0,
-        "phi_in": 0.0,
-        "theta_out": 9.0 + 9.0,
-        "phi_out": 0.0,
-    }
+    rows = {"kind": "reflection", "side": "front", "theta_in": 0.0, "phi_in": 0.0, "theta_out": 18.0, "phi_out": 0.0}
     return pa.table({name: [value] for name, value in (rows | {"value": 0.1} | columns).items() if value is not None})
 
 

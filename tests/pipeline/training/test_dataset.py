@@ -119,12 +119,8 @@ def test_windows_are_of_whole_row_groups_and_of_enough_rows(tmp_path, least, mon
     windows = dataset._windows(tmp_path, shards, 10 * least)
     sizes = [sum(piece.rows for piece in window) for window in windows]
     assert sum(sizes) == sum(rows) and min(sizes) >= 10 * least and max(sizes) < 30 * least
-    read = [
-        (piece.path.name, piece.first + group)
-        for window in windows
-        for piece in window
-        for group in range(-(-piece.rows // 10))
-    ]
+    pieces = [piece for window in windows for piece in window]
+    read = [(piece.path.name, piece.first + group) for piece in pieces for group in range(-(-piece.rows // 10))]
     assert read == [(shard.file, group) for shard in shards for group in range(-(-shard.rows // 10))]
 
 

@@ -26,14 +26,9 @@ def test_a_film_shows_the_truth_and_every_method_once_or_of_many_the_first():
 
 
 def test_strips_say_their_errors_in_order_with_the_first_of_each_kind_in_front():
-    pictures = [
-        file("woven"),
-        file("woven", scene="plane", fabric="denim"),
-        file("truth"),
-        file("woven", scene="sphere", fabric="denim"),
-        file("truth", scene="sphere", fabric="denim"),
-        file("truth", scene="plane", fabric="basket"),
-    ]
+    sphere, plane = ({"scene": scene, "fabric": "denim"} for scene in ("sphere", "plane"))
+    pictures = [file("woven"), file("woven", **plane), file("truth"), file("woven", **sphere), file("truth", **sphere)]
+    pictures.append(file("truth", scene="plane", fabric="basket"))
     errors = [
         pd.DataFrame([("denim", "sphere", "woven", "", 2e-3)], columns=["fabric", "scene", "method", "setting", "mse"]),
         pd.DataFrame([("attic", "woven", "", 5e-4)], columns=["scene", "method", "setting", "mse"]),

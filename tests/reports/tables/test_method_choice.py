@@ -6,16 +6,9 @@ import pytest
 from reports.tables.method_choice import MEASURED, PREDICTED, nearest, predictions, with_measured
 from reports.tables.tradeoff import cheapest
 
-SIZES = pd.DataFrame(
-    [
-        ("fast", "", "small", 100.0, 0.2),
-        ("fast", "", "large", 100.0, 0.1),
-        ("exact", "", "small", 1000.0, 0.02),
-        ("exact", "", "large", 500.0, 0.01),
-        ("half", "", "small", 50.0, 0.01),
-    ],
-    columns=["method", "setting", "size", "ns", "colour"],
-)
+ROWS = [("fast", "small", 100.0, 0.2), ("fast", "large", 100.0, 0.1), ("exact", "small", 1000.0, 0.02)]
+ROWS += [("exact", "large", 500.0, 0.01), ("half", "small", 50.0, 0.01)]
+SIZES = pd.DataFrame(ROWS, columns=["method", "size", "ns", "colour"]).assign(setting="")
 SHARES = {"small": 0.25, "large": 0.75, "huge": 0.0}
 
 

@@ -15,12 +15,9 @@ from weaves.fabric import load_fabric
 
 def error(method, setting, fabric, role, mse, noise=0.0, spread=0.0):
     subject = Record(method=method, setting=setting, fabric=fabric, role=role, scene="queries")
-    return [
-        subject.of("mse", mse, 100, standard_error=spread),
-        subject.of("mse_measured", mse + noise, 100),
-        subject.of("truth_noise", noise, 100),
-        subject.of("colour_rrmse", math.sqrt(abs(mse)), 100),
-    ]
+    others = {"mse_measured": mse + noise, "truth_noise": noise, "colour_rrmse": math.sqrt(abs(mse))}
+    records = [subject.of(name, value, 100) for name, value in others.items()]
+    return [subject.of("mse", mse, 100, standard_error=spread), *records]
 
 
 PICTURES = [("denim", "sphere", "mse", 0.5), ("denim", "plane", "mse", 0.7), ("denim", "plane", "flicker", 0.1)]

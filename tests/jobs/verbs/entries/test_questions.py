@@ -37,14 +37,11 @@ def test_the_questions_are_those_of_the_shards_without_their_answers(folder, rec
     text = csv.read_csv(folder / "questions.csv")
     for name in ("id", *QUERY_COLUMNS):
         np.testing.assert_array_equal(text[name].to_numpy().astype(table[name].to_numpy().dtype), table[name])
-    assert text["fabric"].to_pylist() == table["fabric"].to_pylist() and set(text.column_names).isdisjoint(
-        SCHEMA.names[13:]
-    )
+    assert text["fabric"].to_pylist() == table["fabric"].to_pylist()
+    assert set(text.column_names).isdisjoint(SCHEMA.names[13:])
     listed = json.loads((folder / "questions.json").read_text())
-    dataset, coarse = (
-        load_recipe(recipe).dataset,
-        TruthOptions(estimator="mc", relative_error=1, min_count=64, max_count=64),
-    )
+    dataset = load_recipe(recipe).dataset
+    coarse = TruthOptions(estimator="mc", relative_error=1, min_count=64, max_count=64)
     voile = listed["fabrics"][1]
     assert (voile["name"], voile["role"], voile["first_id"], voile["last_id"]) == ("voile", "unseen", 64, 127)
     task = ShardTask(fabric=load_fabric("voile"), start=0, rows=64, split="test", seed=dataset.seed, truth=coarse)

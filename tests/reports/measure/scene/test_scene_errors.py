@@ -21,12 +21,8 @@ from tests.refusals import refusal
 pytest.importorskip("mitsuba")
 
 COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
-FEW = {
-    "frames": 3,
-    "options": SceneOptions(environment_directions=4, bounces=1),
-    "truth": COARSE,
-    "frame_truth": COARSE,
-}
+FEW = {"frames": 3, "options": SceneOptions(environment_directions=4, bounces=1)}
+FEW |= {"truth": COARSE, "frame_truth": COARSE}
 SCENES = SceneBenchOptions(names=("dinner_table",), size=(40, 32), image=ImageOptions(block=4, resamples=100), **FEW)
 INTERVALS = ("mse", "mse_relative", "psnr", "ssim", "flip_ldr", "flip_hdr", "delta_e", "flicker", "colour_rrmse")
 
