@@ -131,7 +131,7 @@ def test_denim_is_the_example_of_weaves():
     assert tomllib.loads(shown) == {key: value for key, value in preset.items() if key != "source"}
 
 
-def test_models_are_listed_with_what_they_know():
+def test_models_estimators_kinds_of_rows_scenes_and_recipes_are_listed():
     text = text_of(ROOT / "pipeline" / "models" / "README.md")
     known, of_rays = {}, {}
     for names, *cells, rays in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|" + 4 * r" (.+?) \|" + "$", text, re.M):
@@ -141,19 +141,16 @@ def test_models_are_listed_with_what_they_know():
     fields = {name: options.model_fields for name, options in CLASSES.items()}
     assert of_rays == {name: (CLASSES[name].any_physics, "parallax" in fields[name]) for name in CLASSES}
     assert known == {name: set(options().kinds) for name, options in CLASSES.items()}
+    assert set(listed("pipeline/truth", "[^|]+")) == set(ESTIMATORS) and listed("pipeline/shards") == list(SCHEMAS)
+    assert set(listed("pipeline/scenes")) == set(SHIPPED)
+    extra = re.findall(r"`(trade_\w+)`", text_of(ROOT / "jobs" / "README.md"))
+    assert set(recipe_names()) <= {*listed("jobs", "[^|]+"), *extra}
 
 
 def listed(folder, cell=r"\w+"):
     """Return the names in the first cells of the tables of a room's README; of such cells alone."""
     cells = re.findall(rf"^\| (`{cell}`) \|", text_of(ROOT / folder / "README.md"), re.M)
     return [name for cell in cells for name in re.findall(r"`(\w+)`", cell)]
-
-
-def test_estimators_kinds_of_rows_scenes_and_recipes_are_listed():
-    assert set(listed("pipeline/truth", "[^|]+")) == set(ESTIMATORS) and listed("pipeline/shards") == list(SCHEMAS)
-    assert set(listed("pipeline/scenes")) == set(SHIPPED)
-    extra = re.findall(r"`(trade_\w+)`", text_of(ROOT / "jobs" / "README.md"))
-    assert set(recipe_names()) <= {*listed("jobs", "[^|]+"), *extra}
 
 
 def test_changelog_and_citations_have_the_package_version():

@@ -30,7 +30,7 @@ def shards_and_net(count, length):
     return tasks, of(tasks, [1.0] * count + [length])
 
 
-def test_a_long_task_at_the_end_is_the_tail_and_doubling_ends_where_it_saves_little():
+def test_a_long_task_and_the_longest_chain_count_and_doubling_ends_where_it_saves_little():
     tasks, seconds = shards_and_net(8, 10.0)
     found = Schedule.of(tasks, seconds, 4)
     assert (found.makespan, found.tail) == (12.0, 10.0) and max(chains(tasks, seconds).values()) == 11.0
@@ -42,6 +42,12 @@ def test_a_long_task_at_the_end_is_the_tail_and_doubling_ends_where_it_saves_lit
     assert [one.makespan for one in found] == [164.0, 132.0, 116.0, 108.0, 104.0]
     (nothing,) = doublings([], {})
     assert nothing.makespan == nothing.tail == 0.0 and nothing.efficiency == 1.0
+    a, b = costly("a", 10.0), costly("b", 10.0)
+    c = costly("c", 10.0, [a])
+    whole = 10.0
+    for workers, lengths in ((1, 3), (2, 2), (9, 2)):
+        assert Estimate().seconds_left([a, b, c], {}, workers) == pytest.approx(lengths * whole)
+    assert Estimate().seconds_left([], {}, 1) == 0.0
 
 
 class Costly(Step):
@@ -84,12 +90,3 @@ def test_a_task_under_way_is_judged_by_its_share_when_that_is_sure(elapsed, shar
     a = costly("a", 100.0)
     began = {a.id: (time.monotonic() - elapsed, share)}
     assert Estimate().seconds_left([a], began, 1) == pytest.approx(left, rel=0.01)
-
-
-def test_the_longest_chain_and_the_number_of_workers_count():
-    a, b = costly("a", 10.0), costly("b", 10.0)
-    c = costly("c", 10.0, [a])
-    whole = 10.0
-    for workers, lengths in ((1, 3), (2, 2), (9, 2)):
-        assert Estimate().seconds_left([a, b, c], {}, workers) == pytest.approx(lengths * whole)
-    assert Estimate().seconds_left([], {}, 1) == 0.0

@@ -30,7 +30,6 @@ def test_an_environment_map_keeps_its_light_and_a_lamp_at_the_origin_is_read():
     assert sum(light.power for light in lights) == pytest.approx(np.full(3, 8 * math.pi), rel=0.01)
     vector = sum(light.power[0] * light.place for light in lights)
     assert vector == pytest.approx([0, 4 * math.pi / 3, 0], abs=0.04 * 4 * math.pi / 3)
-    mi = mitsuba("scalar_rgb")
     for place in ([0, 0, 0], [0, 3, 4]):
         lamp = {"type": "point", "position": place, "intensity": {"type": "rgb", "value": [1, 2, 3]}}
         world = mi.load_dict({"type": "scene", "ball": {"type": "sphere"}, "lamp": lamp})

@@ -42,7 +42,7 @@ def _manifest(*entries):
     return Manifest(fabrics={"denim": TASK.fabric}, shards=entries, **facts)
 
 
-def test_the_same_task_gives_the_same_bytes_and_the_same_rows_in_any_cut(folder):
+def test_the_same_task_gives_the_same_bytes_in_any_cut_which_a_manifest_reads_in_stream_order(folder):
     generate_shard(TASK, folder / "again.parquet")
     assert (folder / "again.parquet").read_bytes() == (folder / "part-a.parquet").read_bytes()
     generate_shard(TASK.model_copy(update={"start": 52, "rows": 10}), folder / "cut.parquet")
@@ -50,6 +50,17 @@ def test_the_same_task_gives_the_same_bytes_and_the_same_rows_in_any_cut(folder)
     cut_queries, cut_answers = read_shard(folder / "cut.parquet")
     for whole, part in zip((*queries, *answers), (*cut_queries, *cut_answers), strict=True):
         np.testing.assert_array_equal(whole[20:30], part)
+    generate_shard(TASK.model_copy(update={"start": 0, "rows": 32}), folder / "part-b.parquet")
+    _manifest(_entry(folder / "part-a.parquet", 32, 100), _entry(folder / "part-b.parquet", 0, 32)).save(folder)
+    loaded = Manifest.load(folder)
+    assert [entry.start for entry in loaded.shards] == [0, 32]
+    queries, answers = loaded.read(folder, "denim", "test")
+    np.testing.assert_array_equal(queries.u[:32], read_shard(folder / "part-b.parquet")[0].u)
+    assert answers.mean.shape == (132, 4)
+    before = (folder / "manifest.json").read_bytes()
+    loaded.save(folder)
+    assert (folder / "manifest.json").read_bytes() == before
+    assert "no rows" in refusal(loaded.read, folder, "denim", "train")
 
 
 def test_a_shard_explains_itself_and_splits_and_fabrics_draw_different_queries(folder):
@@ -108,20 +119,6 @@ def test_damage_is_named(folder):
     path.unlink()
     assert "does not exist" in refusal(read_shard, path)
     assert "does not exist" in check_shard(folder, entry, manifest)[0]
-
-
-def test_manifest_round_trip_reads_rows_in_stream_order(folder):
-    generate_shard(TASK.model_copy(update={"start": 0, "rows": 32}), folder / "part-b.parquet")
-    _manifest(_entry(folder / "part-a.parquet", 32, 100), _entry(folder / "part-b.parquet", 0, 32)).save(folder)
-    loaded = Manifest.load(folder)
-    assert [entry.start for entry in loaded.shards] == [0, 32]
-    queries, answers = loaded.read(folder, "denim", "test")
-    np.testing.assert_array_equal(queries.u[:32], read_shard(folder / "part-b.parquet")[0].u)
-    assert answers.mean.shape == (132, 4)
-    before = (folder / "manifest.json").read_bytes()
-    loaded.save(folder)
-    assert (folder / "manifest.json").read_bytes() == before
-    assert "no rows" in refusal(loaded.read, folder, "denim", "train")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", json.dumps({"name": "x"})])

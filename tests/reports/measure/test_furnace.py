@@ -22,7 +22,7 @@ def lambertian(queries):
     return np.stack([0 * cosine + 0.1, 0 * cosine, cosine / math.pi, 0 * cosine], axis=1)
 
 
-def test_closed_forms_under_the_same_lights_also_of_a_method_that_knows_one_side():
+def test_closed_forms_both_sides_add_up_and_a_method_may_know_one():
     """A white Lambertian surface returns all, f = .1 returns .2 pi; R2 with 256 points is good to half a per cent."""
     values = {record.metric: record.value for record in measure_furnace(FakeMethod(lambertian), load_fabric("denim"))}
     assert values["furnace_diffuse"] == pytest.approx(1.0, abs=5e-3)
@@ -38,10 +38,7 @@ def test_closed_forms_under_the_same_lights_also_of_a_method_that_knows_one_side
     lights = queries.wi.reshape(-1, DIRECTIONS, 3)
     np.testing.assert_array_equal(lights, np.broadcast_to(lights[0], lights.shape))
     assert (queries.wo.reshape(-1, DIRECTIONS, 3) == queries.wo[::DIRECTIONS, None]).all()
-
-
-def test_both_sides_and_what_goes_straight_through_add_up():
-    """A quarter back, a third through, diffuse; half of what is behind is seen straight: in colours of one channel."""
+    # A quarter back, a third through, diffuse; half of what is behind is seen straight: in colours of one channel.
     denim = load_fabric("denim")
     black, red = (0.0, 0.0, 0.0), (0.5, 0.0, 0.0)
     warp = denim.warp.model_copy(update={"specular": black, "diffuse": red, "diffuse_transmission": red})

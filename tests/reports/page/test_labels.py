@@ -43,7 +43,6 @@ def test_no_label_covers_another_or_a_mark_and_those_far_off_are_joined_to_their
                 away = max(box.x0 - x, x - box.x1, box.y0 - y, y - box.y1)
                 assert away >= half - 1e-6
     # A label without a line touches the ring of `UNJOINED` points round its mark.
-    figure, texts, boxes = drawn
     joined = [text.arrow_patch.get_visible() for text in texts]
     assert any(joined) and not all(joined)
     for text, box, line in zip(texts, boxes, joined, strict=True):

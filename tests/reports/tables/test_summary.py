@@ -97,7 +97,7 @@ def test_summary_is_one_row_a_method_with_aliasing_timing_and_mean_spectra():
     assert math.isnan(table.loc[("neumip", ""), "MSE unseen"]) and summary.summary_table([]).empty
 
 
-def test_the_table_of_extremes_keeps_the_worst_and_lustrous_cloth_apart():
+def test_extremes_keep_the_worst_energy_too_and_silhouettes_are_means_over_fabrics():
     shiny = lustrous(load_fabric("polyester_lining"))
     assert (shiny.warp.roughness, shiny.weft.roughness) == (LUSTROUS, LUSTROUS)
     subject = Record(method="m", setting="s")
@@ -111,9 +111,6 @@ def test_the_table_of_extremes_keeps_the_worst_and_lustrous_cloth_apart():
     assert (row[error_name(1e-4)], row[error_name(1.0)], row["lustrous"]) == (0.5, 0.2, 0.9)
     assert math.isnan(row[error_name(1e4)]) and math.isnan(row["rounding"])
     assert (row["not_finite"], row["answers"], row["negative"]) == (4, 180, 0)
-
-
-def test_energy_is_the_worst_and_silhouettes_are_the_mean_over_fabrics():
     records = []
     for fabric, value in (("denim", 0.5), ("basket", 0.9), ("voile", 0.7)):
         subject = Record(method="m", fabric=fabric, scene="queries")
@@ -164,7 +161,7 @@ def test_a_network_trained_once_has_no_range_on_a_single_unseen_fabric():
         assert summary.unranged(summary.error_table(records)) == set()
 
 
-def test_intervals_over_fabrics():
+def test_intervals_and_ratios_are_those_over_the_same_fabrics():
     """Logarithms -1, 0 and 1: s = 1, and t_{.975, 2} = 4.302653 (tables of Student's distribution)."""
     reach = 4.302653 / math.sqrt(3)
     expected = (1.0, math.exp(-reach), math.exp(reach))
@@ -173,10 +170,7 @@ def test_intervals_over_fabrics():
     assert summary.over_fabrics([0.3]) == pytest.approx((0.3, math.nan, math.nan), nan_ok=True)
     for lost in ([], [0.1, 0.0], [0.1, -0.2], [0.1, math.nan], [0.1, math.inf]):
         assert all(map(math.isnan, summary.over_fabrics(lost))), "errors lost in the noise have no mean"
-
-
-def test_ratios_are_those_of_the_same_fabric():
-    """The baseline errs 100 and 1; the method a thousandth and a tenth of it: geometric mean 100."""
+    # The baseline errs 100 and 1; the method a thousandth and a tenth of it: geometric mean 100.
     base = pd.DataFrame({"fabric": ["b", "a"], "mse": [100.0, 1.0]})
     errors = pd.DataFrame(
         {"fabric": ["a", "b"], "mse": [0.1, 0.1], "colour_rrmse": [0.04, 0.01], "rrmse_specular_warp": [0.3, math.nan]}

@@ -59,7 +59,6 @@ def test_functions_that_are_missing_have_defaults_and_random_numbers_are_those_o
     assert group["lr"] == 0.25 and group["params"][0] is network.network.answer
     about = network.architecture()
     assert (about["parameters"], about["layers"]) == ({"total": 4}, {"answer": [4]})
-    network = build_added(theirs(), CLOTHS)
     losses = [network.loss(batch(), np.random.default_rng(seed)).item() for seed in (1, 2, 1)]
     assert losses[0] == losses[2] != losses[1]
 

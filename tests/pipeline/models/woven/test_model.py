@@ -7,10 +7,9 @@ import torch
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.encoder import read_cloth
 from pipeline.models.woven.model import Woven, WovenNetwork
-from pipeline.models.woven.standard_position import SYMMETRIES
+from pipeline.models.woven.standard_position import SYMMETRIES, moved, placement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
-from tests.pipeline.models.images import image_of
 from tests.pipeline.models.stand_ins import SMALL, batch_of
 from tests.pipeline.truth.cloths import woven
 from weaves.errors import BadInput
@@ -96,8 +95,13 @@ def test_mirror_images_are_answered_alike(symmetry):
     method = Woven(WovenNetwork(WOVEN))
     cloth = woven("cotton_twill", ("##.#.", ".##.#", "#...#", ".#.##"))
     asked = draw_queries(QueryOptions(), cloth.weave.repeat, 1, 0, 200)
-    image, there, one = image_of(symmetry, cloth, asked)
-    expected = one.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
+    place, (ends, picks) = placement(cloth, symmetry, (0, 0)), cloth.weave.repeat
+    columns = asked.u / ends, asked.v / picks, asked.wi, asked.wo
+    u, v, wi, wo = (part[0].numpy() for part in place.move(*(torch.from_numpy(column)[None] for column in columns)))
+    image = moved(cloth, symmetry)
+    ends, picks = image.weave.repeat
+    there = Queries.round(u * ends, v * picks, asked.sigma, wi, wo)
+    expected = place.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
     np.testing.assert_allclose(method.predict(image, there), expected, rtol=2e-3, atol=2e-5)
 
 
