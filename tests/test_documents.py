@@ -115,11 +115,8 @@ def test_what_a_document_names_exists(path):
         check(path)
 
 
-def test_every_verb_is_in_the_readme():
+def test_every_verb_and_every_room_of_work_is_in_the_readme():
     assert {tokens[0] for tokens in commands_of(ROOT / "README.md", "twillight")} == VERBS
-
-
-def test_every_room_of_work_has_a_readme():
     rooms = ["weaves", *(f"pipeline/{name}" for name in ("truth", "shards", "models", "scenes")), "jobs", "reports"]
     readme = text_of(ROOT / "README.md")
     assert [room for room in rooms if f"({room}/README.md)" not in readme] == []
@@ -134,7 +131,7 @@ def test_denim_is_the_example_of_weaves():
     assert tomllib.loads(shown) == {key: value for key, value in preset.items() if key != "source"}
 
 
-def test_models_are_listed_with_what_they_know():
+def test_models_estimators_kinds_of_rows_scenes_and_recipes_are_listed():
     text = text_of(ROOT / "pipeline" / "models" / "README.md")
     known, of_rays = {}, {}
     for names, *cells, rays in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|" + 4 * r" (.+?) \|" + "$", text, re.M):
@@ -144,6 +141,10 @@ def test_models_are_listed_with_what_they_know():
     fields = {name: options.model_fields for name, options in CLASSES.items()}
     assert of_rays == {name: (CLASSES[name].any_physics, "parallax" in fields[name]) for name in CLASSES}
     assert known == {name: set(options().kinds) for name, options in CLASSES.items()}
+    assert set(listed("pipeline/truth", "[^|]+")) == set(ESTIMATORS) and listed("pipeline/shards") == list(SCHEMAS)
+    assert set(listed("pipeline/scenes")) == set(SHIPPED)
+    extra = re.findall(r"`(trade_\w+)`", text_of(ROOT / "jobs" / "README.md"))
+    assert set(recipe_names()) <= {*listed("jobs", "[^|]+"), *extra}
 
 
 def listed(folder, cell=r"\w+"):
@@ -152,18 +153,8 @@ def listed(folder, cell=r"\w+"):
     return [name for cell in cells for name in re.findall(r"`(\w+)`", cell)]
 
 
-def test_estimators_kinds_of_rows_scenes_and_recipes_are_listed():
-    assert set(listed("pipeline/truth", "[^|]+")) == set(ESTIMATORS) and listed("pipeline/shards") == list(SCHEMAS)
-    assert set(listed("pipeline/scenes")) == set(SHIPPED)
-    extra = re.findall(r"`(trade_\w+)`", text_of(ROOT / "jobs" / "README.md"))
-    assert set(recipe_names()) <= {*listed("jobs", "[^|]+"), *extra}
-
-
-def test_the_changelog_begins_with_the_package_version():
+def test_changelog_and_citations_have_the_package_version():
     assert re.search(r"^## (\S+)", text_of(ROOT / "CHANGELOG.md"), re.M)[1] == PROJECT["version"]
-
-
-def test_twillight_is_cited_alike_in_both_forms():
     cited = yaml.safe_load(text_of(ROOT / "CITATION.cff"))
     entry = text_of(ROOT / "BIBLIOGRAPHY.bib").partition("@software{Twillight,")[2].partition("\n}")[0]
     fields = {name: value.strip("{}").replace("}", "") for name, value in re.findall(r"(\w+) += \{(.*)\}", entry)}

@@ -31,7 +31,6 @@ def true_rows(names, splits, rows=200):
 
 
 def executed(path, folder):
-    """Return a notebook executed in a folder."""
     notebook = nbformat.read(path, as_version=4)
     where = {"metadata": {"path": folder}}
     NotebookClient(notebook, kernel_name="python3", timeout=1800, startup_timeout=300, resources=where).execute()

@@ -166,7 +166,7 @@ def test_bad_input_of_evaluate_is_one_sentence(change, options, sentence):
     assert sentence in refusal(evaluate, load_fabric("denim"), queries, **options)
 
 
-def test_rows_are_the_same_in_every_form(dataset):
+def test_rows_of_a_split_are_the_same_in_every_form(dataset):
     queries, answers = dataset.numpy("denim", "train")
     assert answers.mean[:, 0].tolist() == list(range(1, 351))
     frame = dataset.pandas("train")
@@ -175,6 +175,11 @@ def test_rows_are_the_same_in_every_form(dataset):
     batches = list(dataset.torch("train", rows=64, seed=None))
     assert [len(batch["u"]) for batch in batches] == [64, 64, 64, 8, 64, 64, 22]
     assert torch.cat([batch["specular_warp"] for batch in batches]).tolist() == list(range(1, 351))
+    frame = dataset.pandas("test")
+    assert frame["fabric"].value_counts().to_dict() == {"denim": 40, "twill_4_4": 30}
+    assert set(frame[frame["fabric"] == "twill_4_4"]["specular_warp"]) == set(range(1, 31))
+    (batch,) = dataset.torch("test", fabrics=["twill_4_4"])
+    assert batch["fabric"].tolist() == [0] * 30
 
 
 def test_rows_are_read_from_object_storage(dataset, tmp_path):
@@ -182,14 +187,6 @@ def test_rows_are_read_from_object_storage(dataset, tmp_path):
     remote.put(str(tmp_path / "out" / "datasets" / "tiny"), "/bucket/tiny", recursive=True)
     there = open_dataset("memory://bucket/tiny")
     assert there.pandas("train").equals(dataset.pandas("train")) and len(list(there.torch("train", rows=200))) == 2
-
-
-def test_all_fabrics_of_a_split(dataset):
-    frame = dataset.pandas("test")
-    assert frame["fabric"].value_counts().to_dict() == {"denim": 40, "twill_4_4": 30}
-    assert set(frame[frame["fabric"] == "twill_4_4"]["specular_warp"]) == set(range(1, 31))
-    (batch,) = dataset.torch("test", fabrics=["twill_4_4"])
-    assert batch["fabric"].tolist() == [0] * 30
 
 
 @pytest.mark.parametrize(

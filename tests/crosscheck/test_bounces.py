@@ -50,7 +50,6 @@ def _scene(fabric, wi, wo, colours):
 
 
 def _rendered(fabric, wi, wo, colours):
-    """Return the patch BSDF with all bounces, (3,)."""
     scene, values = _scene(fabric, wi, wo, colours), []
     for seed in SEEDS:
         picture = np.array(mi.render(scene, spp=1, seed=seed))[..., :6].astype(np.float64)

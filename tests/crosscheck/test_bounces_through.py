@@ -98,8 +98,6 @@ class Face:
 
 
 class Cloth:
-    """Both faces of a cloth."""
-
     def __init__(self, fabric):
         self.fabric = fabric
         self.faces = Face(fabric), Face(fabric.back())
@@ -177,7 +175,6 @@ class Cloth:
 
 
 def _rendered(cloth, wi, wo, colours, count, random):
-    """Return light of all bounces after the first, (3,)."""
     front = cloth.faces[0]
     begin = np.column_stack([random.random((count, 2)) * front.extent[:2], np.full(count, front.top)])
     begin[:, :2] %= front.extent[:2]

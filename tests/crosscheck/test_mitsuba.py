@@ -100,40 +100,21 @@ def scene_of(fabric, wi, wo, parts, integrator, side, margin=0.0):
     reach, edge = np.stack([np.zeros(2), down, up, down + up]), margin + 1e-6 * extent
     first = np.floor((reach.min(axis=0) - edge) / extent).astype(int)
     last = np.floor((reach.max(axis=0) + edge) / extent + 1.0).astype(int)
-    copies = {
-        f"copy_{i - first[0]}_{j - first[1]}": {
-            "type": "instance",
-            "to_world": mi.ScalarTransform4f().translate([i * extent[0] * SCALE, j * extent[1] * SCALE, 0.0]),
-            "cloth": {"type": "ref", "id": "repeat"},
-        }
-        for i in range(first[0], last[0] + 1)
-        for j in range(first[1], last[1] + 1)
-    }
+    repeat = {name: _shape(name, mesh, colour, centre) for name, mesh, colour in parts if len(mesh.faces)}
+    scene = {"type": "scene", "integrator": integrator, "repeat": {"type": "shapegroup"} | repeat}
+    for i, j in np.ndindex(*(last - first + 1)):
+        place = mi.ScalarTransform4f().translate([*(np.add(first, (i, j)) * extent * SCALE), 0.0])
+        scene[f"copy_{i}_{j}"] = {"type": "instance", "to_world": place, "cloth": {"type": "ref", "id": "repeat"}}
     # Columns: where the camera's x, y and z point. Its rays start above the plane z = top and go along -wo.
     camera = np.eye(4)
     camera[:2, :2] = np.diag([-extent[0] / 2, extent[1] / 2]) * SCALE
     camera[:3, 2], camera[:3, 3] = -wo, np.array([0.0, 0.0, top * SCALE]) + wo
     film = {"type": "hdrfilm", "width": side, "height": side, "rfilter": {"type": "box"}}
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": integrator,
-            "light": {"type": "directional", "direction": (-wi).tolist(), "irradiance": {"type": "rgb", "value": 1.0}},
-            "repeat": {
-                "type": "shapegroup",
-                **{name: _shape(name, mesh, colour, centre) for name, mesh, colour in parts if len(mesh.faces)},
-            },
-            **copies,
-            "sensor": {
-                "type": "orthographic",
-                "near_clip": 1e-3,
-                "far_clip": 1e3 * SCALE,
-                "to_world": mi.ScalarTransform4f(camera),
-                "film": film | {"pixel_format": "rgb", "component_format": "float32"},
-                "sampler": {"type": "independent", "sample_count": 1},
-            },
-        }
-    )
+    film |= {"pixel_format": "rgb", "component_format": "float32"}
+    sensor = {"type": "orthographic", "near_clip": 1e-3, "far_clip": 1e3 * SCALE, "film": film}
+    sensor |= {"to_world": mi.ScalarTransform4f(camera), "sampler": {"type": "independent", "sample_count": 1}}
+    sun = {"type": "directional", "direction": (-wi).tolist(), "irradiance": {"type": "rgb", "value": 1.0}}
+    return mi.load_dict(scene | {"light": sun, "sensor": sensor})
 
 
 def _pictures(fabric, wi, wo, seeds=SEEDS):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,8 +24,6 @@ TIMEOUT = 900.0  # the first run compiles
 
 
 class End(NamedTuple):
-    """End of a run: its exit code and the lines on stderr."""
-
     code: int
     stderr: str
 
@@ -45,16 +44,11 @@ def write_recipe(folder):
 
 def start(recipe, out, *arguments, verb="run", before=(), env=None):
     """Start the command line in a session of its own; Ctrl-C reaches it although pytest may ignore it."""
-    return subprocess.Popen(
-        [*before, sys.executable, "-c", START, verb, str(recipe), "--out", str(out), *arguments],
-        cwd=ROOT,
-        env=os.environ | {"COLUMNS": "400", "OMP_NUM_THREADS": "1"} | (env or {}),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )
+    command = [*before, sys.executable, "-c", START, verb, str(recipe), "--out", str(out), *arguments]
+    options = {"cwd": ROOT, "env": os.environ | {"COLUMNS": "400", "OMP_NUM_THREADS": "1"} | (env or {})}
+    options |= {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    interrupted = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+    return subprocess.Popen(command, preexec_fn=interrupted, **options)
 
 
 def end(process, timeout=TIMEOUT):

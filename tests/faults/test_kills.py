@@ -131,7 +131,6 @@ def test_a_worker_killed_while_the_cluster_starts(tmp_path):
 
 
 def works(process):
-    """Return whether a process does tasks itself."""
     with suppress(psutil.NoSuchProcess):
         command = " ".join(process.cmdline())
         return not process.children() and ("spawn_main" in command or "own_process" in command)

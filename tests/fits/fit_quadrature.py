@@ -36,7 +36,6 @@ def by_rules(cloth: ClothSide, columns: WideQueries, cut: int, level: int) -> np
 
 
 def fit_highlight() -> None:
-    """Print the rate."""
     x, y = [], []
     for name in ("polyester_lining", "cotton_twill", "silk_charmeuse"):
         for alpha in (0.1, 0.15, 0.2, 0.25, 0.3):

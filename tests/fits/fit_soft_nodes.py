@@ -43,7 +43,6 @@ CONSTANTS = {
 
 
 def cloths(fabrics: int, queries: int) -> list[tuple[Fabric, Queries]]:
-    """Return random fabrics with queries of their own."""
     options, drawn = QueryOptions(sigma=(0.02, 8.0)), population_fabrics(Population(count=fabrics, seed=81))
     return [(fabric, draw_queries(options, fabric.weave.repeat, 82, 0, queries)) for fabric in drawn]
 

@@ -47,7 +47,6 @@ class DaskProcesses:
         self._start("dask_worker", "--nthreads", "1", "--no-nanny", *options, cwd=elsewhere, **environment)
 
     def wait_for(self, count):
-        """Wait until so many workers are there."""
         with Client(scheduler_file=str(self.file)) as client:
             client.wait_for_workers(count, timeout=300)
 
@@ -59,7 +58,6 @@ class DaskProcesses:
 
 
 def family(process):
-    """Return the processes that a process has started."""
     try:
         return psutil.Process(process.pid).children(recursive=True)
     except psutil.NoSuchProcess:

@@ -36,14 +36,12 @@ def write_recipe(folder, name, *models, bench=None, **dataset):
 
 
 def flip(path, chance=random.Random(0)):  # noqa: B008, any byte will do
-    """Change a byte of a file."""
     content = bytearray(path.read_bytes())
     content[chance.randrange(len(content))] ^= chance.randrange(1, 256)
     path.write_bytes(content)
 
 
 def make(task, out):
-    """Write the products of a task."""
     paths = [out / path for path in task.products]
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)

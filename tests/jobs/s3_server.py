@@ -50,7 +50,6 @@ class _Quiet(WSGIRequestHandler):
 
 @contextmanager
 def serving():
-    """Yield the address of the server and its switch."""
     from moto.server import DomainDispatcherApplication, create_backend_app
 
     switch = Switch(DomainDispatcherApplication(create_backend_app))

@@ -223,7 +223,6 @@ def surroundings():
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
-    """Return a folder with the good files."""
     folder = tmp_path_factory.mktemp("good")
     with contextlib.chdir(folder):
         surroundings()

@@ -25,12 +25,17 @@ from weaves.surface import surface_at
 ROOT = Path(__file__).parents[2]
 
 
-def test_help_lists_the_verbs_in_the_order_of_work(twillight):
+def test_help_lists_the_verbs_in_the_order_of_work_and_version_and_list_load_no_heavy_library(twillight):
     code, text, _ = twillight("--help")
     verbs = [line.split()[1] for line in text.splitlines() if line.startswith("│") and line.split()[1].isalpha()]
     order = ["list", "import", "show", "export", "render", "plan", "generate", "evaluate", "check", "train", "bench"]
     order += ["report", "run", "status", "compare"]
     assert code == 0 and [verb for verb in verbs if verb in order] == order
+    assert twillight("--version")[:2] == (0, f"twillight {version('twillight')}\n")
+    heavy = ["torch", "numba", "scipy", "pandas", "pyarrow", "colour", "matplotlib"]
+    code = f"from jobs.cli import main; import sys; main(['list']); print([n for n in {heavy} if n in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout.endswith("\n[]\n"), done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -40,14 +45,6 @@ def test_every_help_ends_with_examples_that_are_understood(twillight, verb):
     assert code == 0 and shown == [f"twillight {verb} {tokens}".strip() for tokens in VERBS[verb]["examples"]]
     for call in shown:
         app.parse_args(shlex.split(call)[1:], exit_on_error=False, print_error=False)
-
-
-def test_version_and_list_load_no_heavy_library(twillight):
-    assert twillight("--version")[:2] == (0, f"twillight {version('twillight')}\n")
-    heavy = ["torch", "numba", "scipy", "pandas", "pyarrow", "colour", "matplotlib"]
-    code = f"from jobs.cli import main; import sys; main(['list']); print([n for n in {heavy} if n in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
-    assert done.stdout.endswith("\n[]\n"), done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -67,7 +64,9 @@ def test_shells_complete_verbs_and_options(shell, tmp_path):
         assert [row.split("\t")[0] for row in done.stdout.splitlines()] == [word]
 
 
-def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
+def test_list_plan_and_status_compute_nothing_and_pictures_of_show_agree_with_the_geometry(
+    twillight, tmp_path
+):
     code, text, _ = twillight("list")
     known = [load_fabric("tartan"), load_recipe("quick")]
     assert code == 0 and all(words in text for words in (known[0].weave.name, known[0].source, known[1].about))
@@ -75,9 +74,6 @@ def test_list_show_plan_and_status_compute_nothing(twillight, tmp_path):
     assert code == 0 and "· ██████" in text and "roughness" in text and "about" in twillight("plan", "smoke")[1]
     code, text, _ = twillight("status", "smoke")
     assert code == 0 and "generate     0       0       14" in text and not list(tmp_path.iterdir())
-
-
-def test_show_writes_pictures_that_agree_with_the_geometry(twillight, tmp_path):
     code, text, _ = twillight("show", "denim", "--out", "shown", "--maps", "--size", "32x24")
     kinds = ("draft.png", "height.png", "normals.png", "maps.exr", "swatch.png")
     names = [f"denim-{kind}" for kind in kinds]

@@ -85,7 +85,6 @@ if __name__ == "__main__":  # workers are started from it
 
 
 def command_of(index):
-    """Return the shell line of the snippet that names a variable."""
     blocks = re.findall(r"^```(sh|json|yaml)\n(.*?)^```$", TEXT, re.M | re.S)
     ((language, block),) = [found for found in blocks if index in found[1]]
     if language == "sh":

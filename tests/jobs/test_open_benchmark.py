@@ -151,7 +151,6 @@ def test_a_network_that_fails_leaves_the_others_their_trainings(learnt):
 
 
 def failures(folder):
-    """Return the notes of failed tasks by their titles."""
     notes = [json.loads(path.read_text()) for path in (folder / "out" / "ledger").glob("*.failed.json")]
     return {note["title"]: str(note) for note in notes}
 

@@ -19,7 +19,6 @@ KILLED_AFTER = 20  # tasks
 
 
 def kill_on_the_way(path, out):
-    """Start a run and kill it when it has finished some tasks."""
     process = start(path, out)
     while len(list(out.glob("ledger/[!.]*.json"))) < KILLED_AFTER:
         assert process.poll() is None

@@ -13,15 +13,12 @@ def shown(renderable):
     return stream.getvalue()
 
 
-def test_no_text_moves_the_cursor_or_is_markup():
+def test_no_text_moves_the_cursor_or_is_markup_and_styles_of_our_own_are_as_they_were():
     table = Table(HOSTILE, title=HOSTILE, caption=HOSTILE)
     table.add_row(HOSTILE)
     for renderable in (HOSTILE, table):
         text = shown(renderable)
         assert text.replace("\n", "").isprintable() and "[red]name[/nothing] :smile:" in text
-
-
-def test_lines_columns_and_styles_of_our_own_are_as_they_were():
     assert shown("a\nb  é 織") == "a\nb  é 織\n"
     stream = io.StringIO()
     Terminal(file=stream, force_terminal=True, color_system="standard").print("name", style="bold")

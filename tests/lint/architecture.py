@@ -45,12 +45,10 @@ MOST_PARAMETERS, MOST_LINES = 12, 100
 
 
 def within(module: str, packages: list[str]) -> bool:
-    """Return whether a module is one of some packages, or in one."""
     return any(f"{module}.".startswith(f"{package}.") for package in packages)
 
 
 def layer(module: str) -> int:
-    """Return a module's place in the order."""
     return max(index for index, package in enumerate(ORDER) if within(module, [package]))
 
 
@@ -93,7 +91,6 @@ def outside_the_reference() -> set[str]:
 
 
 def in_circles() -> set[str]:
-    """Return the modules that are in, or import, a circle of imports."""
     left = {module: set(names) for module, names in graph().items()}
     while free := [module for module, names in left.items() if not names & left.keys()]:
         for module in free:
@@ -114,7 +111,6 @@ def large_rooms() -> Iterator[str]:
 
 
 def large_functions() -> Iterator[str]:
-    """Yield functions of too many lines or parameters."""
     for module, source in MODULES.items():
         for node in source.nodes:
             if isinstance(node, ast.FunctionDef):

@@ -28,18 +28,15 @@ Definition = ast.FunctionDef | ast.ClassDef
 
 
 def public(source: Source) -> list[Definition]:
-    """Return the public functions and classes at the top of a module."""
     body = source.tree.body
     return [node for node in body if isinstance(node, Definition) and not node.name.startswith("_")]
 
 
 def twice(names: Iterator[str]) -> list[str]:
-    """Return the names that occur more than once."""
     return sorted(name for name, count in Counter(names).items() if count > 1)
 
 
 def constant_names() -> list[str]:
-    """Return the names that constants of several modules have."""
     return twice(
         name
         for source in PRODUCT
@@ -123,7 +120,6 @@ def tests() -> int:
 
 
 def measured() -> dict[str, tuple[str, int]]:
-    """Return the meaning and the value of each budget."""
     classes = (node.name for source in PRODUCT for node in public(source) if isinstance(node, ast.ClassDef))
     outside, lines = (*PRODUCT, *ASIDE), [len(source.text.splitlines()) for source in (*PRODUCT, *ASIDE)]
     return {
@@ -143,7 +139,6 @@ def measured() -> dict[str, tuple[str, int]]:
 
 
 def limits() -> dict[str, int]:
-    """Return the limit of each budget."""
     stored: dict[str, int] = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["tool"]["budgets"]
     return stored
 

@@ -46,7 +46,6 @@ def problems() -> Iterator[str]:
 
 
 def main() -> int:
-    """Draw the picture into the document."""
     text = DOCUMENT.read_text(encoding="utf-8")
     DOCUMENT.write_text(BLOCK.sub(lambda _: drawn(), text), encoding="utf-8")
     return 0

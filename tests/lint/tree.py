@@ -26,24 +26,20 @@ class Source:
 
     @classmethod
     def read(cls, path: Path) -> Source:
-        """Read a file below the root."""
         text = path.read_text(encoding="utf-8")
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
         return cls(path, module, text)
 
     @property
     def name(self) -> str:
-        """Its path from the root."""
         return str(self.path.relative_to(ROOT))
 
     @cached_property
     def tree(self) -> ast.Module:
-        """Its syntax tree."""
         return ast.parse(self.text)
 
     @cached_property
     def nodes(self) -> list[ast.AST]:
-        """All nodes of its tree."""
         return list(ast.walk(self.tree))
 
     @cached_property
@@ -98,7 +94,6 @@ def bound(body: list[ast.stmt]) -> dict[str, ast.stmt]:
 
 
 def sources(*folders: str) -> Iterator[Source]:
-    """Yield the files below folders of the root."""
     for folder in folders:
         for path in sorted((ROOT / folder).rglob("*.py")):
             yield Source.read(path)

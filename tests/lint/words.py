@@ -32,14 +32,12 @@ def names(source: Source) -> set[str]:
 
 
 def wrong_names(name: str) -> Iterator[str]:
-    """Yield what is wrong with a name."""
     for word, term in NAMES.items():
         if f"_{word}_" in f"_{name}_" or f"_{word}s_" in f"_{name}_":
             yield f"the name {name}: use {term}"
 
 
 def wrong_prose(text: str) -> Iterator[str]:
-    """Yield what is wrong with a docstring or a comment."""
     for word in re.findall(r"\w+", re.sub(r"`[^`]*`", "", text).lower()):
         if word in PROSE:
             yield f"the word {word}: use {PROSE[word]}"

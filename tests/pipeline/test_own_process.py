@@ -80,7 +80,6 @@ SLEEPERS = [
 
 
 def ended(pid):
-    """Return whether a process ends within some seconds."""
     return not psutil.pid_exists(pid) or not gone([psutil.Process(pid)])
 
 

@@ -12,7 +12,7 @@ def of(machine, record):
     return record.model_copy(update={"provenance": record.provenance.model_copy(update={"machine": machine})})
 
 
-def test_times_stay_apart_and_equal_numbers_are_kept_once_those_that_differ_both_and_named():
+def test_times_stay_apart_equal_numbers_are_kept_once_and_equal_machines_are_numbered():
     other = MSE.model_copy(update={"provenance": Provenance(recipe="two", dataset="d")})
     joined = join({"A": [MSE, TIME], "B": [other, TIME], "C": [TIME]})
     assert joined.records == [MSE, of("A", TIME), of("B", TIME), of("C", TIME)]
@@ -20,6 +20,13 @@ def test_times_stay_apart_and_equal_numbers_are_kept_once_those_that_differ_both
     other = MSE.model_copy(update={"value": 2.5})
     joined = join({"A": [MSE], "B": [other]})
     assert joined.records == [MSE, of("B", other)] and joined.unlike == [(MSE, other)]
+    machine = this_machine(1)
+    names = names_of([machine, machine.model_copy(update={"cores": machine.cores + 1}), machine])
+    assert len(set(names)) == 3 and names[0].endswith("(1)") and names[2].endswith("(2)")
+    assert machine.cpu in names[1] and f"{machine.cores + 1} cores" in names[1]
+    joined = join({"A": [MSE, TIME], "B": [TIME]})
+    assert refusal(refuse_several, joined.records, "file").startswith("file: holds Records of several machines")
+    assert refusal(join, {"C": joined.records}).startswith("C: holds")
 
 
 @pytest.mark.parametrize(
@@ -28,16 +35,3 @@ def test_times_stay_apart_and_equal_numbers_are_kept_once_those_that_differ_both
 def test_numbers_of_other_subjects_are_no_pair(change):
     other = MSE.model_copy(update=change)
     assert join({"A": [MSE], "B": [other]}).records == [MSE, other]
-
-
-def test_equal_machines_are_numbered():
-    machine = this_machine(1)
-    names = names_of([machine, machine.model_copy(update={"cores": machine.cores + 1}), machine])
-    assert len(set(names)) == 3 and names[0].endswith("(1)") and names[2].endswith("(2)")
-    assert machine.cpu in names[1] and f"{machine.cores + 1} cores" in names[1]
-
-
-def test_records_of_several_machines_are_not_joined_again():
-    joined = join({"A": [MSE, TIME], "B": [TIME]})
-    assert refusal(refuse_several, joined.records, "file").startswith("file: holds Records of several machines")
-    assert refusal(join, {"C": joined.records}).startswith("C: holds")

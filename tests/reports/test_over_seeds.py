@@ -8,7 +8,6 @@ from reports.record import Provenance, Record
 
 
 def trained(method, seed, metric="mse", value=1.0, fabric="denim", **numbers):
-    """A Record of a network."""
     provenance = Provenance(model=f"{method}{seed}", seed=seed)
     return Record(method=method, fabric=fabric, metric=metric, value=value, provenance=provenance, **numbers)
 
@@ -24,25 +23,16 @@ RECORDS = [
 ]
 
 
-def test_trainings_are_counted_by_their_seeds():
+def test_trainings_are_counted_by_their_seeds_and_their_numbers_become_means_of_one_subject():
     assert trainings(RECORDS) == {("a", ""): 3, ("b", ""): 1, ("points", ""): 0}
-
-
-def test_numbers_of_several_trainings_become_their_mean():
     mean, *others = mean_over_seeds(RECORDS)
     assert (mean.value, mean.standard_error, mean.low, mean.high) == pytest.approx((2.0, 0.2, 1.5, 2.2))
     assert mean.curve == ((0.1, 2.0), (0.2, 2.0))
     assert others == RECORDS[3:], "other numbers are as they were"
-
-
-def test_the_first_training_is_that_of_the_least_seed():
     found = first_training(RECORDS[::-1])
     assert [one.value for one in found if one.method == "a" and one.metric == "mse"] == [3.0, 1.0]
     assert [one.curve for one in found if one.curve] == [RECORDS[0].curve]
-
-
-def test_numbers_of_different_subjects_are_not_mixed():
-    """The data set and the machine are part of what a number is of."""
+    # The data set and the machine are part of what a number is of.
     other = [trained("a", seed, value=9.0) for seed in (7, 8)]
     moved = [one.model_copy(update={"provenance": one.provenance.model_copy(update={"dataset": "z"})}) for one in other]
     assert [one.value for one in mean_over_seeds([*RECORDS[:3], *moved])] == [2.0, 9.0]
@@ -67,7 +57,7 @@ def ratios(records):
     return pd.DataFrame(lines, columns=["method", "setting", "ratio"])
 
 
-def test_a_table_is_that_of_means_with_the_range_of_the_trainings():
+def test_a_table_is_that_of_means_with_ranges_and_nonlinear_numbers_have_means_of_their_own():
     table = ratios(RECORDS).set_index("method")
     assert table.loc["a", ["ratio", "ratio_least", "ratio_most"]].tolist() == pytest.approx([0.05, 0.025, 0.1])
     assert table["seeds"].to_dict() == {"a": 3, "b": 1, "points": 0}
@@ -77,6 +67,12 @@ def test_a_table_is_that_of_means_with_the_range_of_the_trainings():
     # A second training of which something else is known gives no range.
     known = ratios([*RECORDS, trained("b", 1, metric="extreme_error")]).set_index("method")
     assert math.isnan(known["ratio_most"]["b"]) and known["ratio_most"]["a"] == pytest.approx(0.1)
+    # The worst of two fabrics is 5 in either training; that of the mean errors would be 3.
+    errors = {("denim", 0): 5.0, ("denim", 1): 1.0, ("basket", 0): 1.0, ("basket", 1): 5.0}
+    records = [trained("a", seed, fabric=fabric, value=value) for (fabric, seed), value in errors.items()]
+    table = worst([*records, Record(method="points", fabric="denim", value=0.5)]).set_index("method")
+    assert table.loc["a", ["worst", "worst_least", "worst_most"]].tolist() == [5.0, 5.0, 5.0]
+    assert table["worst"]["points"] == 0.5
 
 
 @over_seeds(["method", "setting"], ["worst"], {"worst": max})
@@ -85,12 +81,3 @@ def worst(records):
     values = {one.method: [r.value for r in records if r.method == one.method] for one in records}
     lines = [(method, "", max(found)) for method, found in values.items()]
     return pd.DataFrame(lines, columns=["method", "setting", "worst"])
-
-
-def test_a_number_that_is_not_linear_has_a_mean_of_its_own():
-    """The worst of two fabrics is 5 in either training; that of the mean errors would be 3."""
-    errors = {("denim", 0): 5.0, ("denim", 1): 1.0, ("basket", 0): 1.0, ("basket", 1): 5.0}
-    records = [trained("a", seed, fabric=fabric, value=value) for (fabric, seed), value in errors.items()]
-    table = worst([*records, Record(method="points", fabric="denim", value=0.5)]).set_index("method")
-    assert table.loc["a", ["worst", "worst_least", "worst_most"]].tolist() == [5.0, 5.0, 5.0]
-    assert table["worst"]["points"] == 0.5

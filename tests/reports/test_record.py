@@ -20,15 +20,12 @@ RECORDS = [
 ]
 
 
-def test_records_come_back_as_they_were(tmp_path):
+def test_records_come_back_as_they_were_with_bytes_of_no_machine_or_date(tmp_path):
     write_records(tmp_path / "a.json", RECORDS, this_machine(1))
     write_records(tmp_path / "b.json", RECORDS[:1], this_machine(1))
     assert read_records([tmp_path / "a.json", tmp_path / "b.json"]) == RECORDS + RECORDS[:1]
     machine = read_machine(tmp_path / "a.json")
     assert machine.threads == 1 and machine.cpu and {"numpy", "torch", "numba"} <= set(machine.packages)
-
-
-def test_bytes_do_not_depend_on_the_machine_or_the_date(tmp_path):
     other = this_machine(1).model_copy(update={"cpu": "another", "date": "2000-01-01T00:00:00+00:00"})
     write_records(tmp_path / "a.json", RECORDS, this_machine(1))
     write_records(tmp_path / "b.json", RECORDS, other)

@@ -29,7 +29,6 @@ from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.plan import plan
 from jobs.plan.task import Progress
 from jobs.recipe.load import load_recipe
-from jobs.run.cluster import Scheduler
 from jobs.run.executor import execute
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
@@ -58,7 +57,6 @@ class ShortShard(Shard):
     group: ClassVar = "short"
 
     def run(self, out: Path, progress: Progress) -> None:
-        """Write the file."""
         for path in self.products:
             (out / path).parent.mkdir(parents=True, exist_ok=True)
             (out / path).write_text(self.id)
@@ -73,8 +71,8 @@ def timed(count: int, function: Callable[[], object]) -> dict[str, float]:
     return {"wall": 1000 * wall / count, "cpu": 1000 * cpu / count, "memory": memory}
 
 
-def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
-    """Measure a number of tasks in this process; on a cluster of its own if `here`."""
+def measure(count: int) -> dict[str, dict[str, float]]:
+    """Measure a number of tasks in this process."""
     # Other processes would not find the class of `__main__`.
     from tests.scale import measure_driver as importable
 
@@ -96,27 +94,23 @@ def measure(count: int, here: bool) -> dict[str, dict[str, float]]:
             summary = execute(tasks, ledger, scheduler=connection, workers=2, manifests=[manifest], console=quiet)
             assert len(summary.ran) + len(summary.before) == count, summary
 
-        if here:
-            connection = Scheduler()
+        with DaskProcesses(folder) as dask:
+            for _ in range(2):
+                dask.add("--nthreads", "8")
+            connection = dask.given
             result["run"] = timed(count, run)
-        else:
-            with DaskProcesses(folder) as dask:
-                for _ in range(2):
-                    dask.add("--nthreads", "8")
-                connection = dask.given
-                result["run"] = timed(count, run)
         result["resume"] = timed(count, run)
     return result
 
 
-def main(tasks: tuple[int, ...] = (10**3, 10**4, 10**5), here: bool = False, one: bool = False) -> None:
-    """Measure each number of tasks and print a table; `here` on a cluster of the driver's own, `one` as JSON."""
+def main(tasks: tuple[int, ...] = (10**3, 10**4, 10**5), one: bool = False) -> None:
+    """Measure each number of tasks and print a table; `one` as JSON."""
     if one:
-        print(json.dumps(measure(tasks[0], here)))
+        print(json.dumps(measure(tasks[0])))
         return
     print("| tasks | plan | run | resume | peak memory |\n|---|---|---|---|---|")
     for count in tasks:
-        command = [sys.executable, __file__, "--one", "--tasks", str(count), *(["--here"] if here else [])]
+        command = [sys.executable, __file__, "--one", "--tasks", str(count)]
         found = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout)
         cells = [f"{found[name]['wall']:.2f} ({found[name]['cpu']:.2f})" for name in ("plan", "run", "resume")]
         print(f"| {count:,} | {' | '.join(cells)} | {found['resume']['memory']:.0f} MiB |", flush=True)

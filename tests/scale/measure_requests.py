@@ -31,7 +31,6 @@ from tests.scale.measure_driver import timed, write_many
 
 
 def fill(tasks: list[Shard], folder: Path, address: str) -> None:
-    """Write short products and receipts of all tasks."""
     import s3fs
 
     ledger = Ledger(folder)

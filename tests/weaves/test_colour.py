@@ -4,10 +4,13 @@ import pytest
 from weaves.colour import Spectrum, delta_e, encoded, linear_rgb
 
 
-def test_hex_is_decoded_by_the_srgb_curve():
+def test_hex_is_decoded_by_the_srgb_curve_which_encoding_inverts():
     """IEC 61966-2-1: below 0.04045 a line, above it ((c + 0.055)/1.055)^2.4."""
     assert linear_rgb("#000000") == (0, 0, 0) and linear_rgb("#FFFFFF") == pytest.approx((1, 1, 1))
     assert linear_rgb("#0a80ff") == pytest.approx((10 / 255 / 12.92, ((128 / 255 + 0.055) / 1.055) ** 2.4, 1))
+    codes = [f"#{code:02x}{code:02x}{code:02x}" for code in range(256)]
+    linear = np.array([linear_rgb(code) for code in codes])
+    assert np.allclose(encoded(linear), np.arange(256)[:, None] / 255, atol=1e-7)
 
 
 @pytest.mark.parametrize("level", [0.0, 0.18, 1.0])
@@ -15,19 +18,6 @@ def test_a_flat_spectrum_is_grey_of_its_own_level(level):
     """Under D65 a perfect diffuser is the white of sRGB; the tolerance is the rounding of the white point."""
     rgb = linear_rgb(Spectrum(wavelengths=(400, 700), values=(level, level)))
     assert np.allclose(rgb, level, atol=1e-3)
-
-
-def test_a_spectrum_rising_to_the_red_is_red_and_saturated_ones_are_clipped_to_the_gamut():
-    red, green, blue = linear_rgb(Spectrum(wavelengths=(380, 570, 600, 780), values=(0.05, 0.05, 0.6, 0.6)))
-    assert red > 3 * green > 0 and green >= blue
-    rgb = linear_rgb(Spectrum(wavelengths=(500, 505, 515, 520), values=(0, 1, 1, 0)))
-    assert min(rgb) == 0 and max(rgb) <= 1
-
-
-def test_encoding_inverts_the_srgb_curve():
-    codes = [f"#{code:02x}{code:02x}{code:02x}" for code in range(256)]
-    linear = np.array([linear_rgb(code) for code in codes])
-    assert np.allclose(encoded(linear), np.arange(256)[:, None] / 255, atol=1e-7)
 
 
 SHARMA = """
@@ -61,8 +51,12 @@ def from_lab(lab):
     return np.linalg.solve([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]], xyz)
 
 
-def test_published_colour_differences():
+def test_published_colour_differences_and_a_spectrum_rising_to_the_red():
     """To the four digits that are published."""
     pairs = np.array(SHARMA.split(), np.float64).reshape(4, 8, 7)
     first, second = (np.apply_along_axis(from_lab, -1, lab) for lab in (pairs[..., :3], pairs[..., 3:6]))
     np.testing.assert_allclose(delta_e(first, second), pairs[..., 6], rtol=0, atol=6e-5)
+    red, green, blue = linear_rgb(Spectrum(wavelengths=(380, 570, 600, 780), values=(0.05, 0.05, 0.6, 0.6)))
+    assert red > 3 * green > 0 and green >= blue
+    rgb = linear_rgb(Spectrum(wavelengths=(500, 505, 515, 520), values=(0, 1, 1, 0)))
+    assert min(rgb) == 0 and max(rgb) <= 1

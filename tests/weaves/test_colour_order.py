@@ -15,11 +15,13 @@ def coloured(**colours):
     return validated(Fabric, denim.model_dump() | {"colours": {"palette": PALETTE} | colours}, "cloth.toml")
 
 
-def test_threads_have_their_own_colours_and_keep_what_is_not_given():
+def test_threads_have_their_own_colours_and_a_fabric_without_an_order_no_such_key():
     ends, picks = coloured(ends=[["white", 2], ["navy", 1]]).thread_colours()
     assert ends.diffuse[:2].tolist() == [[0.8, 0.7, 0.6]] * 2
     assert ends.specular.tolist() == [list(denim.warp.specular_rgb)] * 2 + [[0.1, 0.2, 0.3]]
     assert picks.diffuse.tolist() == [list(denim.weft.diffuse_rgb)]
+    assert "colours" not in denim.model_dump() and coloured(picks=[["navy", 1]]).optics() == denim.optics()
+    assert hash(coloured(picks=[["navy", 1]])) == hash(coloured(picks=[["navy", 1]])) != hash(denim)
 
 
 @settings(deadline=None, max_examples=100)
@@ -30,11 +32,6 @@ def test_a_sequence_repeats_after_its_smallest_repeat(runs):
     threads = order.threads("ends")
     assert list(threads) * (len(written) // len(threads)) == written
     assert all(threads != threads[k:] + threads[:k] for k in range(1, len(threads)))
-
-
-def test_a_fabric_without_an_order_has_no_such_key():
-    assert "colours" not in denim.model_dump() and coloured(picks=[["navy", 1]]).optics() == denim.optics()
-    assert hash(coloured(picks=[["navy", 1]])) == hash(coloured(picks=[["navy", 1]])) != hash(denim)
 
 
 @pytest.mark.parametrize(

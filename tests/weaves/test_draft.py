@@ -25,7 +25,7 @@ def run_by_walking(side, place):
 
 
 @given(matrices)
-def test_floats_agree_with_a_walk_along_the_yarns(matrix):
+def test_floats_agree_with_a_walk_and_the_loom_weaves_the_drawing_with_as_few_shafts_as_can_be(matrix):
     found = cells(Draft(matrix))
     for pick, end in np.ndindex(matrix.shape):
         warp = run_by_walking(list(matrix[:, end]), pick)
@@ -33,16 +33,8 @@ def test_floats_agree_with_a_walk_along_the_yarns(matrix):
         top, under = (warp, weft) if matrix[pick, end] else (weft, warp)
         expected = (int(not matrix[pick, end]), *top[::-1], *under[::-1])
         assert tuple(column[pick, end] for column in found) == expected
-
-
-@given(matrices)
-def test_drawing_reads_back(matrix):
     draft = Draft(matrix)
     assert Matrix(rows=draft.rows()).build() == draft and draft.text().count("██") == matrix.sum()
-
-
-@given(matrices)
-def test_the_loom_of_a_draft_weaves_it_with_as_few_shafts_and_treadles_as_can_be(matrix):
     loom = Draft(matrix).loom()
     assert loom.build() == Draft(matrix) and loom.threading[0] == loom.treadling[0] == 1
     assert (len(loom.tie_up), len(loom.tie_up[0])) == tuple(
@@ -72,11 +64,18 @@ def test_cloth_hangs_together_unless_some_yarns_lie_on_all_others(matrix):
     assert Draft(matrix).hangs_together() == (not loose)
 
 
-def test_drawing_has_pick_0_at_the_bottom_and_rolling_moves_the_repeat():
+def test_drawing_has_pick_0_at_the_bottom_and_drafts_are_read_only_copies_that_survive_pickling():
     draft = Matrix(rows=["#..", "##."]).build()
     assert draft.repeat == (3, 2) and draft.warp_over.tolist() == [[True, True, False], [True, False, False]]
     assert draft.text() == "██· · \n████· "
     assert Matrix(rows=["...", "#.."]).build().rolled(1, 1).rows() == [".#.", "..."]
+    matrix = np.eye(3, dtype=np.bool_)
+    draft = Draft(matrix)
+    matrix[0, 0] = False
+    assert draft.warp_over[0, 0]
+    with pytest.raises(ValueError, match="read-only"):
+        draft.warp_over[0, 0] = False
+    assert pickle.loads(pickle.dumps(draft)) == draft and hash(pickle.loads(pickle.dumps(draft))) == hash(draft)
 
 
 @settings(deadline=None)
@@ -88,12 +87,9 @@ def test_canonical_form_ignores_shift_mirror_and_repetition(matrix, ends, picks,
     assert same.canonical() == draft.canonical()
 
 
-def test_canonical_form_tells_cloths_apart():
+def test_canonical_form_tells_cloths_apart_and_is_that_of_a_loom_tied_up_for_a_twill():
     weaves = [Plain(), Twill(over=2, under=2), Twill(over=3, under=1), Twill(over=1, under=3)]
     assert len({weave.build().canonical() for weave in weaves}) == 4
-
-
-def test_loom_weaves_the_twill_it_is_tied_up_for():
     tie_up = [[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1], [1, 0, 0, 1]]
     woven = Loom(threading=[1, 2, 3, 4], tie_up=tie_up, treadling=[1, 2, 3, 4]).build()
     assert woven.canonical() == Twill(over=2, under=2).build().canonical()
@@ -110,16 +106,6 @@ def test_any_drawing_is_woven_or_refused(rows):
         assert Matrix(rows=rows).build().rows() == rows
     except ValidationError:
         assert not rows or not rows[0] or len({*map(len, rows)}) > 1 or "x" in "".join(rows)
-
-
-def test_draft_is_a_read_only_copy_and_survives_pickling():
-    matrix = np.eye(3, dtype=np.bool_)
-    draft = Draft(matrix)
-    matrix[0, 0] = False
-    assert draft.warp_over[0, 0]
-    with pytest.raises(ValueError, match="read-only"):
-        draft.warp_over[0, 0] = False
-    assert pickle.loads(pickle.dumps(draft)) == draft and hash(pickle.loads(pickle.dumps(draft))) == hash(draft)
 
 
 def test_different_cells_are_those_no_translation_carries_into_another():

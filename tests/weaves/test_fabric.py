@@ -72,14 +72,11 @@ def test_published_bend_and_twist_of_the_presets():
         assert (fabric.warp.bend, fabric.weft.bend, fabric.warp.twist, fabric.weft.twist) == (warp, weft, twist, twist)
 
 
-def test_the_physical_size_is_left_out_where_it_is_unknown():
+def test_the_physical_size_is_left_out_where_unknown_and_follows_from_counts_and_sett():
     assert "yarns_per_cm" not in denim.model_dump() and "yarns_per_cm" not in denim.to_toml()
     sized = Fabric.model_validate(denim.model_dump() | {"yarns_per_cm": [24, 19.5]})
     assert sized.yarns_per_cm == (24.0, 19.5) and sized.optics() == denim.optics()
-
-
-def test_counts_and_sett_give_widths():
-    """Peirce's diameter of cotton, 1 / (28 sqrt(Ne)) inches; tex and Ne of one yarn; and area = mass / density."""
+    # Peirce's diameter of cotton, 1 / (28 sqrt(Ne)) inches; tex and Ne of one yarn; and area = mass / density.
     table = denim.model_dump(mode="json")
     for yarn, count in (("warp", {"ne": 24}), ("weft", {"tex": 40, "fibre_density": 1.3, "packing": 0.7})):
         del table[yarn]["width"]
@@ -92,16 +89,13 @@ def test_counts_and_sett_give_widths():
     assert Count(ne=24).diameter == pytest.approx(Count(tex=24.606).diameter, rel=1e-4)
 
 
-def test_cover_and_cut_off_of_a_cloth():
+def test_cover_and_cut_off_and_the_loom_of_a_cloth():
     """Round yarns hide the gaps between them from cos(angle) = width on; closed cloth lets none pass."""
     yarns = [denim.warp.model_copy(update={"width": width}) for width in (0.5, 0.8)]
     closed = cover(*yarns)
     assert closed[:4] == pytest.approx((0.5, 0.8, 0.9, 0.1))
     assert [math.cos(math.radians(angle)) for angle in closed[4:]] == pytest.approx([0.8, 0.5])
     assert cover(denim.warp, yarns[0])[2:] == (1.0, 0.0, 0.0, 0.0)
-
-
-def test_the_loom_of_a_file_is_its_own():
     rows = {"family": "loom", "threading": [2, 1], "tie_up": [[0, 1, 0], [1, 0, 0]], "treadling": [1, 2]}
     loomed = Fabric.model_validate(denim.model_dump() | {"draft": rows})
     assert loomed.loom().threading == (2, 1) and denim.loom().threading == (1, 2, 3, 4)

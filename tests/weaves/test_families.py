@@ -20,13 +20,10 @@ def test_every_end_takes_the_same_steps_and_the_twill_rises_to_the_side_it_is_na
         assert draft.repeat == (sum(over) + sum(under),) * 2 and set(draft.warp_over.sum(axis=0)) == {sum(over)}
 
 
-def test_a_3_1_twill_is_drawn_as_weavers_draw_it_and_broken_it_takes_its_ends_as_0_1_3_2():
+def test_twills_are_drawn_as_weavers_do_broken_by_their_ends_and_herringbone_cut_where_it_turns():
     straight, broken = (Twill(family=family, over=3, under=1).build() for family in ("twill", "broken_twill"))
     assert straight.rows() == [".###", "###.", "##.#", "#.##"] and straight.name == "twill 3/1"
     assert np.array_equal(broken.warp_over, straight.warp_over[:, [0, 1, 3, 2]])
-
-
-def test_herringbone_is_cut_where_it_turns():
     over = Herringbone(over=2, under=2).build().warp_over
     assert over.shape == (4, 8) and np.array_equal(over[:, :4], Twill(over=2, under=2).build().warp_over)
     # Either side of a cut, every pick changes side: opposite ends.

@@ -135,7 +135,28 @@ def test_volume_of_straight_yarns_is_that_of_inscribed_prisms(steps, width):
         assert volume == pytest.approx(polygon * length, rel=2e-5)
 
 
-def test_mean_height_converges_to_the_surface_with_the_square_of_the_step():
+def test_walls_at_gaps_go_down_to_the_lowest_point_also_of_one_yarn_on_top():
+    mesh = repeat_mesh(_cloth("polyester_lining", (0.5, 0.5)), 8)
+    low = min(part.vertices[:, 2].min() for part in mesh[:2])
+    corner = mesh.walls.vertices[np.isclose(mesh.walls.vertices[:, 0], 0.25) & (mesh.walls.vertices[:, 1] < 0.2)]
+    assert len(corner) and corner[:, 2].min() == low == mesh.walls.vertices[:, 2].min()
+    for row in ("#", "."):
+        fabric = load_fabric("denim").model_copy(update={"draft": Matrix(rows=(row,))})
+        full = repeat_mesh(fabric, 8)
+        assert len(full.warp.faces if row == "#" else full.weft.faces) and not len(full.walls.faces)
+        mesh = repeat_mesh(_cloth(fabric, (0.5, 0.5)), 8)
+        assert sum(_areas(part)[0][:, 2].sum() for part in mesh[:2]) == pytest.approx(0.75)
+        np.testing.assert_allclose(sum(_areas(part)[0].sum(axis=0) for part in mesh)[:2], 0, atol=1e-9)
+
+
+def test_copies_are_the_repeat_moved_whose_mean_height_converges_to_the_surface():
+    fabric = _cloth("denim", (0.8, 0.8))
+    ends, picks = fabric.weave.repeat
+    one, six = repeat_mesh(fabric, 4), repeat_mesh(fabric, 4, (3, 2))
+    places = np.array([(i * ends, j * picks, 0) for j in range(2) for i in range(3)])
+    for single, copies in zip(one, six, strict=True):
+        expected = single.vertices[single.faces] + places[:, None, None]
+        np.testing.assert_allclose(copies.vertices[copies.faces].reshape(expected.shape), expected)
     fabric = _cloth("denim", (0.8, 0.9))
     ends, picks = fabric.weave.repeat
 
@@ -152,36 +173,9 @@ def test_mean_height_converges_to_the_surface_with_the_square_of_the_step():
     assert finest == pytest.approx(expected, rel=2e-3)
 
 
-def test_walls_at_gaps_go_down_to_the_lowest_point():
-    mesh = repeat_mesh(_cloth("polyester_lining", (0.5, 0.5)), 8)
-    low = min(part.vertices[:, 2].min() for part in mesh[:2])
-    corner = mesh.walls.vertices[np.isclose(mesh.walls.vertices[:, 0], 0.25) & (mesh.walls.vertices[:, 1] < 0.2)]
-    assert len(corner) and corner[:, 2].min() == low == mesh.walls.vertices[:, 2].min()
-
-
-def test_copies_are_the_repeat_moved():
-    fabric = _cloth("denim", (0.8, 0.8))
-    ends, picks = fabric.weave.repeat
-    one, six = repeat_mesh(fabric, 4), repeat_mesh(fabric, 4, (3, 2))
-    places = np.array([(i * ends, j * picks, 0) for j in range(2) for i in range(3)])
-    for single, copies in zip(one, six, strict=True):
-        expected = single.vertices[single.faces] + places[:, None, None]
-        np.testing.assert_allclose(copies.vertices[copies.faces].reshape(expected.shape), expected)
-
-
 @pytest.mark.parametrize("steps", [2, 7, 64])
 def test_triangles_are_never_degenerate(steps):
     for widths in WIDTHS:
         for part in repeat_mesh(_cloth("silk_shantung", widths), steps):
             vectors, _ = _areas(part)
             assert np.isfinite(part.vertices).all() and (np.linalg.norm(vectors, axis=1) > 0).all()
-
-
-def test_a_draft_of_one_yarn_on_top_has_its_mesh():
-    for row in ("#", "."):
-        fabric = load_fabric("denim").model_copy(update={"draft": Matrix(rows=(row,))})
-        full = repeat_mesh(fabric, 8)
-        assert len(full.warp.faces if row == "#" else full.weft.faces) and not len(full.walls.faces)
-        mesh = repeat_mesh(_cloth(fabric, (0.5, 0.5)), 8)
-        assert sum(_areas(part)[0][:, 2].sum() for part in mesh[:2]) == pytest.approx(0.75)
-        np.testing.assert_allclose(sum(_areas(part)[0].sum(axis=0) for part in mesh)[:2], 0, atol=1e-9)

@@ -54,14 +54,11 @@ def test_numbers_lie_in_their_ranges(family):
         assert fabric.warp.bend != fabric.weft.bend and fabric.warp.twist == fabric.weft.twist
 
 
-def test_square_root_of_roughness_is_uniform():
+def test_square_roots_of_roughness_are_uniform_and_families_equally_likely():
     """Mean of U(0.1, 0.7): 0.4; standard error of 400 draws 0.0087; four of them are allowed."""
     fabrics = population_fabrics(Population(count=400, seed=9, families=("plain",)))
     roots = np.sqrt([fabric.warp.roughness for fabric in fabrics])
     assert abs(roots.mean() - 0.4) < 0.035 and roots.min() >= 0.1 and roots.max() <= 0.7
-
-
-def test_families_are_equally_likely_and_a_population_without_drafts_is_refused():
     fabrics = population_fabrics(Population(count=400, seed=4, families=("plain", "satin")))
     plain = sum(fabric.weave.repeat == (2, 2) for fabric in fabrics)
     assert abs(plain - 200) < 40

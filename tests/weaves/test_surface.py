@@ -13,14 +13,9 @@ from weaves.yarn import Yarn
 
 def cloth(draft=None, warp=None, weft=None):
     """Return a fabric whose yarns differ in everything."""
-    return Fabric.model_validate(
-        {
-            "name": "cloth",
-            "draft": draft or {"family": "twill", "over": 3, "under": 1},
-            "warp": {"bend": 30, "twist": -25, "roughness": 0.3, **(warp or {})},
-            "weft": {"bend": 40, "twist": 15, "roughness": 0.3, **(weft or {})},
-        }
-    )
+    table = {"name": "cloth", "draft": draft or {"family": "twill", "over": 3, "under": 1}}
+    table["warp"] = {"bend": 30, "twist": -25, "roughness": 0.3, **(warp or {})}
+    return Fabric.model_validate(table | {"weft": {"bend": 40, "twist": 15, "roughness": 0.3, **(weft or {})}})
 
 
 NARROW = {"width": 0.6, "relief": 0.7}
@@ -67,7 +62,7 @@ def test_a_plain_float_by_hand():
 
 
 @pytest.mark.parametrize("fabric", CLOTHS.values(), ids=CLOTHS)
-def test_normal_and_tangent_are_unit_and_orthogonal(fabric):
+def test_normal_and_tangent_are_unit_and_orthogonal_and_the_gradient_of_the_height(fabric):
     """Also at a tiny negative place, which is congruent to the end of the repeat."""
     seen = surface_at(fabric, *(np.append(column, -1e-20) for column in random_points(fabric)))
     yarn = seen.yarn != GAP
@@ -75,15 +70,9 @@ def test_normal_and_tangent_are_unit_and_orthogonal(fabric):
     assert np.allclose(np.linalg.norm(seen.tangent[yarn], axis=-1), 1, atol=1e-14)
     assert np.abs((seen.normal * seen.tangent).sum(-1)).max() < 1e-14 and (seen.normal[..., 2] >= 0).all()
     assert np.isfinite(seen.height[yarn]).all()
-
-
-@pytest.mark.parametrize("fabric", CLOTHS.values(), ids=CLOTHS)
-def test_normal_is_the_gradient_of_the_height(fabric):
-    """Central differences of step h = 1e-5 at points whose neighbours lie on the same float.
-
-    Expected: n = (-dz/dx, -dz/dy, 1) normalised. Points within 2 % of a yarn's side are left out, where the third
-    derivative makes the differences themselves inexact (error h² z'''/6); what is left agrees to 2e-6.
-    """
+    # Central differences of step h = 1e-5 at points whose neighbours lie on the same float.  Expected: n =
+    # (-dz/dx, -dz/dy, 1) normalised. Points within 2 % of a yarn's side are left out, where the third derivative
+    # makes the differences themselves inexact (error h² z'''/6); what is left agrees to 2e-6.
     step = 1e-5
     x, y = random_points(fabric)
     seen = surface_at(fabric, x, y)
@@ -102,7 +91,7 @@ def test_normal_is_the_gradient_of_the_height(fabric):
         assert seen.under[inside].any()
 
 
-def test_yarn_beneath_is_smooth_and_ends_with_the_bend():
+def test_yarn_beneath_is_smooth_and_ends_with_the_bend_and_flat_floats_are_straight():
     """Along the axis of a weft beneath narrow warps: no kink where the arc ends, inclination never above u_max."""
     fabric = CLOTHS["steep beneath"]
     y = np.array([0.5, 0.75])[:, None]
@@ -112,6 +101,14 @@ def test_yarn_beneath_is_smooth_and_ends_with_the_bend():
     slope = np.diff(seen.height, axis=1) / np.diff(x)
     # On the axis |dz/dx| = tan |u|: at most tan u_max, and constant once the arc has ended.
     assert np.abs(slope[0]).max() < np.tan(np.radians(70)) + 1e-6 and np.abs(np.diff(slope, axis=1)).max() < 1e-3
+    # Without bend, without change of side, or shorter than w sin u_max: a straight cylinder.
+    yarn = Yarn(bend=80, roughness=0.5, width=1.0)
+    assert curvature(yarn, [0.98, 0.99, np.inf]).tolist() == [0, 2 * np.sin(np.radians(80)) / 0.99, 0]
+    for name in ("never changing side", "no bend"):
+        seen = surface_at(CLOTHS[name], 0.5 + 0.125, np.linspace(0, 4, 33))
+        warp = seen.yarn == WARP
+        width, relief = CLOTHS[name].warp.width, CLOTHS[name].warp.relief
+        assert warp.any() and np.allclose(seen.height[warp], relief * np.sqrt(width**2 / 4 - 0.125**2))
 
 
 def oracle_height(k, half_length, bend, r, x, y):
@@ -185,16 +182,7 @@ def test_a_quarter_turn_of_the_cloth_turns_what_is_seen(name):
     assert np.allclose(np.abs(along), 1, atol=1e-10)
 
 
-def test_relief_scales_height_and_slope():
-    flat, raised = cloth(), cloth(warp={"relief": 0.5}, weft={"relief": 0.5})
-    x, y = random_points(flat, 500)
-    one, half = surface_at(flat, x, y), surface_at(raised, x, y)
-    assert np.allclose(half.height, one.height / 2)
-    slope = one.normal[:, :2] / one.normal[:, 2:]
-    assert np.allclose(half.normal[:, :2] / half.normal[:, 2:], slope / 2)
-
-
-def test_widths_decide_what_shows():
+def test_widths_decide_what_shows_and_relief_scales_height_and_slope():
     """Areas in plain weave: a warp of width g covers g of its cells; the gaps are (1 - g_warp)(1 - g_weft)."""
     seen = surface_maps(cloth({"family": "plain"}, {"width": 0.75}, {"width": 0.5}), 64)
     assert np.isclose((seen.yarn == GAP).mean(), 0.25 * 0.5)
@@ -202,17 +190,12 @@ def test_widths_decide_what_shows():
     assert np.isclose(((seen.yarn == WARP) & seen.under).mean(), 0.5 * 0.5 * 0.75)
     under, height, normal, tangent = (column[seen.yarn == GAP] for column in seen[1:])
     assert (height == -np.inf).all() and (normal == [0, 0, 1]).all() and not under.any() and not tangent.any()
-
-
-def test_flat_floats():
-    """Without bend, without change of side, or shorter than w sin u_max: a straight cylinder."""
-    yarn = Yarn(bend=80, roughness=0.5, width=1.0)
-    assert curvature(yarn, [0.98, 0.99, np.inf]).tolist() == [0, 2 * np.sin(np.radians(80)) / 0.99, 0]
-    for name in ("never changing side", "no bend"):
-        seen = surface_at(CLOTHS[name], 0.5 + 0.125, np.linspace(0, 4, 33))
-        warp = seen.yarn == WARP
-        width, relief = CLOTHS[name].warp.width, CLOTHS[name].warp.relief
-        assert warp.any() and np.allclose(seen.height[warp], relief * np.sqrt(width**2 / 4 - 0.125**2))
+    flat, raised = cloth(), cloth(warp={"relief": 0.5}, weft={"relief": 0.5})
+    x, y = random_points(flat, 500)
+    one, half = surface_at(flat, x, y), surface_at(raised, x, y)
+    assert np.allclose(half.height, one.height / 2)
+    slope = one.normal[:, :2] / one.normal[:, 2:]
+    assert np.allclose(half.normal[:, :2] / half.normal[:, 2:], slope / 2)
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -73,7 +73,7 @@ def read(yarn=(), **table):
     return validated(Fabric, denim.model_dump() | {"warp": denim.warp.model_dump() | dict(yarn)} | table, "cloth.toml")
 
 
-def test_a_yarn_at_the_limit_is_legal_and_one_above_it_is_one_sentence():
+def test_a_yarn_at_the_limit_is_legal_and_a_thread_keeps_as_much_light_as_its_colour_leaves():
     most = Yarn(bend=0.0, roughness=0.5, specular=(0.2, 0.9, 1.0)).most_diffuse(2.0)
     assert 1.0 > most[0] > most[1] > most[2] > 0.4
     given = {"specular": (0.2, 0.9, 1.0), "diffuse": most}
@@ -81,6 +81,12 @@ def test_a_yarn_at_the_limit_is_legal_and_one_above_it_is_one_sentence():
     sentence = refusal(read, given | {"diffuse": (*most[:2], most[2] + 0.001)})
     for part in ("cloth.toml: warp.diffuse = (", "specular 1 and optical_thickness 2", "at most 0.4497 in blue"):
         assert part in sentence
+    palette = {"pale": {"diffuse": [0.7, 0.5, 0.1]}}
+    cloth = read({"diffuse": (0.1,) * 3, "diffuse_transmission": (0.3,) * 3}, colours={
+        "palette": palette, "ends": [["pale", 1]]})  # fmt: skip
+    most = np.array(cloth.warp.most_diffuse(2.0))
+    through = cloth.thread_colours()[0].diffuse_transmission[0]
+    np.testing.assert_allclose(through, np.minimum(0.3, most - palette["pale"]["diffuse"]))
 
 
 @pytest.mark.parametrize(
@@ -95,12 +101,3 @@ def test_a_yarn_at_the_limit_is_legal_and_one_above_it_is_one_sentence():
 )  # fmt: skip
 def test_what_makes_light_is_refused(yarn, table, named):
     assert named in refusal(read, yarn, **table)
-
-
-def test_a_thread_keeps_as_much_of_the_light_through_the_yarn_as_its_colour_leaves():
-    palette = {"pale": {"diffuse": [0.7, 0.5, 0.1]}}
-    cloth = read({"diffuse": (0.1,) * 3, "diffuse_transmission": (0.3,) * 3}, colours={
-        "palette": palette, "ends": [["pale", 1]]})  # fmt: skip
-    most = np.array(cloth.warp.most_diffuse(2.0))
-    through = cloth.thread_colours()[0].diffuse_transmission[0]
-    np.testing.assert_allclose(through, np.minimum(0.3, most - palette["pale"]["diffuse"]))

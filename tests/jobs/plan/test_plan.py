@@ -34,16 +34,13 @@ def test_every_row_once_in_tasks_of_shard_rows(tasks):
     assert rows == named | {(f"random_00{index}", "train"): 800 for index in range(3)}
 
 
-def test_plans_are_pure_and_in_order_of_need_and_no_two_tasks_write_one_file(files, tasks):
+def test_plans_are_pure_in_order_of_need_with_ids_of_what_tasks_compute_and_a_file_for_each_task(files, tasks):
     assert [task.id for task in tasks] == [task.id for task in plan(load_recipe(files.write()))]
     before, written = set(), set()
     for task in tasks:
         assert before.issuperset(task.needs) and task.id not in before and written.isdisjoint(task.products)
         before.add(task.id)
         written.update(task.products)
-
-
-def test_the_ids_of_a_plan_are_those_of_what_its_tasks_compute(tasks):
     assert [task.id for task in tasks] == [fingerprint([task.stage, task.identity()]) for task in tasks]
 
 
@@ -113,13 +110,18 @@ def test_the_silhouette_is_measured_where_the_cloth_is_curved(files, tasks):
     assert_changed(after, again, "edge|errors|^report")
 
 
-def test_models_of_one_kind_are_told_apart_on_the_page(files):
+def test_settings_are_measured_on_scenes_one_by_one_and_models_of_one_kind_are_told_apart(files):
     files.exchange('model = "neumip"', 'model = "neumip"\n\n[[models]]\nmodel = "neumip"\nname = "fine"')
     page = files.plan()[-1]
     notes = {note.name: note for note in page.models}
     assert notes["fine"].kind == "neumip" and notes["fine"].about.startswith("neumip: ")
     assert {"neumip", "fine"} <= {picture.method for picture in page.pictures}
     assert len({(p.fabric, p.scene, p.method, p.setting) for p in page.pictures}) == len(page.pictures)
+    # With one more number of points what was there stays, but what is about all of them.
+    before = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["curtain"] }').plan()
+    after = files.exchange("counts = [1, 2]", "counts = [1, 2, 128]").plan()
+    assert ids(after).keys() - ids(before).keys() == {"bench scene errors of point_sampled, curtain, k = 128"}
+    assert_changed(before, after, "(errors|extremes) of point_sampled(?!, curtain)|frame time|timing|^report")
 
 
 def test_every_method_is_measured_on_every_named_fabric_with_the_right_model(tasks):
@@ -159,14 +161,6 @@ def test_random_unseen_fabrics_are_measured_by_general_models_alone(files, tasks
 def test_the_largest_plan_is_paper_sized():
     tasks = plan(load_recipe("full_transmission"))
     assert sum(task.rows for task in tasks if task.stage == "generate") > 50_000_000
-
-
-def test_settings_are_measured_on_scenes_one_by_one(files):
-    """With one more number of points what was there stays, but what is about all of them."""
-    before = files.exchange("frames = 4", 'frames = 4\nscenes = { names = ["curtain"] }').plan()
-    after = files.exchange("counts = [1, 2]", "counts = [1, 2, 128]").plan()
-    assert ids(after).keys() - ids(before).keys() == {"bench scene errors of point_sampled, curtain, k = 128"}
-    assert_changed(before, after, "(errors|extremes) of point_sampled(?!, curtain)|frame time|timing|^report")
 
 
 BTF = '\n[[models]]\nmodel = "unified_btf"\ntexels_per_yarn = 2\nsamples = 60\n'

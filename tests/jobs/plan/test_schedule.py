@@ -30,21 +30,24 @@ def shards_and_net(count, length):
     return tasks, of(tasks, [1.0] * count + [length])
 
 
-def test_a_long_task_at_the_end_is_the_tail_and_tasks_that_measure_time_run_one_by_one():
+def test_a_long_task_and_the_longest_chain_count_and_doubling_ends_where_it_saves_little():
     tasks, seconds = shards_and_net(8, 10.0)
     found = Schedule.of(tasks, seconds, 4)
     assert (found.makespan, found.tail) == (12.0, 10.0) and max(chains(tasks, seconds).values()) == 11.0
     assert Schedule.of(tasks[-1:], seconds, 4).makespan == 10.0  # what it needs is done
     tasks = [Step(name="a"), Step(name="b"), Alone(name="c"), Alone(name="d")]
     assert Schedule.of(tasks, of(tasks, [1.0, 1.0, 5.0, 5.0]), 8).makespan == 11.0
-
-
-def test_doubling_ends_where_it_saves_little():
-    """The last saves 3.7 %."""
+    # The last saves 3.7 %.
     found = doublings(*shards_and_net(64, 100.0))
     assert [one.makespan for one in found] == [164.0, 132.0, 116.0, 108.0, 104.0]
     (nothing,) = doublings([], {})
     assert nothing.makespan == nothing.tail == 0.0 and nothing.efficiency == 1.0
+    a, b = costly("a", 10.0), costly("b", 10.0)
+    c = costly("c", 10.0, [a])
+    whole = 10.0
+    for workers, lengths in ((1, 3), (2, 2), (9, 2)):
+        assert Estimate().seconds_left([a, b, c], {}, workers) == pytest.approx(lengths * whole)
+    assert Estimate().seconds_left([], {}, 1) == 0.0
 
 
 class Costly(Step):
@@ -60,7 +63,7 @@ def costly(name, seconds, needs=()):
     return task(name, Costly, needs, seconds=seconds)
 
 
-def test_a_kind_takes_what_its_tasks_took_and_others_what_their_stage_took():
+def test_a_kind_takes_what_its_tasks_took_others_what_their_stage_took_and_one_wrong_cost_moves_little():
     estimate, first, other = Estimate(), costly("a 1", 100.0), costly("b 1", 100.0)
     assert estimate.seconds(first) == 100.0
     for _ in range(20):
@@ -70,10 +73,7 @@ def test_a_kind_takes_what_its_tasks_took_and_others_what_their_stage_took():
     for _ in range(2):
         estimate.learn(other, 100.0)
     assert estimate.seconds(other) == pytest.approx(100.0, rel=0.02)
-
-
-def test_one_wrong_cost_moves_no_other_kind_by_much():
-    """A second that took ten minutes, among tasks that took what they cost."""
+    # A second that took ten minutes, among tasks that took what they cost.
     estimate = Estimate()
     for number in range(10):
         estimate.learn(costly(f"a {number}", 5.0), 5.0)
@@ -90,12 +90,3 @@ def test_a_task_under_way_is_judged_by_its_share_when_that_is_sure(elapsed, shar
     a = costly("a", 100.0)
     began = {a.id: (time.monotonic() - elapsed, share)}
     assert Estimate().seconds_left([a], began, 1) == pytest.approx(left, rel=0.01)
-
-
-def test_the_longest_chain_and_the_number_of_workers_count():
-    a, b = costly("a", 10.0), costly("b", 10.0)
-    c = costly("c", 10.0, [a])
-    whole = 10.0
-    for workers, lengths in ((1, 3), (2, 2), (9, 2)):
-        assert Estimate().seconds_left([a, b, c], {}, workers) == pytest.approx(lengths * whole)
-    assert Estimate().seconds_left([], {}, 1) == 0.0

@@ -34,13 +34,19 @@ def of(tasks, kind, name="woven"):
     return found
 
 
-def test_more_seeds_add_trainings_and_change_none(one, three, files):
+def test_more_seeds_add_trainings_change_none_and_are_named(one, three, files):
     before, after = of(one, Training), of(three, Training)
     assert list(before) == [0] and list(after) == [0, 1, 2] and len({task.id for (task,) in after.values()}) == 3
     assert {task.training.model_copy(update={"seed": 0}) for (task,) in after.values()} == {before[0][0].training}
     assert after[2][0].title == "woven on 5 fabrics, seed 2"
     assert_changed(one, three, "^report")
     assert list(of(files.exchange("steps = 10", "steps = 10\nseed = 5").plan(), Training)) == [5, 6, 7]
+    (note,) = [note for note in three[-1].models if note.name == "woven"]
+    assert "3 trainings with the seeds 0 to 2" in note.about
+    trained = {seed: task.id for seed, (task,) in of(three, Training).items()}
+    assert note.fingerprint == trained[0] and not any("trainings with" in note.about for note in one[-1].models)
+    for seed, same in of(three, OnFabric).items():
+        assert (same[0].provenance.seed, same[0].provenance.model) == (seed, trained[seed])
 
 
 def test_each_training_of_one_material_has_every_seed(one, files):
@@ -62,7 +68,7 @@ def test_errors_are_measured_of_every_training(one, three, kind):
     assert len({task.title for same in after.values() for task in same}) == 3 * len(before[0])
 
 
-def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, three):
+def test_times_latents_pictures_and_runtimes_are_of_the_first_training_and_bounds_of_every_one(one, three, files):
     """And errors by size, which are measured with its times."""
     assert not of(one, ErrorsBySize) and list(of(three, ErrorsBySize)) == [1, 2]
     for kind in (TimeOfMethods, FrameTime, Latents):
@@ -72,18 +78,6 @@ def test_times_latents_pictures_and_runtimes_are_of_the_first_training(one, thre
         assert {bool(task.pictures) for task in of(three, kind)[0]} == {True}
         assert {bool(task.pictures) for seed in (1, 2) for task in of(three, kind)[seed]} == {False}
     assert {seed: same[0].ways.runtimes for seed, same in of(three, OnFabric).items()} == {0: ("onnx",), 1: (), 2: ()}
-
-
-def test_the_bound_is_measured_of_every_training(three, files):
     tasks = files.exchange("frames = 4", "frames = 4\nbounds = true").plan()
     bounds = {seed: {task.ways.bounds for task in same} for seed, same in of(tasks, OnFabric).items()}
     assert bounds == {0: {True}, 1: {True}, 2: {True}}
-
-
-def test_the_note_on_a_model_and_its_records_name_the_seeds(one, three):
-    (note,) = [note for note in three[-1].models if note.name == "woven"]
-    assert "3 trainings with the seeds 0 to 2" in note.about
-    trained = {seed: task.id for seed, (task,) in of(three, Training).items()}
-    assert note.fingerprint == trained[0] and not any("trainings with" in note.about for note in one[-1].models)
-    for seed, same in of(three, OnFabric).items():
-        assert (same[0].provenance.seed, same[0].provenance.model) == (seed, trained[seed])

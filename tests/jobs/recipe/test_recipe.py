@@ -11,10 +11,17 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-def test_recipes_of_the_package_load():
+def test_recipes_of_the_package_load_and_trade_trains_the_published_woven_as_long_as_ours():
     for name in recipe_names():
         recipe = load_recipe(name)
         assert recipe.name == name and recipe.about
+    recipe = load_recipe("trade")
+    published = next(one for one in recipe.models if one.options.name == "woven_published")
+    ours = next(one for one in load_recipe("standard").models if one.options.name == "woven")
+    differs = published.options.departures
+    assert differs == ("an encoder of the maps with fewer channels", "maps of 32 texels")
+    assert published.seeds == ours.seeds == 3
+    assert published.training == ours.training and recipe.dataset == load_recipe("standard").dataset
 
 
 def refused(files, words):
@@ -221,16 +228,6 @@ def test_pages_have_eight_random_unseen_fabrics_of_every_kind(name):
     for family in ("plain", "compound_twill", "large_satin", "irregular"):
         widths = [fabric.warp.width for fabric in fabrics if fabric.name.endswith(family)]
         assert 1.0 in widths and min(widths) < 1.0
-
-
-def test_trade_trains_the_published_woven_as_long_as_ours_and_lists_how_it_differs():
-    recipe = load_recipe("trade")
-    published = next(one for one in recipe.models if one.options.name == "woven_published")
-    ours = next(one for one in load_recipe("standard").models if one.options.name == "woven")
-    differs = published.options.departures
-    assert differs == ("an encoder of the maps with fewer channels", "maps of 32 texels")
-    assert published.seeds == ours.seeds == 3
-    assert published.training == ours.training and recipe.dataset == load_recipe("standard").dataset
 
 
 @pytest.mark.parametrize("name", ["stability", "sampler", "a\0b.toml"])

@@ -150,13 +150,10 @@ def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files,
         assert {shard.file for shard in manifest.shards} == {path.name for path in folder.glob("*.parquet")}
 
 
-def test_a_recipe_whose_models_are_all_taught_elsewhere_draws_test_rows_alone(asks):
+def test_models_taught_elsewhere_need_test_rows_alone_and_may_come_by_way_of_a_third_recipe(asks, files):
     recipe = asks()
     alone = dataclasses.replace(recipe, models=recipe.models[-1:])
     assert {part.shard.split for part in DataSet(alone).shards} == {"test"}
-
-
-def test_a_recipe_may_pass_on_what_a_third_one_trains(asks, files):
     asks()
     middle = files.recipe.replace('name = "tiny"', 'name = "middle"').replace("[bench]", f"{OTHER}\n[bench]")
     entry = '\n[[models]]\nname = "curved"\nrecipe = "middle.toml"\n'

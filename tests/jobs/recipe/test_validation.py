@@ -25,12 +25,9 @@ def test_a_table_knows_the_view_rays_that_a_recipe_may_ask_for(name, walls):
     assert FINE.knows(cloth_side(fabric, rays), columns_of(queries)).all()
 
 
-def test_boxes_of_view_rays_are_for_other_estimators():
+def test_boxes_of_view_rays_and_rims_of_very_open_cloth_are_for_other_estimators():
     box = TruthOptions(footprint="box")
     assert "Gaussian" in table_refusal(box, QueryOptions(sigma=(4.0, 8.0)), [load_fabric("denim")])
-
-
-def test_rims_of_very_open_cloth_are_for_other_estimators():
     fabric = load_fabric("gauze")
     sheer = fabric.model_copy(update={"weft": fabric.weft.model_copy(update={"width": 0.55})})
     queries = QueryOptions(sigma=(4.0, 8.0), max_angle=60.0)

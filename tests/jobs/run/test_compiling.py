@@ -14,13 +14,10 @@ def names(tasks):
     return {group.name for group in kernel_groups(tasks)}
 
 
-def test_a_task_asks_for_what_it_uses_alone(tasks):
+def test_a_task_asks_for_what_it_uses_alone_and_each_group_is_compiled_once_whatever_the_options(tasks):
     assert names(task for task in tasks if task.stage == "generate") == {"auto"}
     assert names(task for task in tasks if task.stage in ("train", "report")) <= {"soft_nodes"}
     assert names(t for t in tasks if t.title == "extremes of prefiltered") == {"owen", "prefiltered"}
-
-
-def test_each_group_is_compiled_once_whatever_the_options_and_not_again_in_its_process(tasks):
     groups = kernel_groups(tasks)
     assert len(groups) == len({group.name for group in groups})
     group = next(group for group in groups if group.name == "prefiltered")

@@ -36,12 +36,9 @@ def crew(there):
     return Crew(client, True, lambda message: None)
 
 
-def test_a_worker_of_equal_software_is_accepted():
+def test_a_worker_of_equal_software_is_accepted_and_each_difference_is_named_with_both_versions():
     assert crew(dict(software())).accepted == ["tcp://a"]
     assert "+" not in "".join(software().values())  # builds for other devices are one version
-
-
-def test_each_difference_is_named_with_both_versions():
     missing, words = rf"(missing.*){{{len(software())}}}", r"tcp://a gets no task: it has {} 0\.1 \(here {}\); install"
     different = [(software() | {name: "0.1"}, words.format(name, version)) for name, version in software().items()]
     gone = (ModuleNotFoundError("jobs"), r"it has no twillight of this version \(ModuleNotFoundError\)")

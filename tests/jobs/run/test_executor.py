@@ -79,7 +79,7 @@ def test_damaged_products_are_made_again_and_nothing_else(tmp_path, here, plan):
     assert titles(fake.run(plan, tmp_path).ran) == ["shard 1", "net", "error"]
 
 
-def test_a_damaged_product_of_a_stage_that_does_not_run_is_named(tmp_path, here, plan):
+def test_damaged_needs_of_a_stage_that_does_not_run_are_named_and_each_is_read_once(tmp_path, here, plan):
     fake.done(tmp_path, *plan[:3])
     flip(tmp_path / plan[1].products[0])
     for reason in (
@@ -88,6 +88,12 @@ def test_a_damaged_product_of_a_stage_that_does_not_run_is_named(tmp_path, here,
     ):
         with pytest.raises(WorkFailed, match=reason):
             fake.run(plan, tmp_path, stages=["train"])
+    fake.done(tmp_path, *plan[:3])
+    ledger = Ledger(tmp_path)
+    assert ledger.damaged(plan[:3]) == []
+    flip(tmp_path / plan[1].products[0])
+    assert ledger.damaged(plan[:3]) == [] and ledger.damaged(plan[:3], anew=True) == [plan[1]]
+    assert not (tmp_path / plan[1].products[0]).exists() and Ledger(tmp_path).state(plan[1]) == "missing"
 
 
 @pytest.mark.parametrize("always", [False, True])
@@ -102,15 +108,6 @@ def test_a_task_that_fails_on_an_input_damaged_meanwhile_is_tried_once_more(tmp_
     assert titles(summary.ran) == ["shard 1", "shard 0", "net"]
     names = [event["name"] for event in fake.events(tmp_path) if event["event"] == "start"]
     assert names.count("shard 0") == names.count("net") == 2 and names.count("shard 1") == 1
-
-
-def test_each_need_is_read_once(tmp_path, plan):
-    fake.done(tmp_path, *plan[:3])
-    ledger = Ledger(tmp_path)
-    assert ledger.damaged(plan[:3]) == []
-    flip(tmp_path / plan[1].products[0])
-    assert ledger.damaged(plan[:3]) == [] and ledger.damaged(plan[:3], anew=True) == [plan[1]]
-    assert not (tmp_path / plan[1].products[0]).exists() and Ledger(tmp_path).state(plan[1]) == "missing"
 
 
 def test_what_is_taken_from_another_data_set_is_heard_of_once(tmp_path):

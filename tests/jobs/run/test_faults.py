@@ -25,16 +25,12 @@ def kinds(found):
     return sorted((fault.kind, fault.path) for fault in found)
 
 
-def test_two_data_sets_of_one_recipe_are_sound(trade):
+def test_two_data_sets_of_one_recipe_are_sound_and_each_copy_of_a_shared_shard_is_read(trade):
     recipe, tasks, ledger = trade
     shares = []
     assert faults(*trade, shares.append) == [] and shares == sorted(shares) and shares[-1] == 1.0
     left = {path for path in made_up.contents(ledger.out) if not path.startswith("ledger/")}
     assert left <= set(own_files(recipe, tasks, ledger.out))
-
-
-def test_each_copy_of_a_shared_shard_is_read(trade):
-    recipe, tasks, ledger = trade
     shared = next(task for task in tasks if isinstance(task, Shard) and len(task.products) == 2)
     second = ledger.out / shared.products[1]
     content = second.read_bytes()
@@ -46,7 +42,7 @@ def test_each_copy_of_a_shared_shard_is_read(trade):
     assert ledger.adopt(shared) and second.read_bytes() == content and faults(recipe, tasks, ledger) == []
 
 
-def test_a_manifest_of_either_data_set_is_compared(trade):
+def test_a_manifest_of_either_data_set_is_compared_and_a_folder_or_a_larger_file_is_damaged(trade):
     """One that a killed run left behind its receipts is outdated."""
     recipe, tasks, ledger = trade
     first, second = sorted(ledger.out.glob("datasets/*/manifest.json"))
@@ -64,9 +60,6 @@ def test_a_manifest_of_either_data_set_is_compared(trade):
     second.unlink()
     places = [str(path.relative_to(ledger.out)) for path in (first, second)]
     assert kinds(faults(recipe, tasks, ledger)) == [("damaged", places[0]), ("missing", places[1])]
-
-
-def test_a_folder_or_a_larger_file_in_a_products_place_is_damaged(trade):
     _, tasks, ledger = trade
     one, other = (task for task in tasks if task.stage == "train")
     (ledger.out / one.products[0]).unlink()
@@ -78,7 +71,7 @@ def test_a_folder_or_a_larger_file_in_a_products_place_is_damaged(trade):
     assert ledger.discard(other) == [other.products[0]]
 
 
-def test_products_of_an_earlier_version_are_outdated(tmp_path, monkeypatch):
+def test_products_of_an_earlier_version_are_outdated_and_what_a_stopped_task_leaves_is_known(tmp_path, monkeypatch):
     path = made_up.write_recipe(tmp_path, "other", "neumip")
     with monkeypatch.context() as patch:
         patch.setattr(versions, "TRAINING", versions.TRAINING - 1)
@@ -92,8 +85,5 @@ def test_products_of_an_earlier_version_are_outdated(tmp_path, monkeypatch):
     # What no network is part of is not touched by it.
     assert {stage for stage, _ in found} == {"train", "bench", "report"}
     assert len(found) < sum(task.stage != "generate" for task in tasks)
-
-
-def test_what_a_stopped_task_leaves_is_known_by_name():
     assert all(map(is_leftover, (CHECKPOINT, f"0123-{ROWS}", ".tmp-card.json")))
     assert not any(map(is_leftover, ("model.safetensors", "part-0.parquet", "notes.txt")))

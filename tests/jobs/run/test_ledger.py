@@ -20,7 +20,6 @@ NOTE = f"ledger/{TASK.id}.json"
 
 @pytest.fixture
 def done(tmp_path):
-    """A ledger in which TASK is done."""
     fake.done(tmp_path, TASK)
     return Ledger(tmp_path)
 
@@ -63,9 +62,14 @@ def test_an_odd_receipt_counts_as_missing(done, change):
     assert done.state(TASK) == "missing" and not getattr(done.receipt(TASK), "files", {})
 
 
-def test_a_receipt_of_before_checksums_is_read(done):
+def test_a_receipt_of_before_checksums_is_read_and_a_failure_keeps_its_reason_until_success(done):
     rewrite(done, {"title": "rows 0–9", "identity": {"error": 1e-05}})
     assert b"\\u2013" in (done.out / NOTE).read_bytes() and done.state(TASK) == "done"
+    (done.out / PRODUCT).unlink()
+    done.fail(TASK, "the disk was full", "Traceback …")
+    assert (done.state(TASK), done.reason(TASK)) == ("failed", "the disk was full")
+    fake.done(done.out, TASK)
+    assert (done.state(TASK), done.reason(TASK), done.seconds(TASK)) == ("done", "", 1.0)
 
 
 @pytest.mark.parametrize("content", [b"[" * 100_000, b"{" * 5, b"\xff\xfe", b"null", b"7", b" " * (2 << 20)])
@@ -110,14 +114,6 @@ def test_every_flipped_byte_of_a_receipt_is_found(data):
         assert found.model_dump(exclude={"checksum"}) == receipt.model_dump(exclude={"checksum"})
         path.write_bytes(whole[:place] + bytes([whole[place] ^ mask]) + whole[place + 1 :])
         assert Receipt.read(path, "a" * 16) is None
-
-
-def test_a_failure_keeps_its_reason_until_success(done):
-    (done.out / PRODUCT).unlink()
-    done.fail(TASK, "the disk was full", "Traceback …")
-    assert (done.state(TASK), done.reason(TASK)) == ("failed", "the disk was full")
-    fake.done(done.out, TASK)
-    assert (done.state(TASK), done.reason(TASK), done.seconds(TASK)) == ("done", "", 1.0)
 
 
 @pytest.mark.parametrize("sound", [True, False])

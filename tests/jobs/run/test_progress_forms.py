@@ -88,12 +88,9 @@ def test_lines_have_failures_rate_time_left_and_dashboard(clock):
     assert shown[-1] == "generate 4 of 4 tasks; all 4 of 4, 1 failed, 3 tasks/min, 0:00:00 left"
 
 
-def test_bars_have_failures_rate_and_dashboard(clock):
+def test_bars_have_failures_rate_and_dashboard_and_are_shown_on_a_terminal_alone(clock):
     text = run(clock, "rich")
     assert "dashboard: http://here:8787/status" in text and "2/4 tasks, 1 failed" in text and "4 tasks/min" in text
-
-
-def test_auto_shows_bars_on_a_terminal_alone():
     for form, is_terminal in (("rich", True), ("plain", None)):
         console = Console(file=io.StringIO(), force_terminal=is_terminal)
         assert form_of("auto", console).__func__ is form_of(form, console).__func__

@@ -70,7 +70,7 @@ def test_a_shard_that_is_gone_and_files_cut_short_are_named_and_made_again(run):
     same(made_up.contents(run.out), expected)
 
 
-def test_a_folder_in_the_place_of_a_shard_is_named_and_the_shard_made_again(run):
+def test_a_folder_in_the_place_of_a_shard_is_replaced_and_a_foreign_file_named_and_kept(run):
     expected, shard = made_up.contents(run.out), run.of(Shard)
     place = run.out / shard.products[0]
     place.unlink()
@@ -78,9 +78,6 @@ def test_a_folder_in_the_place_of_a_shard_is_named_and_the_shard_made_again(run)
     code, _, told = run()
     assert code != 0 and str(place) in told and run("--repair")[0] == 0
     same(made_up.contents(run.out), expected, but=[f"ledger/{shard.id}.json"])
-
-
-def test_a_foreign_file_is_named_and_kept(run):
     foreign = (run.out / run.of(Shard).products[0]).with_name("part-0123456789abcdef.parquet")
     foreign.write_text("not a shard")
     (run.out / run.of(Training).folder / "notes.txt").write_text("by hand")
@@ -91,15 +88,12 @@ def test_a_foreign_file_is_named_and_kept(run):
     assert run("--repair")[0] == 2 and foreign.exists()
 
 
-def test_a_page_of_other_measurements_is_outdated(run):
+def test_a_page_of_other_measurements_is_outdated_and_values_that_were_never_right_are_odd(run):
     page = run.of(Page)
     (run.out / "ledger" / f"{page.id}.json").unlink()
     code, _, told = run()
     assert code == 1 and f"{run.out / page.products[0]}: outdated" in told and run("--repair")[0] == 0
-
-
-def test_values_that_were_never_right_are_odd(run):
-    """A shard whose hash is on the receipt, with a value that no truth gives."""
+    # A shard whose hash is on the receipt, with a value that no truth gives.
     shard = run.of(Shard)
     path = run.out / shard.products[0]
     table = read_table(path)
@@ -109,6 +103,15 @@ def test_values_that_were_never_right_are_odd(run):
     Ledger(run.out).finish(shard, {path.name: made_up.Product.of(path)}, 1.0)
     code, _, told = run()
     assert code == 2 and f"{path}: odd: column diffuse_warp spans [-1.0" in told
+
+
+def test_many_faults_are_counted(run):
+    struck = [path for place in ("records/*", "models/*/*", "datasets/*/*.parquet") for path in run.out.glob(place)]
+    for path in struck:
+        flip(path)
+    code, _, told = run()
+    assert code == 2 and len(told.splitlines()) == 22
+    assert told.splitlines()[20] == f"and {len(struck) - 20} damaged more"
 
 
 def test_a_measurement_of_time_is_taken_again_and_shown(run, twillight):
@@ -125,15 +128,6 @@ def test_a_measurement_of_time_is_taken_again_and_shown(run, twillight):
     assert twillight("bench", "tiny.toml")[0] == 0 and not (run.out / page.products[0]).exists()
     assert twillight("report", "tiny.toml")[0] == 0
     assert (run.out / page.products[0]).read_bytes() != found[page.products[0]] and run()[0] == 0
-
-
-def test_many_faults_are_counted(run):
-    struck = [path for place in ("records/*", "models/*/*", "datasets/*/*.parquet") for path in run.out.glob(place)]
-    for path in struck:
-        flip(path)
-    code, _, told = run()
-    assert code == 2 and len(told.splitlines()) == 22
-    assert told.splitlines()[20] == f"and {len(struck) - 20} damaged more"
 
 
 @pytest.mark.parametrize("count", [4, pytest.param(40, marks=pytest.mark.slow)])

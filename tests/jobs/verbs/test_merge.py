@@ -65,7 +65,7 @@ def test_models_and_records_come_along_and_pages_do_not(parts, tmp_path):
     assert made_up.execute(parts.tasks, Ledger(tmp_path / "c")).ran == [page]
 
 
-def test_other_bytes_of_one_task_are_refused(parts, tmp_path):
+def test_other_bytes_of_one_task_and_manifests_of_unlike_data_sets_are_refused(parts, tmp_path):
     task = parts.tasks[0]
     shutil.copytree(tmp_path / "a", tmp_path / "other")
     path = tmp_path / "other" / task.products[0]
@@ -74,15 +74,9 @@ def test_other_bytes_of_one_task_are_refused(parts, tmp_path):
     told = parts.refused("a", "other", "--out", "c")
     assert f"{path.name} of generate {task.title} has other bytes in each" in told
     assert not list((tmp_path / "c").glob("datasets/*/*"))
-
-
-def test_measurements_of_time_in_both_folders_are_refused(parts, tmp_path):
     for name in ("one", "two"):
         made_up.finished("wide.toml", tmp_path / name)
     assert "has other bytes in each: delete ledger/" in parts.refused("one", "two", "--out", "c")
-
-
-def test_manifests_of_unlike_data_sets_are_refused(parts, tmp_path):
     manifest = Manifest.load(tmp_path / "b" / parts.folder)
     manifest.model_copy(update={"fingerprint": "0" * 16}).save(tmp_path / "b" / parts.folder)
     assert "is of another data set" in parts.refused("a", "b", "--out", "c")

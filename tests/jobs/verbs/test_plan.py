@@ -42,14 +42,13 @@ def test_estimates_are_scaled_by_what_was_measured(files, out):
     assert facts.seconds[training.id] > 2 * training.cost  # another stage, of which nothing was done
 
 
-def test_schedules_are_shown_for_the_wished_number_of_workers(files, out, call):
+def test_schedules_and_prices_are_of_what_is_left_and_a_folder_that_is_not_there_has_new_tasks(
+    files, out, call, tmp_path
+):
     code, told, _ = call("plan", files.write(), "--workers", "3")
     assert code == 0
     for part in ("3 workers: ", "workers save less than 5%", "durations are measured"):
         assert part in told
-
-
-def test_a_price_is_of_each_core_hour_that_is_left(files, out, call):
     costs = []
     for price in (1000, 2000):
         told = call("plan", files.write(), "--price", price)[1]
@@ -58,8 +57,5 @@ def test_a_price_is_of_each_core_hour_that_is_left(files, out, call):
         assert costs[-1] == pytest.approx(price * float(hours), abs=0.005 * price)
     assert costs[1] == pytest.approx(2 * costs[0], abs=0.02) and costs[0] > 0
     assert "core-hours" not in call("plan", files.write())[1]
-
-
-def test_a_plan_of_a_folder_that_is_not_there_is_one_of_new_tasks(files, tmp_path, call):
     code, told, _ = call("plan", files.write(), "--out", "none")
     assert code == 0 and "never made" in told and not (tmp_path / "none").exists()

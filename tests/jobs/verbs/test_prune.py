@@ -21,13 +21,21 @@ def two(tmp_path, call):
     return partial(call, "prune")
 
 
-def test_nothing_is_removed_that_a_named_recipe_needs_nor_by_a_list(two, tmp_path):
+def test_a_list_removes_nothing_and_counts_no_bytes_that_another_data_set_keeps(two, tmp_path):
     before = made_up.contents(tmp_path / "out")
     code, said, _ = two("narrow.toml", "wide.toml", "--delete")
     assert code == 0 and "nothing to remove" in said
     code, said, _ = two("wide.toml")
     assert code == 0 and "--delete removes them" in said and all(path in said for path in FOREIGN)
     assert made_up.contents(tmp_path / "out") == before
+    # The shards that both share are hard links: removing one of two names frees nothing.
+    shards = next(iter((tmp_path / "out" / "datasets").glob("narrow-*")))
+    shared = [path for path in shards.glob("*.parquet") if path.stat().st_nlink == 2]
+    assert len(shared) == 4
+    _, said, _ = two("wide.toml")
+    freed = said.split(f"{shards.relative_to(tmp_path / 'out')} 5 ")[1].split()
+    manifest = (shards / "manifest.json").stat().st_size
+    assert freed[1] == "kB" and float(freed[0]) == pytest.approx(manifest / 1000, rel=0.01)
 
 
 @pytest.mark.parametrize("kept", ["narrow", "wide"])
@@ -48,17 +56,6 @@ def test_what_a_stopped_training_goes_on_from_is_kept(two, tmp_path):
             (out / training.folder / name).write_text("x")
     two("narrow.toml", "--delete")
     assert len(list(out.glob("models/*/checkpoint.safetensors"))) == 1 and not list(out.glob("models/*/.tmp-*"))
-
-
-def test_bytes_of_shards_that_another_data_set_keeps_are_not_counted(two, tmp_path):
-    """The shards that both share are hard links: removing one of two names frees nothing."""
-    shards = next(iter((tmp_path / "out" / "datasets").glob("narrow-*")))
-    shared = [path for path in shards.glob("*.parquet") if path.stat().st_nlink == 2]
-    assert len(shared) == 4
-    _, said, _ = two("wide.toml")
-    freed = said.split(f"{shards.relative_to(tmp_path / 'out')} 5 ")[1].split()
-    manifest = (shards / "manifest.json").stat().st_size
-    assert freed[1] == "kB" and float(freed[0]) == pytest.approx(manifest / 1000, rel=0.01)
 
 
 def test_a_copied_data_set_keeps_its_manifest(two, tmp_path):

@@ -34,15 +34,12 @@ def test_what_differs_is_marked(call, write):
     assert call("compare", a / page, b / page / OF_A_PAGE)[1] == text and "faster" in call("compare", b, a)[1]
 
 
-def test_other_machines_are_refused_unless_asked_for(call, write):
+def test_other_machines_are_refused_unless_asked_for_and_of_several_pages_one_is_chosen(call, write, refused):
     a, b = write("a"), write("b", cpu="another")
     code, text, told = call("compare", a, b)
     assert (code, text) == (2, "") and told.count("\n") == 1 and "another" in told and "--other-machine" in told
     code, text, _ = call("compare", a, b, "--other-machine")
     assert code == 0 and "different machines: cpu" in text
-
-
-def test_of_several_pages_one_is_chosen(call, refused, write):
     a, b = write("a"), write("b")
     write("b", recipe="smoke", time=900.0)
     assert "--recipe: quick, smoke" in refused("compare", a, b)
@@ -80,7 +77,6 @@ def test_records_of_two_machines_are_joined_and_shown(call, refused, write, tmp_
 
 @pytest.fixture
 def results(twillight, tmp_path):
-    """Run `twillight results` on a made-up page."""
     subject = Record(method="point_sampled", setting="k = 2", provenance=Provenance(recipe="smoke"))
     records = [subject.of("time", 500.0, 25, low=490.0, high=510.0), subject.of("bytes_stored", 2000.0, 2)]
     for fabric, role in (("denim", "seen"), ("twill_4_4", "unseen")):
@@ -95,14 +91,7 @@ def results(twillight, tmp_path):
     return lambda *more: twillight("results", "smoke", *more)
 
 
-def test_the_tables_are_written_beside_the_page_or_where_it_is_said(results, tmp_path):
-    assert results()[0] == results("--file", "R.md")[0] == 0
-    beside = (tmp_path / "out" / "report" / "smoke" / "results.md").read_text(encoding="utf-8")
-    assert beside == (tmp_path / "R.md").read_text(encoding="utf-8")
-    assert beside.startswith("# Results of the recipe `smoke`")
-
-
-def test_only_the_block_of_a_readme_is_written(results, tmp_path):
+def test_only_the_block_of_a_readme_is_written_or_tables_beside_the_page_or_where_it_is_said(results, tmp_path):
     first, last = markers("quick")
     file = tmp_path / "README.md"
     file.write_text(f"title\n{first}\n{last}\nend\n", encoding="utf-8")
@@ -112,3 +101,7 @@ def test_only_the_block_of_a_readme_is_written(results, tmp_path):
     assert not (tmp_path / "out" / "report" / "smoke" / "results.md").exists()
     code, said, _ = results("--readme", file)
     assert code == 0 and "unchanged" in said and file.read_text(encoding="utf-8") == text
+    assert results()[0] == results("--file", "R.md")[0] == 0
+    beside = (tmp_path / "out" / "report" / "smoke" / "results.md").read_text(encoding="utf-8")
+    assert beside == (tmp_path / "R.md").read_text(encoding="utf-8")
+    assert beside.startswith("# Results of the recipe `smoke`")

@@ -42,7 +42,12 @@ def require(tmp_path, call, refused):
     return require
 
 
-def test_the_wish_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, monkeypatch):
+def test_a_wish_for_a_method_or_an_error_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, monkeypatch):
+    code, text, _ = require("--method", "woven", "--effort", ".5", "--set", "hidden=16")
+    assert code == 0 and "(from its footprints)" in text
+    own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
+    assert own.models[0].options.model == "woven" and own.models[0].options.hidden == 16
+    assert own.models[0].training.steps == 200 and own.dataset.rows.train == 4096
     code, text, _ = require("--error", ".3")
     assert code == 0 and "denim 100 %" in text and "light from behind 0.0 %" in text
     # 16 points err .2 and take less time than woven does.
@@ -50,14 +55,6 @@ def test_the_wish_is_met_and_the_recipe_loads_from_elsewhere(require, tmp_path, 
     own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
     assert own.models[0].options.counts == [16] and [fabric.name for fabric in own.fabrics] == ["denim"]
     assert own.bench.scenes.names == ("plane",) and own.bench.scenes.size == (24, 18)
-
-
-def test_a_method_may_be_wished_for(require, tmp_path):
-    code, text, _ = require("--method", "woven", "--effort", ".5", "--set", "hidden=16")
-    assert code == 0 and "(from its footprints)" in text
-    own = load_recipe(tmp_path / "out" / "recipes" / "require-plane.toml")
-    assert own.models[0].options.model == "woven" and own.models[0].options.hidden == 16
-    assert own.models[0].training.steps == 200 and own.dataset.rows.train == 4096
 
 
 def test_what_lies_beyond_the_general_domain_counts_as_the_fallbacks(require, monkeypatch):
@@ -70,11 +67,14 @@ def test_what_lies_beyond_the_general_domain_counts_as_the_fallbacks(require, mo
     assert 0.1 < seen["woven"] < 0.9 and seen["woven"] == seen["neumip"] and seen["point_sampled"] == 0.0
 
 
-def test_a_wish_that_nothing_meets_names_the_nearest_points(require):
+def test_a_wish_that_nothing_meets_names_the_nearest_points_and_the_general_recipe_may_run_first(require, monkeypatch):
     told = require.refused("--error", ".01", "--time", ".001")
     assert "no method meets them" in told and "point_sampled k = 2" in told
     told = require.refused("--method", "woven", "--error", ".01")
     assert "woven: " in told and "point_sampled" not in told
+    ran = []
+    monkeypatch.setattr(verb, "work", lambda recipe, stages, *_: ran.append((recipe, stages)))
+    assert require("--run")[0] == 0 and ran == [("wide.toml", verb.STAGES)]
 
 
 def test_a_method_that_was_not_measured_or_that_only_an_old_page_has_is_refused(require, tmp_path):
@@ -87,9 +87,3 @@ def test_a_method_that_was_not_measured_or_that_only_an_old_page_has_is_refused(
     assert "the page of wide: method = 'sums'" in require.refused() and require("--method", "point_sampled")[0] == 0
     path.unlink()
     assert "no page of the recipe wide with Records: `twillight run wide.toml` must run first" in require.refused()
-
-
-def test_the_general_recipe_may_run_first(require, monkeypatch):
-    ran = []
-    monkeypatch.setattr(verb, "work", lambda recipe, stages, *_: ran.append((recipe, stages)))
-    assert require("--run")[0] == 0 and ran == [("wide.toml", verb.STAGES)]

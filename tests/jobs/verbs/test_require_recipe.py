@@ -71,7 +71,7 @@ def test_a_table_that_cannot_answer_makes_way_for_sampling_at_a_stated_error(tmp
     assert own.dataset.queries.curvature[1] > 0 and own.dataset.training_truth == SAMPLED
 
 
-def test_the_training_is_cut_by_the_effort_and_its_average_with_it(tmp_path):
+def test_the_training_is_cut_by_the_effort_with_its_average_and_what_is_saved_is_counted(tmp_path):
     recipe = narrowed(tmp_path / "r.toml", effort=0.25)
     assert (recipe.dataset.rows.train, recipe.dataset.rows.population) == (16384, 0)
     own = recipe.models[0].training
@@ -81,9 +81,6 @@ def test_the_training_is_cut_by_the_effort_and_its_average_with_it(tmp_path):
     assert own.average**own.steps == pytest.approx(general.average**general.steps, rel=1e-2)
     # No more rows than the general recipe has, whatever the effort.
     assert narrowed(tmp_path / "r.toml", effort=3.0).dataset.rows.train == 65536
-
-
-def test_what_is_saved_is_counted(tmp_path):
     own = narrowed(tmp_path / "r.toml", method="neumip", effort=0.5)
     assert effort_of(own) == (32768 + 2048 + 4096, 1000 * 512)
     # By itself neumip learns from the nine named fabrics; the population is drawn for the general recipe all the same.
@@ -102,16 +99,13 @@ def test_one_setting_is_enough(tmp_path, method, parameter, k):
     assert "nothing to train" in savings(tmp_path / "r.toml", QUICK)
 
 
-def test_a_model_can_be_made_smaller(tmp_path):
+def test_a_model_can_be_made_smaller_and_has_its_other_options(tmp_path):
     own = narrowed(tmp_path / "r.toml", options={"hidden": 64}).models[0].options
     assert own == QUICK.models[0].options.model_copy(update={"hidden": 64})
     with pytest.raises(BadInput, match=r"--set: hiden = 64: unknown key; did you mean 'hidden'"):
         narrowed(tmp_path / "other.toml", options={"hiden": 64})
     assert not (tmp_path / "other.toml").exists()
-
-
-def test_options_of_a_model_are_kept(tmp_path):
-    """But for the largest curvature, where the scene's is beyond it: the rows would be refused in training."""
+    # But for the largest curvature, where the scene's is beyond it: the rows would be refused in training.
     curved = load_recipe("curved")
     own = narrowed(tmp_path / "r.toml", curved, "curved_grazing", requirement=require(curved.dataset.queries))
     bent = own.dataset.queries.curvature[1]

@@ -65,7 +65,6 @@ class Runs:
         return self
 
     def finish(self, task, seconds=1.0):
-        """Write the receipt of a task whose products are there."""
         files = {Path(path).name: Product.of(self.out / path) for path in task.products}
         Ledger(self.out).finish(task, files, seconds)
 
@@ -135,11 +134,18 @@ def test_a_model_of_many_fabrics_is_charged_for_one_of_its_trainings(runs):
     assert rows["mse"].general.value == pytest.approx(8e-4)
 
 
-def test_where_nothing_is_trained_rows_of_the_test_are_saved(runs):
+def test_where_nothing_is_trained_rows_of_the_test_are_saved_and_the_command_prints_all(runs, call):
     rows = by_quantity(both(runs, "point_sampled", "k = 2"))
     assert rows["queries generated"].ratio == 3.0 and math.isnan(rows["queries learnt from"].ratio)
     assert rows["frame_time over 2 points"].general.value == 1.0
     assert "3.0 times fewer queries to generate; MSE 0.0003 in place of 0.0004." in conclusion([*rows.values()])
+    code, text, _ = call("savings", both(runs).general, "sphere", "--out", runs.out)
+    assert code == 0 and "queries generated 29,184 3.58e+03 8.14" in text
+    assert "sphere, neumip: 8.1 times fewer queries to generate, 12.0 times fewer to learn from" in text
+    with (runs.out / "report" / "savings.csv").open(newline="") as file:
+        rows = {row["quantity"]: row for row in csv.DictReader(file)}
+    assert float(rows["queries learnt from"]["ratio"]) == 12.0 and rows["training"]["unit"] == "s"
+    assert (float(rows["mse"]["general_high"]), float(rows["mse"]["own_low"])) == pytest.approx((4.8e-4, 2.4e-4))
 
 
 @pytest.mark.parametrize(
@@ -188,16 +194,6 @@ def write_frames(path, fabric):
     path.parent.mkdir(parents=True, exist_ok=True)
     arrays = {f"a.{name}": column for name, column in columns.items()}
     np.savez(path, about=np.array(json.dumps(about)), base=np.zeros((1, 8, 8, 3), np.float32), **arrays)
-
-
-def test_the_command_prints_and_writes_all_of_it(runs, call):
-    code, text, _ = call("savings", both(runs).general, "sphere", "--out", runs.out)
-    assert code == 0 and "queries generated 29,184 3.58e+03 8.14" in text
-    assert "sphere, neumip: 8.1 times fewer queries to generate, 12.0 times fewer to learn from" in text
-    with (runs.out / "report" / "savings.csv").open(newline="") as file:
-        rows = {row["quantity"]: row for row in csv.DictReader(file)}
-    assert float(rows["queries learnt from"]["ratio"]) == 12.0 and rows["training"]["unit"] == "s"
-    assert (float(rows["mse"]["general_high"]), float(rows["mse"]["own_low"])) == pytest.approx((4.8e-4, 2.4e-4))
 
 
 def test_what_is_missing_is_one_sentence_that_says_what_to_run(runs):

@@ -41,22 +41,16 @@ def test_colours_are_near_those_of_quadrature(method, size):
     assert colour_error(method(LOPSIDED, queries, **RIMS.get(method, {})), exact.mean) < bound
 
 
-def test_a_method_without_shadows_is_far_off():
+def test_light_from_behind_and_points_are_near_quadrature_and_a_method_without_shadows_is_far_off():
     """What the bounds above can tell apart: averaged normals are off by ten times the bound of soft nodes."""
     queries, exact, _ = asked("wide")
     assert colour_error(methods.averaged_normals(LOPSIDED, queries), exact.mean) > 10 * BOUNDS[methods.soft_nodes][2]
-
-
-def test_light_from_behind_is_near_that_of_quadrature():
     queries, exact, error = asked("wide", 1.0)
     assert error < 0.25 * 0.035
     found = methods.soft_nodes_behind(LOPSIDED, queries._replace(wi=queries.wi * np.float32([1, 1, -1])), rims=False)
     assert colour_error(found[:, :4], exact.mean) < 0.035
     assert np.sqrt(np.mean((found[:, 4] - exact.transparency) ** 2)) < 0.005
-
-
-def test_points_converge_to_quadrature():
-    """R2 points, from 16 to 4,096: faster than independent ones, whose order is 1/2."""
+    # R2 points, from 16 to 4,096: faster than independent ones, whose order is 1/2.
     queries, exact, error = asked("middle")
     counts = [16, 64, 256, 1024, 4096]
     errors = [colour_error(methods.points(LOPSIDED, queries, count, rims=False), exact.mean) for count in counts]

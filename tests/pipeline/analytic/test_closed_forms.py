@@ -17,7 +17,7 @@ from tests.pipeline.truth.cloths import along_cylinders, cylinder_answers, cylin
 
 
 @pytest.mark.parametrize("method", methods.ALL)
-def test_a_lamp_at_the_eye_lights_all_that_is_seen(method):
+def test_a_lamp_at_the_eye_lights_all_that_is_seen_and_white_cloth_returns_no_more_than_it_gets(method):
     """Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction.
 
     Soft nodes see by rays and areas what they light by soft horizons: up to 2.6 % are in soft shadows there.
@@ -28,6 +28,20 @@ def test_a_lamp_at_the_eye_lights_all_that_is_seen(method):
     )  # fmt: skip
     found = method(fabric, queries._replace(wi=queries.wo))[:, 2:].sum(axis=1)
     np.testing.assert_allclose(found * math.pi, queries.wo[:, 2], rtol=0.03 if method is methods.soft_nodes else 2e-3)
+    # Diffuse parts under an even sky, k_d = 1: cosine-distributed lights, whose density is cos / pi. Three
+    # standard errors of the mean over 2,000 lights are added. A method without shadows may return all of it.
+    fabric, rows = woven("cotton_twill", blend=1.0), 2000
+    u, v, x, y = np.random.default_rng(1).random((4, rows))
+    sine, azimuth = np.sqrt(u), 2.0 * math.pi * v
+    wi = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.sqrt(1.0 - u)], axis=1)
+    for sigma, theta in ((0.15, 0.0), (0.5, 1.0), (6.0, 1.3)):
+        wo = np.tile([math.sin(theta), 0.0, math.cos(theta)], (rows, 1))
+        found = method(fabric, Queries.round(4.0 * x, 4.0 * y, np.full(rows, sigma), wi, wo))[:, 2:].sum(axis=1)
+        returned = math.pi * found.astype(np.float64) / wi[:, 2]
+        assert returned.mean() + 3.0 * returned.std() / math.sqrt(rows) < 1.0 + 0.02 * (
+            method is methods.averaged_normals
+        )
+        assert returned.mean() > 0.5
 
 
 def cloth(blend=0.5):
@@ -60,11 +74,18 @@ def test_shadows_converge_with_points(blend):
         assert 0.8 < -slope < 1.7, by_points
 
 
-def test_soft_shadows_converge_with_the_nodes_across():
+def test_soft_shadows_converge_with_the_nodes_across_and_the_seen_area_is_the_projected_one():
     """From k = 2 to 4 a yarn has twice as many, and narrower ramps: order 1/2 at least. Others change nothing."""
     errors = np.array([shadow_errors(methods.soft_nodes, 0.5, 1.2, level=level) for level in (1, 2, 4, 8)])
     np.testing.assert_allclose(errors[[0, 2]], errors[[1, 3]], atol=5e-4)
     assert (errors[2] < errors[1] / math.sqrt(2.0)).all(), errors
+    # Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle.  Its
+    # table is linear between angles and azimuths; no wall is there to be left out.
+    fabric = cloth()
+    queries = draw_queries(QueryOptions(sigma=(6.0, 8.0), max_angle=80.0), fabric.weave.repeat, 3, 0, 60)
+    sums, gaps = query_sums(tabulate(fabric, rims=False), queries)
+    assert not gaps.any()
+    assert np.abs(sums[:, :, AREA].sum(axis=1) / queries.wo[:, 2] - 1.0).mean() < 0.01
 
 
 @pytest.mark.parametrize("depth", [0.05, 0.4, 2.0])
@@ -77,36 +98,6 @@ def test_unscattered_light_through_cylinders(depth):
     looks = queries._replace(wi=-queries.wo)
     through = sample_transparency(cloth_side(fabric, TruthOptions()), looks, 1024, 3, True)
     np.testing.assert_allclose(through, exact, atol=0.01 * exact.max())
-
-
-@pytest.mark.parametrize("method", methods.ALL)
-def test_white_cloth_returns_no_more_light_than_it_gets(method):
-    """Diffuse parts under an even sky, k_d = 1: cosine-distributed lights, whose density is cos / pi. Three standard
-    errors of the mean over 2,000 lights are added. A method without shadows may return all of it."""
-    fabric, rows = woven("cotton_twill", blend=1.0), 2000
-    u, v, x, y = np.random.default_rng(1).random((4, rows))
-    sine, azimuth = np.sqrt(u), 2.0 * math.pi * v
-    wi = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.sqrt(1.0 - u)], axis=1)
-    for sigma, theta in ((0.15, 0.0), (0.5, 1.0), (6.0, 1.3)):
-        wo = np.tile([math.sin(theta), 0.0, math.cos(theta)], (rows, 1))
-        found = method(fabric, Queries.round(4.0 * x, 4.0 * y, np.full(rows, sigma), wi, wo))[:, 2:].sum(axis=1)
-        returned = math.pi * found.astype(np.float64) / wi[:, 2]
-        assert returned.mean() + 3.0 * returned.std() / math.sqrt(rows) < 1.0 + 0.02 * (
-            method is methods.averaged_normals
-        )
-        assert returned.mean() > 0.5
-
-
-def test_the_seen_area_of_a_closed_surface_is_the_projected_one():
-    """Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle.
-
-    Its table is linear between angles and azimuths; no wall is there to be left out.
-    """
-    fabric = cloth()
-    queries = draw_queries(QueryOptions(sigma=(6.0, 8.0), max_angle=80.0), fabric.weave.repeat, 3, 0, 60)
-    sums, gaps = query_sums(tabulate(fabric, rims=False), queries)
-    assert not gaps.any()
-    assert np.abs(sums[:, :, AREA].sum(axis=1) / queries.wo[:, 2] - 1.0).mean() < 0.01
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def test_few_rays_and_the_table_are_near_the_truth(name):
         assert abs(errors.mean()) < 0.01
 
 
-def test_closed_form_along_half_cylinders():
+def test_closed_form_along_half_cylinders_and_rows_answered_one_by_one():
     """Along the warps: the share of a period whose height exceeds 1/2 - depth, by rays and by the table. The share is
     an interval, whose two ends lie in two of 32 strata."""
     depth = np.array([0.02, 0.1, 0.3, 0.49])
@@ -55,18 +55,12 @@ def test_closed_form_along_half_cylinders():
             if size == 4.0:
                 np.testing.assert_allclose(truth, share, atol=0.005)
             np.testing.assert_allclose(quick_coverage(CORDUROY, asked), truth, atol=allowed)
-
-
-def test_what_needs_no_ray():
     fabric = load_fabric("denim")
     asked = looks(fabric, 40, (0.1, 9.0), (0.01, 1.0))
     assert (quick_coverage(fabric, asked._replace(curvature=np.zeros(40, np.float32))) == 1).all()
     assert (quick_coverage(fabric, asked._replace(wo=asked.wo * np.float32([1, 1, -1]))) == 0).all()
     assert (quick_coverage(fabric, asked._replace(wo=np.tile(np.float32([0.6, 0, 0.8]), (40, 1)))) < 1).sum() == 0
     assert (quick_coverage(fabric, asked._replace(wo=np.tile(np.float32([0, 0, 1]), (40, 1)))) == 1).all()
-
-
-def test_rows_are_answered_one_by_one():
     fabric = load_fabric("silk_charmeuse")
     asked = looks(fabric, 60, (0.05, 20.0), (0.01, 1.0))
     whole = quick_coverage(fabric, asked)

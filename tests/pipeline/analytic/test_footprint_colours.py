@@ -78,18 +78,6 @@ def test_threads_are_those_that_a_grazing_viewer_sees(sigma):
     assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < 0.03
 
 
-def test_the_mean_over_the_cloth_does_not_depend_on_the_footprint():
-    """Masses are integrals: over a lattice of centres, every size of footprint has the mean of the threads."""
-    fabric = coloured("twill_4_4", ends=[["red", 3], ["blue", 1]], picks=[["red", 1], ["blue", 5]])
-    u, v = np.mgrid[0 : fabric.repeat[0] : 0.125, 0 : fabric.repeat[1] : 0.125].reshape(2, -1)
-    wi, wo = np.tile([0.6, 0.0, 0.8], (u.size, 1)), np.tile([0.0, 0.0, 1.0], (u.size, 1))
-    wide = footprint_colours(fabric, Queries.round([0.0], [0.0], [1e3], wi[:1], wo[:1]))
-    for size in (2.0, 7.0, 40.0):
-        found = footprint_colours(fabric, Queries.round(u, v, np.full(u.size, size), wi, wo))
-        assert found.mean(axis=0) == pytest.approx(wide[0], abs=0.01)
-    assert np.ptp(found, axis=0) == pytest.approx(np.zeros((4, 3)), abs=1e-4)
-
-
 @pytest.mark.parametrize("sigma", [0.03, 0.4, 1.5, 3.0])
 def test_stripes_have_the_mass_of_a_gaussian(sigma):
     """Ends of two colours, three and two, in a footprint long along them: each end is seen half, whichever it is."""
@@ -107,7 +95,7 @@ def test_stripes_have_the_mass_of_a_gaussian(sigma):
 
 
 @pytest.mark.parametrize("behind", [slow(False), True])
-def test_a_cloth_turned_by_half_a_turn_has_its_threads_in_reverse(behind):
+def test_a_cloth_turned_has_its_threads_in_reverse_and_ends_and_picks_change_places(behind):
     """The plain weave is its own half turn; ends and picks of two colours are not."""
     fabric = coloured("voile", **STRIPES)
     other = coloured("voile", ends=[["blue", 2], ["red", 3]], picks=[["red", 4], ["blue", 1]])
@@ -117,11 +105,7 @@ def test_a_cloth_turned_by_half_a_turn_has_its_threads_in_reverse(behind):
     own, there = footprint_colours(fabric, asked), footprint_colours(other, turned)
     assert np.ptp(own, axis=0)[[0, 1, 2 - behind, 3 - behind]].max() > 0.1
     assert np.abs(own - there).max() < 0.05 and np.abs(own - there).mean() < 1e-3
-
-
-@pytest.mark.parametrize("behind", [slow(False), True])
-def test_ends_and_picks_change_places(behind):
-    """A mirror in the diagonal of a cloth without symmetries: the transposed draft, yarns and orders exchanged."""
+    # A mirror in the diagonal of a cloth without symmetries: the transposed draft, yarns and orders exchanged.
     own, other = LOPSIDED, redrawn(~OVER.T, swap=True, mirrored=True)
     asked = queries(60, np.random.default_rng(2), 0.4, behind)
     # Seen from straight above, nodes lie on lines along x in both.
@@ -132,7 +116,7 @@ def test_ends_and_picks_change_places(behind):
     assert np.abs(one - there[:, [1, 0, 3, 2]]).max() < 0.05 and np.abs(one - there[:, [1, 0, 3, 2]]).mean() < 1e-3
 
 
-def test_a_move_by_repeats_of_weave_and_colours_changes_nothing():
+def test_neither_a_move_nor_the_footprint_changes_the_mean_and_light_from_behind_is_transmitted():
     """15 ends and 15 picks of a weave of 3: a move by the weave's repeat alone meets other threads."""
     fabric = coloured(LOPSIDED, **STRIPES)
     asked = queries(40, np.random.default_rng(4))
@@ -144,9 +128,15 @@ def test_a_move_by_repeats_of_weave_and_colours_changes_nothing():
     )
     np.testing.assert_allclose(far, own, atol=1e-4)
     assert np.abs(near - own).max() > 0.1
-
-
-def test_light_from_behind_takes_the_transmission_colours():
+    # Masses are integrals: over a lattice of centres, every size of footprint has the mean of the threads.
+    fabric = coloured("twill_4_4", ends=[["red", 3], ["blue", 1]], picks=[["red", 1], ["blue", 5]])
+    u, v = np.mgrid[0 : fabric.repeat[0] : 0.125, 0 : fabric.repeat[1] : 0.125].reshape(2, -1)
+    wi, wo = np.tile([0.6, 0.0, 0.8], (u.size, 1)), np.tile([0.0, 0.0, 1.0], (u.size, 1))
+    wide = footprint_colours(fabric, Queries.round([0.0], [0.0], [1e3], wi[:1], wo[:1]))
+    for size in (2.0, 7.0, 40.0):
+        found = footprint_colours(fabric, Queries.round(u, v, np.full(u.size, size), wi, wo))
+        assert found.mean(axis=0) == pytest.approx(wide[0], abs=0.01)
+    assert np.ptp(found, axis=0) == pytest.approx(np.zeros((4, 3)), abs=1e-4)
     palette = {"red": {"diffuse": [0.1, 0.1, 0.2], "diffuse_transmission": [0.5, 0.3, 0.1]}}
     fabric = coloured("voile", palette=palette, ends=[["red", 1]])
     found = footprint_colours(fabric, queries(2, np.random.default_rng(1), behind=True))

@@ -30,21 +30,27 @@ def test_overlaps_are_shares(radius):
     assert ((middles > edges[:-1]) & (middles < edges[1:])).all()
 
 
-def test_readings_have_the_moments_of_a_gaussian():
-    table = taps(16)
-    assert not table[1].any()
-    for count in range(2, 17):
-        places = table[count, :count]
-        assert places.mean() == pytest.approx(0.0, abs=1e-12) and (places**2).mean() == pytest.approx(1.0)
-
-
-def test_a_rule_of_n_nodes_is_exact_to_degree_2n_minus_1_and_no_further():
+def test_rules_are_exact_to_their_degree_and_readings_converge_to_a_gaussian():
     for count in range(1, 7):
         rule = gauss_rule(0.2, 0.9, count, 0.0)
         errors = [
             rule.weights @ rule.places**p - (0.9 ** (p + 1) - 0.2 ** (p + 1)) / (p + 1) for p in range(2 * count + 1)
         ]
         assert np.abs(errors[:-1]).max() < 1e-14 and abs(errors[-1]) > 1e-12
+    table = taps(16)
+    assert not table[1].any()
+    for count in range(2, 17):
+        places = table[count, :count]
+        assert places.mean() == pytest.approx(0.0, abs=1e-12) and (places**2).mean() == pytest.approx(1.0)
+    # The error of a wave of length 2 pi deviations falls with their number, by order 1 nearly: tails are missing.
+    counts, table = 2 ** np.arange(3, 9), taps(256)
+    errors = {
+        wave: [abs(np.cos(wave * table[n, :n]).mean() - math.exp(-0.5 * wave**2)) for n in counts]
+        for wave in (0.5, 1.0, 2.0)
+    }
+    assert max(own[-1] for own in errors.values()) < 0.01
+    assert -1.5 < np.polyfit(np.log(counts[:-1]), np.log(errors[1.0][:-1]), 1)[0] < -0.7, errors
+    np.testing.assert_allclose(table[:, :1] + [[table[n, n - 1]] for n in range(257)], 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.4])
@@ -65,15 +71,3 @@ def test_a_mirrored_extent_has_the_mirrored_rule(radius):
     for values, mirrored in ((own.places, other.places), (own.borders, other.borders)):
         np.testing.assert_allclose(1.0 - values[::-1], mirrored, atol=1e-14)
     np.testing.assert_allclose(own.weights[::-1], other.weights, atol=1e-14)
-
-
-def test_readings_converge_to_the_gaussian():
-    """The error of a wave of length 2 pi deviations falls with their number, by order 1 nearly: tails are missing."""
-    counts, table = 2 ** np.arange(3, 9), taps(256)
-    errors = {
-        wave: [abs(np.cos(wave * table[n, :n]).mean() - math.exp(-0.5 * wave**2)) for n in counts]
-        for wave in (0.5, 1.0, 2.0)
-    }
-    assert max(own[-1] for own in errors.values()) < 0.01
-    assert -1.5 < np.polyfit(np.log(counts[:-1]), np.log(errors[1.0][:-1]), 1)[0] < -0.7, errors
-    np.testing.assert_allclose(table[:, :1] + [[table[n, n - 1]] for n in range(257)], 0.0, atol=1e-12)

@@ -49,16 +49,13 @@ def test_the_kernel_has_the_mass_mean_and_variance_of_the_gaussian(octave):
     assert variance == pytest.approx(expected, rel=0.01)
 
 
-def test_a_constant_is_read_as_it_is_and_a_coarse_reading_is_the_mean(noise):
+def test_a_constant_is_read_as_it_is_a_coarse_reading_is_the_mean_and_a_narrow_one_bilinear(noise):
     even, maps = levels_of(np.full((TEXELS, TEXELS, 1), 0.7)), levels_of(noise)
     for sigma in (1e-3, 0.06, 0.11, 0.9, 30.0):
         assert read(even, 3.3, -2.9, sigma)[0] == pytest.approx(0.7, rel=1e-6)
     np.testing.assert_allclose(read(maps, 1.0, 2.0, 1e3), noise.mean(axis=(0, 1)), rtol=1e-6)
     np.testing.assert_allclose(read(maps, 1.0, 2.0, 0.2, 2.5), 2.5 * read(maps, 1.0, 2.0, 0.2), rtol=1e-6)
-
-
-def test_a_narrow_reading_is_bilinear(noise):
-    """At centres of texels their values, halfway the means of two and of four."""
+    # At centres of texels their values, halfway the means of two and of four.
     maps, width = levels_of(noise), 8.0 / TEXELS
     expected = {(5.5, 9.5): noise[9, 5], (6.0, 9.5): noise[9, 5:7].mean(axis=0)}
     expected |= {(6.0, 10.0): noise[9:11, 5:7].mean(axis=(0, 1)), (5.5, 0.0): noise[[-1, 0], 5].mean(axis=0)}

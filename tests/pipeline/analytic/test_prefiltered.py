@@ -42,17 +42,14 @@ def maps():
     return tabulate(load_fabric("denim"), PER_YARN)
 
 
-def test_each_level_is_the_mean_of_the_one_before(maps):
+def test_each_level_is_the_mean_of_the_one_before_and_widening_lowers_highlights_alone(maps):
     texels, levels = maps.maps.texels.astype(np.float64), maps.maps.levels
     whole = texels[: levels[0, 1] * levels[0, 2]].mean(axis=0)
     for first, width, height in levels:
         np.testing.assert_allclose(texels[first : first + width * height].mean(axis=0), whole, atol=1e-6)
     shares = texels[-1, [0, CHANNELS]]
     assert shares.sum() == pytest.approx(1.0, abs=1e-6) and shares.min() > 0.1  # denim has no gaps
-
-
-def test_widening_lowers_highlights_and_leaves_the_diffuse_light(maps):
-    """A texel of many tangents has a broader lobe: lower in its middle; diffuse light knows no roughness."""
+    # A texel of many tangents has a broader lobe: lower in its middle; diffuse light knows no roughness.
     middle = Queries.round([0.0], [0.0], [50.0], [above(0.0, 0.3)], [above(0.0, -0.3)])
     none, toksvig, lean = (answer(maps, middle, widening)[0] for widening in (NONE, TOKSVIG, LEAN))
     np.testing.assert_allclose(toksvig[2:], none[2:], rtol=1e-6)

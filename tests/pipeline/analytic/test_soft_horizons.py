@@ -5,7 +5,7 @@ from pipeline.analytic import soft_horizons as soft
 from pipeline.analytic.gauss_rules import overlap
 
 
-def test_boxes_of_whole_cells_have_the_moments_of_these():
+def test_boxes_have_the_moments_of_their_cells_and_a_ramp_is_the_share_of_a_spread_horizon():
     grid = np.random.default_rng(1).random((3, 6, 8))
     rows = overlap(np.array([0.0, 0.5, 1.0]), np.linspace(0, 1, 7))
     columns = overlap(np.array([0.0, 0.25, 1.0]), np.linspace(0, 1, 9))
@@ -13,6 +13,12 @@ def test_boxes_of_whole_cells_have_the_moments_of_these():
     boxes = [part.reshape(3, -1) for half in (grid[:, :3], grid[:, 3:]) for part in (half[..., :2], half[..., 2:])]
     np.testing.assert_allclose(mean, np.stack([box.mean(axis=1) for box in boxes], axis=1), rtol=1e-12)
     np.testing.assert_allclose(variance, np.stack([box.var(axis=1) for box in boxes], axis=1), rtol=1e-9)
+    # Horizons even between 0.3 and 0.5, of which a direction clears those beneath it.
+    horizons = 0.3 + 0.2 * (np.arange(1000) + 0.5) / 1000
+    sharpness = np.float32(1.0 / (np.sqrt(12.0) * horizons.std()))
+    for rise in np.float32([0.2, 0.32, 0.4, 0.49, 0.6]):
+        found = soft.ramp(soft.above(rise, np.float32(0.3), np.float32(0.5), np.float32(0.5), sharpness))
+        assert found == pytest.approx((horizons < rise).mean(), abs=2e-3)
 
 
 @pytest.mark.parametrize(("turn", "expected"), [(0.0, "less"), (90.0, "product"), (180.0, "both leave")])
@@ -28,16 +34,7 @@ def test_what_hides_one_hides_or_shows_the_other(turn, expected):
     assert soft.seen_and_lit(first, second, *ways) == pytest.approx((free & chosen[expected]).mean(), abs=1e-3)
 
 
-def test_a_ramp_is_the_share_of_a_spread_horizon():
-    """Horizons even between 0.3 and 0.5, of which a direction clears those beneath it."""
-    horizons = 0.3 + 0.2 * (np.arange(1000) + 0.5) / 1000
-    sharpness = np.float32(1.0 / (np.sqrt(12.0) * horizons.std()))
-    for rise in np.float32([0.2, 0.32, 0.4, 0.49, 0.6]):
-        found = soft.ramp(soft.above(rise, np.float32(0.3), np.float32(0.5), np.float32(0.5), sharpness))
-        assert found == pytest.approx((horizons < rise).mean(), abs=2e-3)
-
-
-def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction():
+def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction_and_a_quarter_turn_is_exact():
     """Linear interpolation of a second derivative of 1 errs by at most h^2 / 8, twice, with h up to 0.25."""
     even = np.sin(2.0 * np.pi * np.arange(2 * soft.AZIMUTHS) / (2 * soft.AZIMUTHS) + 0.3)[:, None]
     table = soft.from_even(even)[:, 0]
@@ -45,10 +42,7 @@ def test_a_smooth_function_of_the_azimuth_is_found_around_any_direction():
         low, high, turn = soft.around(np.float32(0.7 * np.cos(angle)), np.float32(0.7 * np.sin(angle)))
         assert 0 <= low < soft.AZIMUTHS and high == (low + 1) % soft.AZIMUTHS and 0.0 <= turn <= 1.0
         assert abs((1.0 - turn) * table[low] + turn * table[high] - np.sin(angle + 0.3)) < 0.015
-
-
-def test_a_quarter_turn_is_a_quarter_of_the_azimuths_and_no_azimuth_is_one_too():
-    """The diamond angle runs clockwise."""
+    # The diamond angle runs clockwise.
     for x, y in np.random.default_rng(1).normal(size=(50, 2)).astype(np.float32):
         own, turned = soft.around(x, y), soft.around(y, -x)
         quarters = [(after - before) % soft.AZIMUTHS * 4 for before, after in zip(own[:2], turned[:2], strict=True)]
@@ -57,7 +51,7 @@ def test_a_quarter_turn_is_a_quarter_of_the_azimuths_and_no_azimuth_is_one_too()
     assert 0 <= low < soft.AZIMUTHS and 0.0 <= turn <= 1.0
 
 
-def test_azimuths_even_in_the_angle_are_read_to_second_order():
+def test_azimuths_are_read_to_second_order_and_what_two_see_together_lies_between_the_bounds():
     """Linear interpolation: the error falls by four with twice the azimuths."""
     t = np.arange(soft.AZIMUTHS) * 4.0 / soft.AZIMUTHS
     y = np.where(t <= 2.0, 1.0 - t, t - 3.0)
@@ -67,10 +61,7 @@ def test_azimuths_even_in_the_angle_are_read_to_second_order():
         even = np.sin(2.0 * np.pi * np.arange(count) / count + 0.3)[:, None]
         errors.append(np.abs(soft.from_even(even)[:, 0] - np.sin(angle + 0.3)).max())
     assert -2.2 < np.polyfit(np.log(counts), np.log(errors), 1)[0] < -1.7, errors
-
-
-def test_what_two_directions_see_together_is_between_the_least_and_the_most_that_is_possible():
-    """Frechet's bounds; it is symmetric, and all of what one sees if the other sees everything."""
+    # Frechet's bounds; it is symmetric, and all of what one sees if the other sees everything.
     random = np.random.default_rng(7)
     for first, second, *xy in random.random((200, 6)).astype(np.float32):
         ways = soft.azimuths_apart(*(np.float32(2.0 * w - 1.0) for w in xy))
@@ -83,7 +74,7 @@ def test_what_two_directions_see_together_is_between_the_least_and_the_most_that
         )
 
 
-def test_a_fall_of_the_largest_share_is_a_line_in_the_curvature():
+def test_a_fall_of_the_largest_share_is_a_line_in_the_curvature_also_between_two_azimuths():
     """With shares of 1 the sine falls by FALL times the curvature, between tabulated curvatures too."""
     for curvature in (0.0, 0.01, 0.05, 0.1, 0.25, 0.7, 1.0):
         bend = soft.bend_of(np.float32(curvature))
@@ -93,10 +84,7 @@ def test_a_fall_of_the_largest_share_is_a_line_in_the_curvature():
             assert max(bend.of_low, bend.of_high) == pytest.approx(soft.FALL * curvature, rel=1e-6)
             own = bend.high if bend.of_high > 0 else bend.low
             assert soft.CURVATURES[own] == curvature
-
-
-def test_horizons_over_curved_cloth_fall_from_those_between_two_azimuths():
-    """By the tabulated falls times their factors; without curvature they do not."""
+    # By the tabulated falls times their factors; without curvature they do not.
     random, turn = np.random.default_rng(2), np.float32(0.3)
     mean, falls = (np.float32(random.random(shape)) for shape in ((2, 1, 16), (len(soft.CURVATURES), 2, 1, 16)))
     for curvature in (0.0, 0.03, 0.4):

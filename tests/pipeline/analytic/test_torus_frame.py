@@ -22,19 +22,12 @@ def test_frames_are_those_of_the_height_field(field, kind, rtol):
     picks, ends = np.nonzero(field.top == heights.WARP)
     for pick, end in zip(picks[:4], ends[:4], strict=True):
         own, yarn = field.floats[pick, end, heights.TOP], field.yarn[heights.WARP]
+        radius, ring = yarn[heights.RADIUS], own[heights.BEND_RADIUS]
         for across, along in random.uniform(-0.45, 0.45, (20, 2)):
-            x, y = end + 0.5 + across * 2 * yarn[heights.RADIUS], pick + 0.5 + along
+            x, y = end + 0.5 + across * 2 * radius, pick + 0.5 + along
             _, _, _, *expected = heights.surface_at(field, x, y, end, pick)
-            sin_v = (x - end - 0.5) / yarn[heights.RADIUS]
-            limit = own[heights.HALF_LENGTH] / own[heights.BEND_RADIUS]
-            numbers = (
-                sin_v,
-                math.sqrt(1 - sin_v**2),
-                yarn[heights.RADIUS],
-                along + own[heights.OFFSET],
-                1 / own[heights.BEND_RADIUS],
-                limit,
-            )
+            sin_v, limit = (x - end - 0.5) / radius, own[heights.HALF_LENGTH] / ring
+            numbers = (sin_v, math.sqrt(1 - sin_v**2), radius, along + own[heights.OFFSET], 1 / ring, limit)
             angles, _ = bend(*(kind(number) for number in numbers))
             fibre = Fibre(*(kind(yarn[column]) for column in (heights.SIN_TWIST, heights.COS_TWIST, heights.BETA)))
             angles = Angles(*(kind(number) for number in angles))
@@ -43,7 +36,7 @@ def test_frames_are_those_of_the_height_field(field, kind, rtol):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_turning_is_a_derivative(seed):
+def test_turning_and_frames_are_derivatives_of_the_surface(seed):
     """Central differences with a step of 1e-5: their error is 1e-10."""
     v, u, twist, beta, *h = np.random.default_rng(seed).uniform(-0.9, 0.9, 7).tolist()
     fibre = Fibre(math.sin(twist), math.cos(twist), 1.0 + 0.3 * beta)
@@ -56,11 +49,7 @@ def test_turning_is_a_derivative(seed):
     pairs = (((u + STEP, v), (u - STEP, v)), ((u, v + STEP), (u, v - STEP)))
     expected = [(along(*after)[0] - along(*before)[0]) / (2 * STEP) for after, before in pairs]
     np.testing.assert_allclose(along(u, v)[1], expected, atol=1e-8)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_frames_are_those_of_the_surface_by_differentiation(seed):
-    """Points of a torus of R = 2.1, r = .4 stretched by beta; fibres wind about the yarn at the angle of the twist."""
+    # Points of a torus of R = 2.1, r = .4 stretched by beta; fibres wind about the yarn at the angle of the twist.
     v, u, twist, relief = np.random.default_rng(seed).uniform(-0.9, 0.9, 4).tolist()
     radius, bend_radius, beta, step = 0.4, 2.1, 1.0 + 0.5 * relief, STEP
 

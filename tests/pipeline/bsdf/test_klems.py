@@ -15,6 +15,7 @@ from pipeline.scenes.shade import shade
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.refusals import refusal
 from weaves.colour import LUMINANCE
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -102,8 +103,7 @@ def test_a_fabric_is_reciprocal_and_lets_light_through_its_gaps(voile):
     gap = np.prod([1.0 - yarn.width for yarn in (load_fabric("voile").warp, load_fabric("voile").weft)])
     assert voile.direct[0] > 0.7 * gap and (voile.direct >= 0.0).all()
     assert voile.scattering.direct("visible")[0, 0] >= voile.direct[0]
-    with pytest.raises(BadInput, match="in other colours"):
-        fabric_bsdf(load_fabric("voile"), load_fabric("denim"))
+    assert "in other colours" in refusal(fabric_bsdf, load_fabric("voile"), load_fabric("denim"))
 
 
 @pytest.mark.external
@@ -113,13 +113,10 @@ def test_radiance_and_pywincalc_read_the_same_numbers(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     layer = fabric_bsdf(load_fabric("cotton_twill"), points=1).scattering
     write_klems(Path("layer.xml"), layer, FACTS)
-    system = pywincalc.GlazingSystem(
-        solid_layers=[pywincalc.parse_bsdf_xml_file("layer.xml")],
-        width_meters=1,
-        height_meters=1,
-        environment=pywincalc.nfrc_shgc_environments(),
-        bsdf_hemisphere=pywincalc.BSDFHemisphere.create(pywincalc.BSDFBasisType.KLEMS_FULL),
-    )
+    hemisphere = pywincalc.BSDFHemisphere.create(pywincalc.BSDFBasisType.KLEMS_FULL)
+    about = {"environment": pywincalc.nfrc_shgc_environments(), "bsdf_hemisphere": hemisphere}
+    layers = [pywincalc.parse_bsdf_xml_file("layer.xml")]
+    system = pywincalc.GlazingSystem(solid_layers=layers, width_meters=1, height_meters=1, **about)
     front = system.optical_method_results("PHOTOPIC").system_results.front
     shares = front.reflectance.direct_hemispherical, front.transmittance.direct_hemispherical
     assert shares == pytest.approx(layer.hemispherical("visible")[:, 0, 0], rel=1e-4)
@@ -127,9 +124,9 @@ def test_radiance_and_pywincalc_read_the_same_numbers(tmp_path, monkeypatch):
     home = Path(radiance.__file__).parent
     environment = os.environ | {"RAYPATH": f".:{home / 'lib'}"}
 
-    def program(name, *arguments, **options):
+    def program(name, *arguments, text=True, **options):
         command = [str(home / "bin" / name), *arguments]
-        return subprocess.run(command, env=environment, check=True, capture_output=True, text=True, **options).stdout
+        return subprocess.run(command, env=environment, check=True, capture_output=True, text=text, **options).stdout
 
     errors = [line.split()[-1] for line in program("checkBSDF", "layer.xml").splitlines()[-3:]]
     assert [float(error) for error in errors] == [0.0, 0.0, 0.0]
@@ -146,11 +143,7 @@ def test_radiance_and_pywincalc_read_the_same_numbers(tmp_path, monkeypatch):
             f"void light l 0 0 3 1e6 1e6 1e6\nl source s 0 0 4 {x} {y} {z} .05\nvoid BSDF m 6 0 layer.xml 0 1 0 . 0 0\n"
             "m polygon p 0 0 12 -1 -1 0 1 -1 0 1 1 0 -1 1 0\n"
         )
-        Path("scene.oct").write_bytes(
-            subprocess.run(
-                [str(home / "bin" / "oconv"), "scene.rad"], env=environment, check=True, capture_output=True
-            ).stdout
-        )
+        Path("scene.oct").write_bytes(program("oconv", "scene.rad", text=False))
         ray = " ".join(f"{number:.9g}" for number in (*(5.0 * eye), *-eye))
         radiance_seen = float(program("rtrace", "-h", "-w", "-ab", "0", "scene.oct", input=ray).split()[1])
         irradiance = 1e6 * 2.0 * np.pi * (1.0 - np.cos(np.radians(0.025))) * abs(z)

@@ -97,17 +97,14 @@ def test_a_sheet_that_contradicts_itself_is_refused_in_one_sentence(sheet, text,
         fit_sheet(read_sheet(sheet(text)), "screen")
 
 
-def test_second_bands_are_predicted_where_sheets_state_them():
+def test_second_bands_are_predicted_where_sheets_state_them_and_white_yarns_scatter_like_white_yarns():
     """Products whose two bands are stated: the interval has the stated transmittance, the value is within .02."""
     rows = [row for row in predicted_transmittances(SCREENS) if np.isfinite(row.stated)]
     assert len(rows) == 3
     for row in rows:
         assert row.predicted.low <= row.stated <= row.predicted.high
         assert "Verosol" in row.product or abs(row.predicted.value - row.stated) < 0.02
-
-
-def test_white_yarns_scatter_like_white_yarns():
-    """NET 5 % white by the yarns of NET 1 % white: more than NET 1 % white by about the gaps, and no light is made."""
+    # NET 5 % white by the yarns of NET 1 % white: more than NET 1 % white by about the gaps, and no light is made.
     white = read_sheet(SCREENS, "Alkenz 3000 NET 1 % white")
     sheet, remarks = completed(read_sheet(SCREENS, "Alkenz 3000 NET 5 % white"), white)
     assert len(remarks) == 2

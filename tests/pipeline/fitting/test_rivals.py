@@ -13,16 +13,13 @@ def test_at_normal_incidence_the_openness_passes_and_at_ninety_degrees_nothing(f
     assert formula(0.04, np.array([0.0, 90.0]), np.zeros(2)) == pytest.approx([0.04, 0.0], abs=1e-12)
 
 
-def test_cut_off_angles():
+def test_cut_off_angles_and_errors_on_the_measured_shade():
     """Threads of diameter over spacing 0.8 close at acos(0.8); roller blinds at 90 - 25 cos(90 openness) degrees."""
     angle = np.degrees(np.arccos(0.8))
     assert woven_shade(0.04, np.array([angle - 0.1, angle + 0.1]), np.zeros(2)) == pytest.approx([3e-4, 0.0], abs=3e-4)
     assert roller_blind(1e-6, np.array([64.9, 65.1]), np.zeros(2))[1] == 0.0
     assert roller_blind(1e-6, np.array([64.9]), np.zeros(1))[0] > 0.0
-
-
-def test_errors_on_the_measured_shade():
-    """Cosine .54, EnergyPlus roller blind .36, woven shade .98, best model without axes .247: to a tenth of each."""
+    # Cosine .54, EnergyPlus roller blind .36, woven shade .98, best model without axes .247: to a tenth of each.
     scattering = read_bsdf(SHADE)
     errors = rivals(scattering, "visible", scattering.basis.ring > 0)
     stated = dict(zip([*RIVALS, "means over azimuths, of these very data"], (0.54, 0.36, 0.98, 0.247), strict=True))

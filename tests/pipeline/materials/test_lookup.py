@@ -38,7 +38,7 @@ def maps_of(pattern, sheen=SHEEN):
     return tabulate(level, MATERIAL, shown, sheen, SPECULAR, LEVEL_GROUND), normal, fibre
 
 
-def test_one_material_is_the_sum_of_its_lobes():
+def test_one_material_is_the_sum_of_its_lobes_and_white_f0_returns_the_reflectance_of_the_truth():
     maps, normal, fibre = maps_of(np.full((8, 8), 0.75))
     frame = np.stack([fibre, np.cross(normal, fibre), normal])
     wi, wo = even_sky(64), np.array([0.3, -0.2, 0.9])
@@ -59,13 +59,20 @@ def test_one_material_is_the_sum_of_its_lobes():
     specular = (under * lobe[:, None] * f0 / f0.sum() + sheen[:, :2]) / SPECULAR
     base = under * ((1 - fresnel) * cosine)[:, None] * (0.3, 0.2) / math.pi + sheen[:, 2:]
     np.testing.assert_allclose(found, 0.75 * np.concatenate([specular, base], axis=1), rtol=2e-3)
-
-
-def test_light_from_behind_passes_by_the_transmitted_colour():
     maps, normal, _ = maps_of(np.ones((8, 8)), np.zeros(4))
     wi = np.array([[0.0, 0.6, -0.8]])
     found = answer(maps, Queries.round(*np.zeros((2, 1)), np.ones(1), wi, np.array([[0.0, 0.0, 1.0]])))
     np.testing.assert_allclose(found, [np.array([0, 0, 0.1, 0.05]) / math.pi * -(wi[0] @ normal)], rtol=1e-5)
+    fabric = load_fabric("denim")
+    share, up = reflectance(fabric), np.array([0.0, 0.0, 1.0])
+    # Another rule than that of the code: a grid of square and turn.
+    square, turn = np.stack(np.meshgrid(*[(np.arange(96) + 0.5) / 96] * 2), -1).reshape(-1, 2).T
+    z, turn = np.sqrt(square), 2 * math.pi * turn
+    wi = np.stack([np.sqrt(1 - square) * np.cos(turn), np.sqrt(1 - square) * np.sin(turn), z], -1)
+    for family, yarn in enumerate((fabric.warp, fabric.weft)):
+        f0 = np.full(3, white_f0(fabric, share)[family])
+        lobe = math.pi * ggx(wi, up, yarn.roughness, 1.0, f0)[:, 0].mean()
+        assert lobe * share.coverage[family] == pytest.approx(share.specular[family], rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -81,16 +88,3 @@ def test_footprints_average_as_a_gaussian(major, minor, angle):
     high, low = answer(maps, queries)[:, 2]
     along = math.hypot(major * math.cos(angle), minor * math.sin(angle))
     assert (high - low) / (high + low) == pytest.approx(0.8 * math.exp(-2 * math.pi**2 * along**2 / 16), rel=0.02)
-
-
-def test_white_f0_returns_the_specular_reflectance_of_the_truth():
-    fabric = load_fabric("denim")
-    share, up = reflectance(fabric), np.array([0.0, 0.0, 1.0])
-    # Another rule than that of the code: a grid of square and turn.
-    square, turn = np.stack(np.meshgrid(*[(np.arange(96) + 0.5) / 96] * 2), -1).reshape(-1, 2).T
-    z, turn = np.sqrt(square), 2 * math.pi * turn
-    wi = np.stack([np.sqrt(1 - square) * np.cos(turn), np.sqrt(1 - square) * np.sin(turn), z], -1)
-    for family, yarn in enumerate((fabric.warp, fabric.weft)):
-        f0 = np.full(3, white_f0(fabric, share)[family])
-        lobe = math.pi * ggx(wi, up, yarn.roughness, 1.0, f0)[:, 0].mean()
-        assert lobe * share.coverage[family] == pytest.approx(share.specular[family], rel=0.02)

@@ -44,14 +44,17 @@ def test_the_mean_base_colour_is_the_diffuse_albedo_of_the_truth(name, side):
     np.testing.assert_allclose(found, diffuse_albedo(fabric, side), rtol=0.03)
 
 
-def test_the_mean_transmitted_colour_is_what_the_truth_lets_through():
+def test_the_mean_transmitted_colour_the_fibres_direction_and_roughness_are_those_of_the_truth():
     fabric = load_fabric("gauze")
     maps = maps_of(fabric, 256)
     through = (maps.transmission_color * maps.opacity[..., None]).mean(axis=(0, 1))
     np.testing.assert_allclose(through, diffuse_albedo(fabric, 16, sky=-1.0), rtol=0.03)
-
-
-def test_on_one_fibre_the_roughness_is_that_of_the_fibre():
+    maps = maps_of(load_fabric("denim"), 64)
+    flat = across_direction(maps.normal, maps.tangent)
+    laid = np.concatenate([flat, np.zeros_like(flat[..., :1])], axis=-1)
+    laid -= maps.normal * (laid * maps.normal).sum(axis=-1, keepdims=True)
+    laid /= np.linalg.norm(laid, axis=-1, keepdims=True)
+    assert np.abs((laid * maps.tangent).sum(axis=-1)).max() < 1e-3
     fabric = load_fabric("silk_charmeuse")
     maps = maps_of(fabric, 512)
     alphas = np.float32([fabric.warp.roughness, fabric.weft.roughness])
@@ -97,16 +100,7 @@ def test_roughness_of_mip_levels_holds_the_variance_below_a_texel(name, size, ha
             assert square_area(other) >= 0.97 * square_area(along)
 
 
-def test_the_direction_across_the_fibres_is_found_again_in_the_surface():
-    maps = maps_of(load_fabric("denim"), 64)
-    flat = across_direction(maps.normal, maps.tangent)
-    laid = np.concatenate([flat, np.zeros_like(flat[..., :1])], axis=-1)
-    laid -= maps.normal * (laid * maps.normal).sum(axis=-1, keepdims=True)
-    laid /= np.linalg.norm(laid, axis=-1, keepdims=True)
-    assert np.abs((laid * maps.tangent).sum(axis=-1)).max() < 1e-3
-
-
-def test_roughness_of_openpbr_and_gltf_give_both_alphas_back():
+def test_openpbr_and_gltf_give_both_alphas_the_specular_colour_and_the_index_of_refraction_back():
     along, across = np.float32([0.1, 0.5, 0.7]), np.float32([1.0, 0.9, 0.7])
     r, a = openpbr_roughness(along, across)
     rough = r**2 * np.sqrt(2.0 / (1.0 + (1.0 - a) ** 2))
@@ -114,9 +108,6 @@ def test_roughness_of_openpbr_and_gltf_give_both_alphas_back():
     np.testing.assert_allclose((1.0 - a) * rough, along, rtol=1e-5)
     s = gltf_strength(along, across)
     np.testing.assert_allclose(along + (1.0 - along) * s**2, across, rtol=1e-5)
-
-
-def test_the_specular_colour_and_index_of_refraction_are_the_f0_of_the_yarns():
     fabric = load_fabric("satin_8")
     share, maps = reflectance(fabric), maps_of(fabric, 256)
     material = constants(fabric, share)

@@ -51,7 +51,7 @@ def test_filter_and_footprint_together_are_one_pixel(scalar, rfilter, samples):
     assert found == pytest.approx(wanted, rel=1e-3)
 
 
-def test_first_footprints_are_those_of_the_gbuffer(scalar):
+def test_first_footprints_are_those_of_the_gbuffer_and_hidden_lights_are_hidden(scalar):
     """Rays through the middles of pixels of the scene `drape`; both know places in single precision."""
     import drjit as dr
 
@@ -67,9 +67,14 @@ def test_first_footprints_are_those_of_the_gbuffer(scalar):
         found = Footprints.of(jacobian(si) * 80.0)
         wanted = (gbuffer.sigma[index], gbuffer.sigma_minor[index])
         np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=2e-2)
+    scene = scalar.load_dict({"type": "scene", "sky": {"type": "constant"}, "sensor": sensor(scalar, 2)})
+    shown, hidden = (
+        np.asarray(scalar.render(scene, integrator=path(scalar, hide_emitters=hide), spp=1)) for hide in (False, True)
+    )
+    assert (shown[..., :3] == 1.0).all() and (hidden[..., :3] == 0.0).all()
 
 
-def test_a_bounce_widens_the_footprint(scalar):
+def test_a_bounce_widens_the_footprint_and_a_rare_direction_no_more_than_an_even_one(scalar):
     """A ray straight down four units to a floor and up again two units to a ceiling of side 2, u from 0 to 1. Its cone
     is PIXEL * .01 wide for every unit of way; the bounce, of density 3, adds 2 / sqrt(4 pi 3)."""
     import drjit as dr
@@ -94,9 +99,6 @@ def test_a_bounce_widens_the_footprint(scalar):
         wanted = math.hypot(PIXEL * 0.06, widened) / 2.0
         found = Footprints.of(jacobian(met))
         np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=1e-3)
-
-
-def test_a_rare_direction_widens_no_more_than_an_even_one(scalar):
     import drjit as dr
 
     cone = _Cone(scalar, dr)
@@ -122,14 +124,6 @@ def test_light_transport_is_that_of_mitsubas_path_tracer(mi):
         errors.append(np.std(found, ddof=1) / math.sqrt(8))
     assert abs(means[0] - means[1]) < 4.8 * math.hypot(*errors)  # t of 7 degrees of freedom at .1 %, two-sided
     assert errors[0] < 0.1 * means[0]
-
-
-def test_hidden_lights_are_hidden(scalar):
-    scene = scalar.load_dict({"type": "scene", "sky": {"type": "constant"}, "sensor": sensor(scalar, 2)})
-    shown, hidden = (
-        np.asarray(scalar.render(scene, integrator=path(scalar, hide_emitters=hide), spp=1)) for hide in (False, True)
-    )
-    assert (shown[..., :3] == 1.0).all() and (hidden[..., :3] == 0.0).all()
 
 
 @NEEDS_LLVM

@@ -14,7 +14,7 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-def test_the_viewer_is_mitsubas_wi():
+def test_the_viewer_is_mitsubas_wi_and_a_turned_cloth_is_the_cloth_seen_from_elsewhere():
     """Cotton twill, whose twisted yarns tell light from viewer: swapped, the answer is another one."""
     viewer, light = unit(20.0, 15.0), unit(65.0, 130.0)
     cloth, bsdf = worn_of("cotton_twill"), PatchBSDF(load_fabric("cotton_twill"))
@@ -24,13 +24,7 @@ def test_the_viewer_is_mitsubas_wi():
     )
     np.testing.assert_allclose(value, right, rtol=1e-5)
     assert np.abs(right / swapped - 1.0).min() > 0.2
-
-
-VIEWER, LIGHT = unit(30.0, 40.0), unit(50.0, 200.0)[None]
-
-
-def test_a_turned_cloth_is_the_cloth_seen_from_elsewhere_and_left_handed_uv_count_v_backwards():
-    """Turned by 90 degrees, u runs along the warp's opposite: (u, v) is (v, -u) in yarns, and so are directions."""
+    # Turned by 90 degrees, u runs along the warp's opposite: (u, v) is (v, -u) in yarns, and so are directions.
     turned = worn_of("denim", turn=90.0).eval(hits_of(VIEWER), LIGHT)
     around = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1.0]])
     plain = worn_of("denim").eval(hits_of(around @ VIEWER, 1, uv=(0.0057, -0.0062)), LIGHT @ around.T)
@@ -39,7 +33,10 @@ def test_a_turned_cloth_is_the_cloth_seen_from_elsewhere_and_left_handed_uv_coun
     np.testing.assert_allclose(left, worn_of("denim").eval(hits_of(VIEWER), LIGHT), rtol=1e-6)
 
 
-def test_derivatives_are_in_yarns_of_both_sides_and_a_pixels_angle_stands_for_them():
+VIEWER, LIGHT = unit(30.0, 40.0), unit(50.0, 200.0)[None]
+
+
+def test_derivatives_are_in_yarns_and_axes_their_singular_vectors():
     """100 and 50 yarns: a pixel of .004 by .004 in uv is an ellipse of deviations .2 and .1, along the weft. .5 of .002
     radians, 3 units of u to the radian, 100 yarns a unit: .3 yarns."""
     jacobian = np.array([[[0.004, 0.0], [0.0, 0.004]]])
@@ -51,6 +48,22 @@ def test_derivatives_are_in_yarns_of_both_sides_and_a_pixels_angle_stands_for_th
     np.testing.assert_allclose(value, worn_of("denim").eval(hits_of(VIEWER), LIGHT), rtol=1e-6)
     with pytest.raises(BadInput, match="use the integrator twillight_path, or state pixel_angle or sigma"):
         Worn(ClothOptions(fabric="denim")).eval(hits_of(VIEWER), LIGHT)
+    jacobian = np.random.default_rng(0).standard_normal((500, 2, 2))
+    found = Footprints.of(jacobian)
+    vectors, sizes, _ = np.linalg.svd(jacobian)
+    np.testing.assert_allclose(found.sigma, PIXEL * sizes[:, 0], rtol=1e-5)
+    np.testing.assert_allclose(found.sigma_minor, PIXEL * sizes[:, 1], rtol=1e-4, atol=2e-6)
+    axis = np.stack([np.cos(found.angle), np.sin(found.angle)], axis=-1)
+    np.testing.assert_allclose(np.abs(np.einsum("ni,ni->n", axis, vectors[:, :, 0])), 1.0, atol=1e-5)
+    # A ratio of 1e6 between the axes, turned by .3: a difference of squares would lose the narrow one.
+    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    found = Footprints.of((turn @ np.diag([10.0, 1e-5]))[None])
+    np.testing.assert_allclose([found.sigma[0], found.sigma_minor[0], found.angle[0]], [5.0, 5e-6, 0.3], rtol=1e-5)
+    for lost in (np.nan, np.inf, 1e30):
+        assert Footprints.of(np.array([[[lost, 0.0], [0.0, 1.0]]])).sigma[0] == LARGEST_FOOTPRINT
+    found = Footprints.round(np.array([0.5, 1e9, 0.0]))
+    np.testing.assert_array_equal(found.sigma, found.sigma_minor)
+    assert found.sigma[0] == 0.5 and found.sigma[1] == LARGEST_FOOTPRINT and found.sigma[2] > 0.0
 
 
 def test_no_light_leaks_through_an_interpolated_normal():
@@ -88,28 +101,6 @@ def test_points_are_drawn_anew_for_each_direction():
     one, other = (cloth.eval(hits, light)[:, 1] for light in (first, second))
     assert abs(np.corrcoef(one, other)[0, 1]) < stats.norm.isf(0.005) / math.sqrt(400)
     np.testing.assert_array_equal(one, cloth.eval(hits, first)[:, 1])
-
-
-def test_axes_are_singular_vectors_and_deviations_singular_values():
-    jacobian = np.random.default_rng(0).standard_normal((500, 2, 2))
-    found = Footprints.of(jacobian)
-    vectors, sizes, _ = np.linalg.svd(jacobian)
-    np.testing.assert_allclose(found.sigma, PIXEL * sizes[:, 0], rtol=1e-5)
-    np.testing.assert_allclose(found.sigma_minor, PIXEL * sizes[:, 1], rtol=1e-4, atol=2e-6)
-    axis = np.stack([np.cos(found.angle), np.sin(found.angle)], axis=-1)
-    np.testing.assert_allclose(np.abs(np.einsum("ni,ni->n", axis, vectors[:, :, 0])), 1.0, atol=1e-5)
-    # A ratio of 1e6 between the axes, turned by .3: a difference of squares would lose the narrow one.
-    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
-    found = Footprints.of((turn @ np.diag([10.0, 1e-5]))[None])
-    np.testing.assert_allclose([found.sigma[0], found.sigma_minor[0], found.angle[0]], [5.0, 5e-6, 0.3], rtol=1e-5)
-
-
-def test_a_footprint_without_derivatives_is_the_largest():
-    for lost in (np.nan, np.inf, 1e30):
-        assert Footprints.of(np.array([[[lost, 0.0], [0.0, 1.0]]])).sigma[0] == LARGEST_FOOTPRINT
-    found = Footprints.round(np.array([0.5, 1e9, 0.0]))
-    np.testing.assert_array_equal(found.sigma, found.sigma_minor)
-    assert found.sigma[0] == 0.5 and found.sigma[1] == LARGEST_FOOTPRINT and found.sigma[2] > 0.0
 
 
 def at_a_rim(count=1, azimuth=0.0):

@@ -32,7 +32,6 @@ def untrained(options, *fabrics):
 
 
 def card_of(fabric, domain=None):
-    """Return the card of a network of one fabric, as far as it is read again."""
     about = {"name": fabric.name, "optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)}
     return {"fabrics": [about]} | ({} if domain is None else {"domain": domain.model_dump(mode="json")})
 

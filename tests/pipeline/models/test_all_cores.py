@@ -53,12 +53,9 @@ def test_no_bit_depends_on_the_number_of_threads(name):
         np.testing.assert_allclose(one, whole, rtol=1e-4, atol=1e-6)
 
 
-def test_two_runs_are_answered_at_a_time():
+def test_two_runs_are_answered_at_a_time_with_seeds_of_their_own():
     """Two runs after the first wait for one another: one thread alone would wait for ever."""
     AllCores(Fake(together=2), threads=2).predict(DENIM, queries(3 * CHUNK_ROWS))
-
-
-def test_runs_have_seeds_of_their_own_and_few_queries_have_the_callers():
     drawn = AllCores(Fake(), threads=2).predict(DENIM, queries(), seed=0)[:, 0]
     assert (drawn[:CHUNK_ROWS] == 0).all() and len(set(drawn[::CHUNK_ROWS].tolist())) == 4
     np.testing.assert_array_equal(drawn[CHUNK_ROWS:-17:CHUNK_ROWS], drawn[2 * CHUNK_ROWS - 1 :: CHUNK_ROWS])

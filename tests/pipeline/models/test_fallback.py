@@ -56,8 +56,41 @@ def test_a_method_is_asked_in_the_nearest_form_that_it_knows():
         np.testing.assert_array_equal(known, expected)
 
 
-def test_coverage_is_the_methods_own_up_to_its_curvature_and_that_of_a_few_rays_else():
-    """The method says .5 of curved cloth; flat cloth is covered, and nothing below the tangent plane."""
+def test_what_no_form_stands_for_and_a_kind_that_was_not_taught_are_the_fallbacks():
+    fabric, queries = load_fabric("voile"), mixed()
+    fallback = Fallback(FakeMethod(), ())
+    strange = fallback.out_of_domain(fabric, queries)
+    np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
+    found = fallback.predict(fabric, queries)
+    assert (found[~strange] == 1.0).all()
+    reference = estimate(fabric, queries.take(strange), fixed(8192), 1).mean
+    # Asked for 10 % of each answer's length, and an absolute error where it is dark.
+    wrong, size = (np.linalg.norm(part, axis=1) for part in (found[strange] - reference, reference))
+    assert np.median(wrong / size) < 0.1 and wrong.sum() < 0.1 * size.sum()
+    # A recipe narrowed to a scene without light from behind teaches none, though the model could learn it.
+    fallback = fallback_of(fabric, {}, {"behind", "stretch", "curvature"})
+    assert fallback.out_of_domain(fabric, queries)[queries.behind].all()
+    fallback.predict(fabric, queries)
+    (asked,) = fallback.method.asked
+    assert not asked.curvature.any() and not asked.behind.any()
+    np.testing.assert_array_equal(asked.sigma, asked.sigma_minor)
+
+
+def test_viewers_too_low_are_tilted_up_and_coverage_is_the_methods_own_up_to_its_curvature():
+    """On either side of the cloth, to the same azimuth; others keep their bits."""
+    queries = mixed()
+    low = queries._replace(wo=queries.wo * np.float32([1, 1, 1e-4]))
+    low.wo[:10] = queries.wo[:10]
+    low.wo[:] /= np.linalg.norm(low.wo, axis=1, keepdims=True)
+    raised = low.raised()
+    np.testing.assert_array_equal(raised.wo[:10], low.wo[:10])
+    assert np.isfinite(fallback_answers(DENIM, low, 3)).all()
+    np.testing.assert_array_equal(fallback_answers(DENIM, low, 3), fallback_answers(DENIM, raised, 3))
+    degrees = np.degrees(np.arccos(np.abs(raised.wo[10:, 2])))
+    np.testing.assert_allclose(degrees, 89.0, atol=1e-3)
+    assert (np.sign(raised.wo) == np.sign(low.wo)).all()
+    np.testing.assert_allclose(raised.wo[10:, 0] * low.wo[10:, 1], raised.wo[10:, 1] * low.wo[10:, 0], atol=1e-6)
+    # The method says .5 of curved cloth; flat cloth is covered, and nothing below the tangent plane.
     fabric = load_fabric("denim")
     queries = draw_queries(QueryOptions(curvature=(0.01, 0.5)), fabric.repeat, 5, 0, 40)
     low = queries._replace(wo=queries.wo * np.float32([1, 1, -1]))
@@ -72,35 +105,6 @@ def test_coverage_is_the_methods_own_up_to_its_curvature_and_that_of_a_few_rays_
     expected = np.where(own, np.float32(0.5), quick_coverage(fabric, queries))
     np.testing.assert_array_equal(fallback.coverage(fabric, queries), expected)
     assert (fallback.coverage(fabric, low) == 0).all() and (fallback.coverage(fabric, flat) == 1).all()
-
-
-def test_what_no_form_stands_for_is_answered_by_the_fallback():
-    fabric, queries = load_fabric("voile"), mixed()
-    fallback = Fallback(FakeMethod(), ())
-    strange = fallback.out_of_domain(fabric, queries)
-    np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
-    found = fallback.predict(fabric, queries)
-    assert (found[~strange] == 1.0).all()
-    reference = estimate(fabric, queries.take(strange), fixed(8192), 1).mean
-    # Asked for 10 % of each answer's length, and an absolute error where it is dark.
-    wrong, size = (np.linalg.norm(part, axis=1) for part in (found[strange] - reference, reference))
-    assert np.median(wrong / size) < 0.1 and wrong.sum() < 0.1 * size.sum()
-
-
-def test_viewers_too_low_for_the_truth_are_tilted_up():
-    """On either side of the cloth, to the same azimuth; others keep their bits."""
-    queries = mixed()
-    low = queries._replace(wo=queries.wo * np.float32([1, 1, 1e-4]))
-    low.wo[:10] = queries.wo[:10]
-    low.wo[:] /= np.linalg.norm(low.wo, axis=1, keepdims=True)
-    raised = low.raised()
-    np.testing.assert_array_equal(raised.wo[:10], low.wo[:10])
-    assert np.isfinite(fallback_answers(DENIM, low, 3)).all()
-    np.testing.assert_array_equal(fallback_answers(DENIM, low, 3), fallback_answers(DENIM, raised, 3))
-    degrees = np.degrees(np.arccos(np.abs(raised.wo[10:, 2])))
-    np.testing.assert_allclose(degrees, 89.0, atol=1e-3)
-    assert (np.sign(raised.wo) == np.sign(low.wo)).all()
-    np.testing.assert_allclose(raised.wo[10:, 0] * low.wo[10:, 1], raised.wo[10:, 1] * low.wo[10:, 0], atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["denim", slow("voile")])
@@ -120,10 +124,21 @@ def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
     assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
 
 
-def test_yarns_unlike_those_trained_on_are_left_to_the_fallback():
+def test_yarns_and_steep_cloth_unlike_those_trained_on_are_left_to_the_fallback():
     fallback, queries = fallback_of(DENIM, {}), draw_queries(QueryOptions(sigma=(0.5, 1.0)), (4, 4), 3, 0, 20)
     assert not fallback.out_of_domain(DENIM, queries).any() and fallback.out_of_domain(ROUGH, queries).all()
     np.testing.assert_array_equal(fallback.predict(ROUGH, queries), fallback_answers(ROUGH, queries, 0))
+    # The scenes' drape bends up to 1 a yarn; `curved` knows up to .5, and refuses beyond.
+    about, options = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}, SMALL["curved"]
+    network = CurvedNetwork(options, DENIM.weave.repeat)
+    method = Curved({fingerprint(DENIM.optics()): network}, Domain.of(about, [DENIM]))
+    queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), DENIM.weave.repeat, 3, 0, 40)
+    fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
+    assert steep.any() and not steep.all()
+    np.testing.assert_array_equal(fallback.out_of_domain(DENIM, queries), steep)
+    answers = fallback.predict(DENIM, queries)
+    np.testing.assert_array_equal(answers[~steep], method.predict(DENIM, queries.take(~steep)))
+    np.testing.assert_array_equal(answers[steep], fallback_answers(DENIM, queries.take(steep), 0))
 
 
 @pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT_TURN, 0.03), (3.0 * FLAT_TURN, 0.1)])
@@ -156,17 +171,6 @@ def test_beyond_the_ranges_trained_on_the_fallback_answers_and_within_them_the_m
     assert asked.sigma.max() <= 1.03 and asked.sigma.min() >= 0.29
 
 
-def test_a_kind_that_a_method_could_know_and_was_not_taught_is_none_of_its_own():
-    """A recipe narrowed to a scene without light from behind teaches none, though the model could learn it."""
-    fabric, queries = load_fabric("voile"), mixed()
-    fallback = fallback_of(fabric, {}, {"behind", "stretch", "curvature"})
-    assert fallback.out_of_domain(fabric, queries)[queries.behind].all()
-    fallback.predict(fabric, queries)
-    (asked,) = fallback.method.asked
-    assert not asked.curvature.any() and not asked.behind.any()
-    np.testing.assert_array_equal(asked.sigma, asked.sigma_minor)
-
-
 @pytest.mark.parametrize("rows", [0, 7])
 def test_plain_queries_are_the_methods_alone(rows):
     fabric, sums = load_fabric("denim"), SoftNodes()
@@ -175,17 +179,3 @@ def test_plain_queries_are_the_methods_alone(rows):
     np.testing.assert_array_equal(fallback.predict(fabric, queries), sums.predict(fabric, queries))
     assert (fallback.name, fallback.setting) == (sums.name, sums.setting)
     assert fallback.bytes_stored(fabric) == sums.bytes_stored(fabric)
-
-
-def test_cloth_steeper_than_was_taught_is_left_to_the_fallback():
-    """The scenes' drape bends up to 1 a yarn; `curved` knows up to .5, and refuses beyond."""
-    about, options = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}, SMALL["curved"]
-    network = CurvedNetwork(options, DENIM.weave.repeat)
-    method = Curved({fingerprint(DENIM.optics()): network}, Domain.of(about, [DENIM]))
-    queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), DENIM.weave.repeat, 3, 0, 40)
-    fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
-    assert steep.any() and not steep.all()
-    np.testing.assert_array_equal(fallback.out_of_domain(DENIM, queries), steep)
-    answers = fallback.predict(DENIM, queries)
-    np.testing.assert_array_equal(answers[~steep], method.predict(DENIM, queries.take(~steep)))
-    np.testing.assert_array_equal(answers[steep], fallback_answers(DENIM, queries.take(steep), 0))

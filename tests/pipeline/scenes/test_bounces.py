@@ -21,13 +21,19 @@ def _queries(wi=WI, wo=WO):
     return Queries.round(np.array([0.3, 0.7]), np.array([0.2, 0.9]), np.array([0.1, 3.0]), wi, wo)
 
 
-def test_all_bounces_are_added_to_the_first():
+def test_all_bounces_are_added_to_the_first_and_threads_send_on_light_in_their_own_colours():
     """By default; a channel that no yarn reflects gets no light, and a white one most."""
     components, queries = np.random.default_rng(1).random((2, 4)), _queries()
     once, every = shade(CLOTH, components, queries, 1), shade(CLOTH, components, queries)
     added = every - once
     assert added == pytest.approx(shade(CLOTH, NONE, queries))
     assert (added[:, 2] == 0.0).all() and (added[:, 0] > 2.0 * added[:, 1]).all() and (added[:, 1] > 0.0).all()
+    # The yarns further back have the mean colours of the cloth: light on the seen thread is that of the mean cloth.
+    cloth, queries = coloured("denim", ends=[["red", 1], ["blue", 1]]), _queries()
+    own, mean = colours_of(cloth, queries), colours_of(cloth.average(), queries)
+    light = bounces.later_bounces(cloth.average(), queries, mean) / mean[:, 2:]
+    assert bounces.later_bounces(cloth, queries, own) == pytest.approx(light * own[:, 2:])
+    assert np.ptp(own[:, 2], axis=0).max() > 0.1
 
 
 def test_colours_change_no_table(monkeypatch):
@@ -38,30 +44,14 @@ def test_colours_change_no_table(monkeypatch):
     assert make.call_count == 1
 
 
-def test_a_thread_sends_on_light_in_its_own_colour():
-    """The yarns further back have the mean colours of the cloth: light on the seen thread is that of the mean cloth."""
-    cloth, queries = coloured("denim", ends=[["red", 1], ["blue", 1]]), _queries()
-    own, mean = colours_of(cloth, queries), colours_of(cloth.average(), queries)
-    light = bounces.later_bounces(cloth.average(), queries, mean) / mean[:, 2:]
-    assert bounces.later_bounces(cloth, queries, own) == pytest.approx(light * own[:, 2:])
-    assert np.ptp(own[:, 2], axis=0).max() > 0.1
-
-
-def test_cloth_seen_from_behind_is_the_cloth_of_its_back():
+def test_cloth_from_behind_is_that_of_its_back_and_what_is_transmitted_has_colours_of_its_own():
     flip = np.float32([1.0, 1.0, -1.0])
     behind = shade(CLOTH, NONE, _queries(WI * flip, WO * flip), "all")
     assert behind == pytest.approx(shade(CLOTH.back(), NONE, _queries(), "all")) and behind.max() > 0.0
-
-
-def test_no_light_comes_through_closed_cloth_that_transmits_none():
-    queries = _queries(WI * np.float32([1.0, 1.0, -1.0]))
+    queries = _queries(WI * flip)
     assert shade(CLOTH, NONE, queries, "all").max() == 0.0
-
-
-def test_what_is_transmitted_has_colours_of_its_own():
-    """From behind, one channel each: without k_dt only gaps let light in; k_d makes more of what k_dt lets through."""
+    # From behind, one channel each: without k_dt only gaps let light in; k_d makes more of what k_dt lets through.
     cloth = woven("gauze", diffuse=(0.6, 0.3, 0.6), diffuse_transmission=(0.3, 0.3, 0.0))
-    queries = _queries(WI * np.float32([1.0, 1.0, -1.0]))
     light = shade(cloth, NONE, queries, "all")
     assert (light > 0.0).all() and (light[:, 0] > 1.2 * light[:, 1]).all() and (light[:, 2] < 0.5 * light[:, 0]).all()
     turned = _queries(WI, WO * np.float32([1.0, 1.0, -1.0]))

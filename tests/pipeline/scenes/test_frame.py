@@ -186,16 +186,13 @@ def test_the_end_of_a_bend_is_no_silhouette(curvature, rims):
     assert low.sum() > 60 if rims else not low.any()
 
 
-def test_a_hollow_is_flat_and_so_is_the_back():
+def test_a_hollow_is_flat_and_left_handed_coordinates_show_the_front_and_no_mirror_image():
     dome = {"type": "cylinder", "p0": [-1, 0, 0], "p1": [1, 0, 0], "flip_normals": True, "b": WEARS}
     gbuffer = shot(lambda mi: {"dome": dome, "s": SUN}, eye=(-4, -1.5, 1.5), cloth=Cloth(yarns=(300, 300)))
     # Through the open end the inside is seen, which is the front; from outside, the back.
     assert (gbuffer.wo[:, 2] > 0).sum() > 100 and (gbuffer.wo[:, 2] < 0).sum() > 100
     assert (gbuffer.curvature == 0).all()
-
-
-def test_left_handed_coordinates_show_the_front_and_no_mirror_image():
-    """Mitsuba's sphere counts v from the pole downwards, so v is counted backwards: u to the right, v upwards."""
+    # Mitsuba's sphere counts v from the pole downwards, so v is counted backwards: u to the right, v upwards.
     ball = {"type": "sphere", "b": WEARS}
     gbuffer = shot(lambda mi: {"ball": ball, "s": SUN}, eye=(0, -4, 0), cloth=Cloth(yarns=(200, 100)))
     assert (gbuffer.wo[:, 2] > 0).all()
@@ -206,7 +203,7 @@ def test_left_handed_coordinates_show_the_front_and_no_mirror_image():
     assert np.linalg.norm(gbuffer.wi, axis=1) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_blocker_throws_its_shadow():
+def test_a_blocker_throws_its_shadow_and_those_of_an_even_sky_are_soft():
     """A square of side 1 at height 1/2 under a slanting sun hides the square of floor behind it, to the pixel."""
 
     def parts(mi):
@@ -224,6 +221,22 @@ def test_a_blocker_throws_its_shadow():
     clear = np.abs(distance) > 1e-3
     assert (lit[clear] == (distance > 0)[clear]).all()
     assert 50 < (~lit).sum() < len(lit) / 2
+
+    # A wall of height 1 along x = 0 takes (1 - x / sqrt(x^2 + 1)) / 2 of the sky's irradiance pi. One shadow ray
+    # to each of 64 directions would be off by .085 rms.
+    def walled(mi):
+        upright = mi.ScalarTransform4f().rotate([0, 1, 0], 90).scale([1, 99, 1])
+        wall = {"type": "rectangle", "to_world": upright, "paint": {"type": "diffuse"}}
+        return {**floor(mi), "wall": wall, "s": {"type": "constant", "radiance": 1.0}}
+
+    gbuffer = shot(walled, eye=(1.5, -1.0, 3.0))
+    total, above = np.zeros(len(gbuffer.pixel)), gbuffer.wi[:, 2] > 0
+    np.add.at(total, gbuffer.place[above], gbuffer.wi[above, 2] * gbuffer.irradiance[above, 0])
+    x = gbuffer.u / 100 * 8 - 4
+    chosen = x > 0.05
+    expected = math.pi * (1 + x / np.hypot(x, 1)) / 2
+    assert chosen.sum() > 1000 and x[chosen].max() > 1.0
+    assert np.sqrt(np.mean(np.square(total - expected)[chosen])) < 0.05
 
 
 def test_a_backdrop_is_matte_and_the_shadow_of_the_cloth_is_not_seen_behind_it():
@@ -249,7 +262,7 @@ def test_a_backdrop_is_matte_and_the_shadow_of_the_cloth_is_not_seen_behind_it()
     np.testing.assert_allclose(frame.backdrop, np.where((floor & ~shadow)[..., None], lit, 0.0), rtol=1e-5, atol=1e-12)
 
 
-def test_point_lights_fall_off_with_the_square():
+def test_point_lights_fall_off_with_the_square_and_an_even_sky_lights_both_sides_with_pi():
     lamp = {"type": "point", "position": [0.5, 0, 2], "intensity": {"type": "rgb", "value": [1, 2, 3]}}
     gbuffer = shot(lambda mi: {**floor(mi), "s": lamp})
     x, y = pixels(gbuffer)
@@ -257,10 +270,7 @@ def test_point_lights_fall_off_with_the_square():
     square = np.square(towards).sum(axis=1)
     np.testing.assert_allclose(gbuffer.irradiance, np.outer(1 / square, [1, 2, 3]), rtol=1e-4)
     np.testing.assert_allclose(gbuffer.wi, towards / np.sqrt(square)[:, None], atol=1e-5)
-
-
-def test_an_even_sky_lights_both_sides_of_a_sheet_with_pi():
-    """Irradiance of a hemisphere of radiance 1 is pi; the lattice of 64 directions is allowed 2 %."""
+    # Irradiance of a hemisphere of radiance 1 is pi; the lattice of 64 directions is allowed 2 %.
     gbuffer = shot(lambda mi: {**floor(mi), "s": {"type": "constant", "radiance": 1.0}})
     cosine = gbuffer.wi[:, 2:] * gbuffer.irradiance
     for side in (1, -1):
@@ -270,25 +280,6 @@ def test_an_even_sky_lights_both_sides_of_a_sheet_with_pi():
         assert total == pytest.approx(math.pi, rel=0.02)
     assert (gbuffer.wo[:, 2] > 0).all()
     assert not faults(gbuffer.queries((4, 4)))
-
-
-def test_shadows_of_an_even_sky_are_soft():
-    """A wall of height 1 along x = 0 takes (1 - x / sqrt(x^2 + 1)) / 2 of the sky's irradiance pi. One shadow ray to
-    each of 64 directions would be off by .085 rms."""
-
-    def walled(mi):
-        upright = mi.ScalarTransform4f().rotate([0, 1, 0], 90).scale([1, 99, 1])
-        wall = {"type": "rectangle", "to_world": upright, "paint": {"type": "diffuse"}}
-        return {**floor(mi), "wall": wall, "s": {"type": "constant", "radiance": 1.0}}
-
-    gbuffer = shot(walled, eye=(1.5, -1.0, 3.0))
-    total, above = np.zeros(len(gbuffer.pixel)), gbuffer.wi[:, 2] > 0
-    np.add.at(total, gbuffer.place[above], gbuffer.wi[above, 2] * gbuffer.irradiance[above, 0])
-    x = gbuffer.u / 100 * 8 - 4
-    chosen = x > 0.05
-    expected = math.pi * (1 + x / np.hypot(x, 1)) / 2
-    assert chosen.sum() > 1000 and x[chosen].max() > 1.0
-    assert np.sqrt(np.mean(np.square(total - expected)[chosen])) < 0.05
 
 
 def test_frames_move_the_camera_to_the_right():

@@ -69,7 +69,6 @@ PLACES, FACE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32), [0, 1, 9
 
 
 def write_meshes_with_lost_vertices(folder):
-    """Write a mesh whose only face has vertex 9 of three, in every format."""
     (folder / "a.ply").write_text(PLY.format("ascii") + "0 0 0\n1 0 0\n0 1 0\n5 3 0 1 9\n")
     face = struct.pack(">BB3i", 5, 3, *FACE)
     (folder / "b.ply").write_bytes(PLY.format("binary_big_endian").encode() + PLACES.astype(">f4").tobytes() + face)

@@ -64,16 +64,6 @@ def test_windows_cover_a_picture_once_and_are_small(size, queries):
     assert (count == 1).all()
 
 
-def test_a_window_shows_what_the_whole_frame_shows_there(table):
-    window = FilmWindow(5, 9, 20, 11)
-    part, frame = render(table, 1.0, SIZE, window), render(table, 1.0, SIZE)
-    cut = slice(9, 20), slice(5, 25)
-    np.testing.assert_allclose(part.backdrop, frame.backdrop[cut], atol=1e-6)
-    np.testing.assert_allclose(part.depth, frame.depth[cut], atol=1e-5)
-    for key, gbuffer in part.gbuffers.items():
-        np.testing.assert_array_equal(gbuffer.mask, frame.gbuffers[key].mask[cut])
-
-
 def test_windows_and_threads_change_nothing(table, monkeypatch):
     expected, counts = whole(table)
     monkeypatch.setattr(pictures, "QUERIES", 500)
@@ -91,7 +81,7 @@ def test_one_thread_or_three_give_the_same_bytes_of_a_random_method(table, monke
     assert one.tobytes() != whole(table, mc, seed=1, size=(16, 12))[0]["rgb"].tobytes()
 
 
-def test_layers_sum_to_the_picture_and_tell_what_is_seen(table):
+def test_layers_sum_to_the_picture_and_a_window_shows_what_the_whole_frame_shows_there(table):
     expected, layers = whole(table)[0]["rgb"], whole(table, layers=True)[0]
     np.testing.assert_allclose(layers["rgb"], expected, atol=1e-6)
     total = layers["backdrop"] + sum(layers[name] for name in COMPONENTS)
@@ -104,9 +94,22 @@ def test_layers_sum_to_the_picture_and_tell_what_is_seen(table):
     np.testing.assert_allclose(layers["depth"][..., 0], frame.depth, rtol=1e-6)
     seen = layers["depth"][..., 0] > 0
     np.testing.assert_allclose(np.linalg.norm(layers["normal"][seen], axis=-1), 1.0, atol=1e-5)
+    window = FilmWindow(5, 9, 20, 11)
+    part, frame = render(table, 1.0, SIZE, window), render(table, 1.0, SIZE)
+    cut = slice(9, 20), slice(5, 25)
+    np.testing.assert_allclose(part.backdrop, frame.backdrop[cut], atol=1e-6)
+    np.testing.assert_allclose(part.depth, frame.depth[cut], atol=1e-5)
+    for key, gbuffer in part.gbuffers.items():
+        np.testing.assert_array_equal(gbuffer.mask, frame.gbuffers[key].mask[cut])
+    # The share of cloth is in ninths with nine rays, and its mean stays: the silhouette is a tenth of the pixels.
+    one, nine = (whole(table, side=side, layers=True)[0]["cloth"] for side in (1, 3))
+    assert set(np.unique(one)) == {0.0, 1.0}
+    np.testing.assert_allclose(9 * nine, np.round(9 * nine), atol=1e-6)
+    assert ((nine > 0) & (nine < 1)).mean() > 0.02
+    assert nine.mean() == pytest.approx(one.mean(), rel=0.03)
 
 
-def test_what_comes_through_is_the_transparency_times_what_is_behind():
+def test_what_comes_through_is_behind_in_the_share_of_transparency_and_of_rims():
     """Drape under an even sky: the transparency is .25 whether a query knows it or a look is asked."""
     drape = load(SHIPPED["drape"], OPTIONS)
     layers, frame = whole(drape, layers=True)[0], render(drape, 0.0, SIZE)
@@ -114,17 +117,7 @@ def test_what_comes_through_is_the_transparency_times_what_is_behind():
     behind = frame.backdrop.reshape(-1, 3)[gbuffer.pixel]
     assert behind.min() > 0
     np.testing.assert_allclose(layers["backdrop"].reshape(-1, 3)[gbuffer.pixel], 0.25 * behind, rtol=1e-6)
-
-
-class Gauze(Flat):
-    """The same, of which a rim covers a quarter."""
-
-    def coverage(self, fabric, looks, seed):
-        return np.full(len(looks.u), 0.25, np.float32)
-
-
-def test_a_rim_shows_what_is_behind_in_the_share_that_it_leaves_free():
-    """C (L + T background) + (1 - C) background at silhouettes; all else is as before."""
+    # C (L + T background) + (1 - C) background at silhouettes; all else is as before.
     roll = load(SHIPPED["roll"], OPTIONS)
     full, thin = (whole(roll, answerer, layers=True)[0] for answerer in (Flat(), Gauze()))
     (gbuffer,) = render(roll, 0.0, SIZE).gbuffers.values()
@@ -140,6 +133,13 @@ def test_a_rim_shows_what_is_behind_in_the_share_that_it_leaves_free():
     np.testing.assert_array_equal(thin["rgb"][~rim], full["rgb"][~rim])
 
 
+class Gauze(Flat):
+    """The same, of which a rim covers a quarter."""
+
+    def coverage(self, fabric, looks, seed):
+        return np.full(len(looks.u), 0.25, np.float32)
+
+
 @pytest.mark.parametrize("side", [2, 3, 8])
 def test_the_footprints_of_a_pixels_rays_have_the_variance_of_one(table, side):
     """In pixels: the variance of the rays' places and that of each footprint sum to pixel_sigma^2."""
@@ -147,15 +147,6 @@ def test_the_footprints_of_a_pixels_rays_have_the_variance_of_one(table, side):
     own = sharpened(table, side).options.pixel_sigma / side
     assert np.square(places).mean() + own**2 == pytest.approx(OPTIONS.pixel_sigma**2)
     assert sharpened(table, 1).options.pixel_sigma == OPTIONS.pixel_sigma
-
-
-def test_samples_soften_silhouettes(table):
-    """The share of cloth is in ninths with nine rays, and its mean stays: the silhouette is a tenth of the pixels."""
-    one, nine = (whole(table, side=side, layers=True)[0]["cloth"] for side in (1, 3))
-    assert set(np.unique(one)) == {0.0, 1.0}
-    np.testing.assert_allclose(9 * nine, np.round(9 * nine), atol=1e-6)
-    assert ((nine > 0) & (nine < 1)).mean() > 0.02
-    assert nine.mean() == pytest.approx(one.mean(), rel=0.03)
 
 
 def test_all_bounces_add_the_light_of_the_table_to_what_faces_the_lamp(table):

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
-from weaves.errors import BadInput
+from tests.refusals import refusal
 
 EDGES, NAMES = (0.0, 0.3, 1.0), ("small", "middle", "large")
 
@@ -34,18 +34,14 @@ def test_the_domain_holds_what_was_asked_and_little_else(low, factor, angle, beh
     assert (found.curvature == (0.0, 0.0)) == (curvature == (0.0, 0.0))
 
 
-def test_stretched_footprints_keep_their_ratio_and_area_and_what_a_model_does_not_know_is_not_asked_of_it():
+def test_stretched_footprints_keep_their_ratio_and_area_and_classes_of_size_sum_to_one():
     shaped = required(QueryOptions(sigma=(0.5, 0.5), stretch=4.0, behind=0.5, curvature=(0.01, 0.1)))
     assert 3.9 <= shaped.stretch <= 4.0 * 1.26
     assert shaped.sigma == pytest.approx((0.4, 0.625), rel=1e-3)
     assert shaped.queries(frozenset()).plain
     assert shaped.queries(frozenset({"behind"})).behind > 0.4
-
-
-def test_classes_of_size_sum_to_one_and_a_scene_without_lit_cloth_is_one_sentence():
     found = required(QueryOptions(sigma=(0.05, 32.0)))
     assert sum(found.sizes.values()) == pytest.approx(1.0)
     # Log-uniform: each class has the share of its width in the logarithm.
     assert found.sizes["small"] == pytest.approx(np.log(0.3 / 0.05) / np.log(32 / 0.05), abs=0.03)
-    with pytest.raises(BadInput, match="no cloth that is lit"):
-        required(QueryOptions(), count=0)
+    assert "no cloth that is lit" in refusal(required, QueryOptions(), count=0)

@@ -16,7 +16,7 @@ def lit(side):
     return Queries.round(ones, ones, ones, wi, wo)
 
 
-def test_shade_applies_each_colour_to_its_component():
+def test_shade_applies_each_colour_to_its_component_and_those_of_threads_to_footprints_of_a_check():
     """One component at a time gives back its own colour, transmitted light that of transmission."""
     denim = load_fabric("denim")
     fabric = denim.model_copy(update={"weft": denim.weft.model_copy(update={"diffuse_transmission": (0.1, 0.2, 0.3)})})
@@ -26,10 +26,7 @@ def test_shade_applies_each_colour_to_its_component():
     assert rgb.reshape(2, 4, 3) == pytest.approx(np.array(expected))
     assert np.array([colours(fabric), colours(fabric, transmitted=True)]) == pytest.approx(np.array(expected))
     assert fabric.warp.diffuse_rgb != fabric.weft.diffuse_rgb
-
-
-def test_footprints_of_a_check_take_the_colours_of_their_own_threads():
-    """A white end beside a black one: each footprint on one end has its colour, a wide one the mean of both."""
+    # A white end beside a black one: each footprint on one end has its colour, a wide one the mean of both.
     palette = {"white": {"diffuse": [0.8, 0.8, 0.8]}, "black": {"diffuse": [0.0, 0.0, 0.0]}}
     order = {"palette": palette, "ends": [["white", 2], ["black", 2]]}
     fabric = Fabric.model_validate(load_fabric("denim").model_dump() | {"colours": order})
@@ -54,7 +51,7 @@ def gbuffer():
     return GBuffer(mask, np.flatnonzero(mask), *shapes, np.array([UP, SIDE, UP]), *queries)
 
 
-def test_queries_repeat_their_places(gbuffer):
+def test_queries_repeat_their_places_and_lights_add_up_over_what_is_seen_through(gbuffer):
     queries = gbuffer.queries((4, 4))
     assert queries.u.tolist() == [3.0, 0.0, 3.0] and queries.v.tolist() == [3.0, 0.0, 3.0]
     assert queries.sigma_minor.tolist() == [0.5, 1.5, 0.5]
@@ -64,19 +61,13 @@ def test_queries_repeat_their_places(gbuffer):
     assert gbuffer.lit.tolist() == [[True, False, True], [False, False, False]]
     looks = gbuffer.looks((4, 4))
     assert looks.u.tolist() == [3.0, 0.0, 1.0] and (looks.wi == looks.wo).all()
-
-
-def test_places_at_a_silhouette_are_asked_as_they_are_seen(gbuffer):
-    """Their directions are not tilted; all other places are covered."""
+    # Their directions are not tilted; all other places are covered.
     assert len(gbuffer.rims((4, 4)).u) == 0 and gbuffer.coverage([]).tolist() == [1.0, 1.0, 1.0]
     low = np.array([[0.8, 0.0, -0.6]])
     seen = replace(gbuffer, rim=np.array([2]), rim_wo=low)
     (look,) = zip(*seen.rims((4, 4)), strict=True)
     assert look[0] == 1.0 and look[4] == pytest.approx(low[0]) and look[3] == pytest.approx(low[0])
     assert seen.coverage([0.25]).tolist() == [1.0, 1.0, 0.25]
-
-
-def test_lights_add_up_over_what_is_seen_through(gbuffer):
     rgb = np.array([[0.1, 0.1, 0.1], [0.2, 0.4, 0.6], [0.01, 0.02, 0.03]])
     background = np.arange(18.0).reshape(2, 3, 3)
     picture = compose(gbuffer, rgb, background, transparency=[0.0, 0.5, 0.25])

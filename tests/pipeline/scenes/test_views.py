@@ -25,24 +25,21 @@ def derivative(gbuffer):
 
 
 @pytest.mark.parametrize("scene", ["sphere", "plane"])
-def test_directions_are_unit_and_in_front(scene):
+def test_directions_are_unit_and_in_front_and_frames_slide_the_cloth_by_less_than_a_pixel(scene):
     gbuffer = view(scene, 64, 48)
     for directions in (gbuffer.wi, gbuffer.wo):
         assert np.linalg.norm(directions, axis=1) == pytest.approx(1.0, abs=1e-12)
         assert (directions[:, 2] > 0).all()
     assert gbuffer.wo[:, 2].min() >= math.cos(math.radians(ViewOptions().largest_angle))
     assert (gbuffer.sigma > 0).all() and not (gbuffer.lit & ~gbuffer.mask).any()
+    still, moved = (view(scene, 48, 40, frame=frame, options=FLAT) for frame in (0, 2))
+    slide, heading = 2 * FLAT.step / 6, math.radians(HEADING)
+    np.testing.assert_allclose(still.u - moved.u, slide * math.cos(heading), rtol=1e-6)
+    np.testing.assert_allclose(still.v - moved.v, slide * math.sin(heading), rtol=1e-6)
+    assert FLAT.step < 1 and (still.lit == moved.lit).all() and (still.wi == moved.wi).all()
 
 
-def test_the_plane_ends_with_a_whole_row_and_unlit_pixels_are_cloth_without_queries():
-    plane = view("plane", 96, 72, options=ViewOptions(largest_angle=80.0))
-    assert (plane.mask.any(axis=1) == plane.mask.all(axis=1)).all()
-    assert plane.wo[:, 2].min() >= math.cos(math.radians(80.0))
-    sphere = view("sphere", 64, 64, options=ViewOptions(sphere_light=(80.0, 0.0)))
-    assert sphere.lit.sum() == len(sphere.u) < sphere.mask.sum()
-
-
-def test_the_centre_of_the_sphere():
+def test_the_centre_of_the_sphere_and_a_turn_of_light_and_coordinates_together():
     """Surface and picture are parallel there: pixels are 1/6 yarn apart, rows count downwards; wi is the light."""
     gbuffer = view("sphere", 129, 129, options=FLAT)
     assert derivative(gbuffer)[63, 63] == pytest.approx(np.diag([1 / 6, -1 / 6]), rel=1e-3, abs=1e-6)
@@ -50,10 +47,7 @@ def test_the_centre_of_the_sphere():
     assert sigma == pytest.approx(0.5 / 6, rel=1e-3)
     assert wo == pytest.approx([0, 0, 1], abs=1e-12)
     assert wi == pytest.approx(unit(*FLAT.sphere_light), abs=1e-12)
-
-
-def test_turn_rotates_light_and_coordinates_together():
-    """With the weft turned by 90 degrees, x of the local frame points up: (x, y) reads (y, -x) of before."""
+    # With the weft turned by 90 degrees, x of the local frame points up: (x, y) reads (y, -x) of before.
     straight = view("sphere", 65, 65, options=FLAT)
     turned = view("sphere", 65, 65, options=ViewOptions(turn=90.0))
     assert turned.wi == pytest.approx(np.stack([straight.wi[:, 1], -straight.wi[:, 0], straight.wi[:, 2]], 1))
@@ -79,7 +73,7 @@ def test_footprint_is_the_finite_difference_of_the_coordinates(scene, footprint)
     assert sigma[1:-1, 1:-1][inner] == pytest.approx(0.5 * expected, rel=0.03)
 
 
-def test_plane_goes_from_resolved_yarns_to_many_repeats():
+def test_the_plane_goes_from_resolved_yarns_to_many_repeats_and_ends_with_a_whole_row():
     options = FLAT.model_copy(update={"horizon": 0.1, "largest_sigma": 1e6, "largest_angle": 89.0})
     gbuffer = view("plane", 320, 224, options=options)
     u, sigma = spread(gbuffer, gbuffer.u), spread(gbuffer, gbuffer.sigma)
@@ -89,9 +83,14 @@ def test_plane_goes_from_resolved_yarns_to_many_repeats():
     assert 88.7 < np.degrees(np.arccos(np.nanmin(spread(gbuffer, gbuffer.wo)[top, :, 2]))) < 89.0
     assert np.nanmin(sigma[top]) > 50
     assert view("plane", 320, 224, options=ViewOptions(largest_sigma=4.0)).sigma.max() == 4.0
+    plane = view("plane", 96, 72, options=ViewOptions(largest_angle=80.0))
+    assert (plane.mask.any(axis=1) == plane.mask.all(axis=1)).all()
+    assert plane.wo[:, 2].min() >= math.cos(math.radians(80.0))
+    sphere = view("sphere", 64, 64, options=ViewOptions(sphere_light=(80.0, 0.0)))
+    assert sphere.lit.sum() == len(sphere.u) < sphere.mask.sum()
 
 
-def test_plane_camera_sees_along_the_ray():
+def test_the_plane_camera_sees_along_the_ray_and_queries_are_reduced_in_float64_first():
     """Oracle: the angle of a pixel's view below the horizontal is pitch plus its angle in the picture."""
     gbuffer = view("plane", 101, 81, options=ViewOptions(turn=0.0, horizon=0.1))
     wo = spread(gbuffer, gbuffer.wo)
@@ -100,19 +99,7 @@ def test_plane_camera_sees_along_the_ray():
     for row in (30, 40, 80):
         below = pitch + math.atan((row + 0.5 - 40.5) / focal)
         assert wo[row, 50] == pytest.approx([0, -math.cos(below), math.sin(below)], abs=1e-12)
-
-
-@pytest.mark.parametrize("scene", ["sphere", "plane"])
-def test_frames_slide_the_cloth_by_less_than_a_pixel(scene):
-    still, moved = (view(scene, 48, 40, frame=frame, options=FLAT) for frame in (0, 2))
-    slide, heading = 2 * FLAT.step / 6, math.radians(HEADING)
-    np.testing.assert_allclose(still.u - moved.u, slide * math.cos(heading), rtol=1e-6)
-    np.testing.assert_allclose(still.v - moved.v, slide * math.sin(heading), rtol=1e-6)
-    assert FLAT.step < 1 and (still.lit == moved.lit).all() and (still.wi == moved.wi).all()
-
-
-def test_queries_are_reduced_in_float64_first():
-    """Near the horizon, 1e5 yarns away, float32 would have lost the position within the repeat."""
+    # Near the horizon, 1e5 yarns away, float32 would have lost the position within the repeat.
     gbuffer = view("plane", 640, 480, options=ViewOptions(plane_pixels_per_yarn=0.01, largest_angle=89.0))
     assert np.abs(gbuffer.v).max() > 1e5
     queries = gbuffer.queries((3, 8))

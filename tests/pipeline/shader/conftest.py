@@ -158,7 +158,6 @@ def cpp(programs):
 
 
 def job_of(buffers, rows, **other):
-    """Return buffers and rows of queries for a page."""
     columns = {**buffers, "queries": rows}
     encoded = {name: base64.b64encode(values.tobytes()).decode() for name, values in columns.items()}
     return {"names": list(columns), **encoded, "count": len(rows), **other}

@@ -149,13 +149,18 @@ def test_light_and_viewer_behind_answer_nothing_without_their_tables(programs, e
             assert (scattered[1:3, 12] == 0.0).all() and np.isfinite(scattered).all() and (scattered[:, 3] > 0.0).all()
 
 
-def test_curvature_counts_as_flat_without_its_tables(cpp, exported):
+def test_curvature_counts_as_flat_without_its_tables_and_odd_footprints_are_answered(cpp, exported):
     flat, curved = read(exported("gingham")), read(exported("gingham", kinds=("curvature",)))
     rows = flat.queries.copy()
     rows[:, 11] = 0.5
     answers = cpp(flat.buffers, flat.queries)
     assert (cpp(flat.buffers, rows) == answers).all()
     assert (np.abs(cpp(curved.buffers, rows) - answers).max(axis=1) > 1e-4).mean() > 0.5
+    cloth = read(exported("gauze"))
+    rows = cloth.queries[:64].copy()
+    rows[:16, 2:4], rows[16:32, 4], rows[32:48, 4], rows[40:48, 2:4] = 0.0, 1.0, -1.0, 1e9
+    rows[48:56, 8:11], rows[56:, 5:8], rows[0, 0] = (1.0, 0.0, 1e-6), (0.0, 0.0, 1.0), 1e30
+    assert np.isfinite(cpp(cloth.buffers, rows)).all()
 
 
 @pytest.mark.parametrize("name", [*FEW, slow("silk_charmeuse")])
@@ -178,11 +183,3 @@ def test_coverage_is_that_of_python(cpp, exported, name):
     assert (np.abs(found - wanted)[narrow] > 1e-5).mean() < 0.01
     assert np.sqrt(np.square(found - wanted)[~narrow & rim].mean()) < 0.1
     assert (cpp(cloth.buffers, rows_of(queries._replace(curvature=0.0 * z)), "scatter")[:, 14] == 1.0).all()
-
-
-def test_odd_footprints_are_answered_with_numbers(cpp, exported):
-    cloth = read(exported("gauze"))
-    rows = cloth.queries[:64].copy()
-    rows[:16, 2:4], rows[16:32, 4], rows[32:48, 4], rows[40:48, 2:4] = 0.0, 1.0, -1.0, 1e9
-    rows[48:56, 8:11], rows[56:, 5:8], rows[0, 0] = (1.0, 0.0, 1e-6), (0.0, 0.0, 1.0), 1e30
-    assert np.isfinite(cpp(cloth.buffers, rows)).all()

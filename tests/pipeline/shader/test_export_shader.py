@@ -21,7 +21,6 @@ from weaves.fabric import load_fabric
 
 @pytest.fixture(scope="module")
 def every(exported):
-    """The folder with all languages."""
     return exported("gingham", 2, "all")
 
 

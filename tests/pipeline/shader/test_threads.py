@@ -22,16 +22,13 @@ def looks(sizes):
     return Queries.round(*(np.asarray(column, np.float32) for column in (u, v, sigma, wi, wo)))
 
 
-def test_sums_of_all_threads_near_are_those_of_the_cloth():
+def test_sums_of_all_threads_near_are_those_of_the_cloth_in_the_colours_of_methods():
     table, queries = tabulate(load_fabric("houndstooth")), looks((0.05, 0.4, 0.8))
     (whole, gaps), (parts, own) = query_sums(table, queries), query_sums(by_copy(table), queries)
     of_families = np.stack([part.sum(axis=1) for part in np.split(parts, 2, axis=1)], axis=1)
     np.testing.assert_allclose(of_families, whole, atol=2e-5 * whole.max())
     np.testing.assert_allclose(own, gaps, atol=1e-6)
-
-
-def test_colours_are_those_of_methods():
-    """These weigh every thread of the repeat by its light, and its copies by what is seen of them: 1 % apart."""
+    # These weigh every thread of the repeat by its light, and its copies by what is seen of them: 1 % apart.
     fabric, queries = load_fabric("gingham"), looks((0.05, 0.4, 2.0, 8.0))
     sides = tabulate_sides(fabric, 2, ())
     components = read_sides(sides, queries)[:, :4]

@@ -12,7 +12,7 @@ from weaves.fabric import load_fabric
 DENIM, LINING, BASKET, SHANTUNG = map(load_fabric, ("denim", "polyester_lining", "basket", "silk_shantung"))
 
 
-def test_samples_are_the_truth_at_the_texels():
+def test_samples_are_the_truth_at_the_texels_and_opacities_the_truths():
     """Texel (row, column) lies at v = row, u = column: on a 6 x 8 repeat no mistake of order can hide."""
     exact = TruthOptions(estimator="owen", min_count=4096, max_count=4096)
     rows, columns = SAMPLES.grid(SHANTUNG)
@@ -24,9 +24,18 @@ def test_samples_are_the_truth_at_the_texels():
     found = answers.mean[row * columns + column]
     assert np.abs(found - answer.mean[0]).max() < 5 * answer.standard_error.max()
     assert np.ptp(answers.mean, axis=0).max() > 0.1 * answer.mean.max()
+    column = OPACITY.answer(DENIM, 0, 512)
+    wo = np.stack([column[f"wo_{axis}"] for axis in "xyz"], axis=-1)
+    queries = Queries.round(column["u"], column["v"], column["sigma"], wo, wo)
+    exactly = TruthOptions(min_count=256, max_count=256)
+    exact, error = opacity(DENIM, queries._replace(curvature=column["curvature"]), exactly, seed=9)
+    doubt = np.sqrt(np.square(error) + 0.25 / 32)
+    assert (np.abs(column["opacity"] - exact) < 4 * doubt + 1e-6).mean() > 0.99
+    assert ((exact > 0.02) & (exact < 0.98)).mean() > 0.25
+    assert column["curvature"].max() <= 0.5
 
 
-def test_all_texels_of_a_fabric_are_seen_under_directions_of_their_own():
+def test_all_texels_are_seen_under_directions_of_their_own_that_fabric_and_seed_choose():
     lining, basket = (queries_of(SAMPLES.answer(fabric, 0, SAMPLES.count(fabric))) for fabric in (LINING, BASKET))
     rows, columns = SAMPLES.grid(LINING)
     assert SAMPLES.count(LINING) == 4 * rows * columns == 4 * 16
@@ -35,6 +44,9 @@ def test_all_texels_of_a_fabric_are_seen_under_directions_of_their_own():
         assert (by_sample == by_sample[:, :1]).all()
         assert len(np.unique(by_sample[:, 0], axis=0)) == 4
     assert not np.isin(lining.wi, basket.wi).any()
+    cases = (OPACITY, DENIM), (OPACITY, BASKET), (OPACITY.model_copy(update={"seed": 1}), DENIM)
+    drawn = [rows.answer(fabric, 0, 16)["sigma"] for rows, fabric in cases]
+    assert len(np.unique(np.concatenate(drawn))) == 48
 
 
 def test_rows_are_the_same_in_any_cut_and_for_any_number_of_samples():
@@ -46,18 +58,6 @@ def test_rows_are_the_same_in_any_cut_and_for_any_number_of_samples():
         found = [cut.answer(LINING, start, count) for start, count in parts]
         for name, column in whole.items():
             np.testing.assert_array_equal(np.concatenate([part[name] for part in found]), column[5:])
-
-
-def test_opacities_are_the_truths():
-    column = OPACITY.answer(DENIM, 0, 512)
-    wo = np.stack([column[f"wo_{axis}"] for axis in "xyz"], axis=-1)
-    queries = Queries.round(column["u"], column["v"], column["sigma"], wo, wo)
-    exactly = TruthOptions(min_count=256, max_count=256)
-    exact, error = opacity(DENIM, queries._replace(curvature=column["curvature"]), exactly, seed=9)
-    doubt = np.sqrt(np.square(error) + 0.25 / 32)
-    assert (np.abs(column["opacity"] - exact) < 4 * doubt + 1e-6).mean() > 0.99
-    assert ((exact > 0.02) & (exact < 0.98)).mean() > 0.25
-    assert column["curvature"].max() <= 0.5
 
 
 @pytest.mark.parametrize("footprint", ["gaussian", "box"])
@@ -73,9 +73,3 @@ def test_grazing_rows_are_mean_and_variance_of_cosines(footprint):
     limit = 5 * np.sqrt(2 / 64) * cosines.std(axis=1)
     assert (np.abs(column["grazing_mean"] - cosines.mean(axis=1)) < limit).all()
     assert column["grazing_variance"].mean() == pytest.approx(cosines.var(axis=1).mean(), rel=0.2)
-
-
-def test_fabrics_and_seeds_draw_other_queries():
-    cases = (OPACITY, DENIM), (OPACITY, BASKET), (OPACITY.model_copy(update={"seed": 1}), DENIM)
-    drawn = [rows.answer(fabric, 0, 16)["sigma"] for rows, fabric in cases]
-    assert len(np.unique(np.concatenate(drawn))) == 48

@@ -13,6 +13,7 @@ from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.store import read_about, read_columns, rows_of, write_columns
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.shards.extra import GRAZING, OPACITY, SAMPLES
+from tests.refusals import refusal
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -41,7 +42,7 @@ def _manifest(*entries):
     return Manifest(fabrics={"denim": TASK.fabric}, shards=entries, **facts)
 
 
-def test_the_same_task_gives_the_same_bytes_and_the_same_rows_in_any_cut(folder):
+def test_the_same_task_gives_the_same_bytes_in_any_cut_which_a_manifest_reads_in_stream_order(folder):
     generate_shard(TASK, folder / "again.parquet")
     assert (folder / "again.parquet").read_bytes() == (folder / "part-a.parquet").read_bytes()
     generate_shard(TASK.model_copy(update={"start": 52, "rows": 10}), folder / "cut.parquet")
@@ -49,17 +50,31 @@ def test_the_same_task_gives_the_same_bytes_and_the_same_rows_in_any_cut(folder)
     cut_queries, cut_answers = read_shard(folder / "cut.parquet")
     for whole, part in zip((*queries, *answers), (*cut_queries, *cut_answers), strict=True):
         np.testing.assert_array_equal(whole[20:30], part)
+    generate_shard(TASK.model_copy(update={"start": 0, "rows": 32}), folder / "part-b.parquet")
+    _manifest(_entry(folder / "part-a.parquet", 32, 100), _entry(folder / "part-b.parquet", 0, 32)).save(folder)
+    loaded = Manifest.load(folder)
+    assert [entry.start for entry in loaded.shards] == [0, 32]
+    queries, answers = loaded.read(folder, "denim", "test")
+    np.testing.assert_array_equal(queries.u[:32], read_shard(folder / "part-b.parquet")[0].u)
+    assert answers.mean.shape == (132, 4)
+    before = (folder / "manifest.json").read_bytes()
+    loaded.save(folder)
+    assert (folder / "manifest.json").read_bytes() == before
+    assert "no rows" in refusal(loaded.read, folder, "denim", "train")
 
 
-def test_a_shard_explains_itself(folder):
+def test_a_shard_explains_itself_and_splits_and_fabrics_draw_different_queries(folder):
     about = read_about(folder / "part-a.parquet")
     assert about["task"]["truth"]["normaliser"] == "visible"
     assert b"signed" in pq.read_schema(folder / "part-a.parquet").field("wi_z").metadata[b"meaning"]
     group = pq.read_metadata(folder / "part-a.parquet").row_group(0)
     assert {group.column(column).compression for column in range(group.num_columns)} == {"ZSTD"}
+    generate_shard(TASK.model_copy(update={"split": "train"}), folder / "train.parquet")
+    first, second = (read_shard(folder / name)[0] for name in ("part-a.parquet", "train.parquet"))
+    assert not np.intersect1d(first.u, second.u).size
 
 
-def test_identity_follows_optics_and_parameters_and_not_colours():
+def test_a_manifest_is_written_as_json_writes_it_and_identity_follows_optics_and_parameters():
     extra = [ExtraShardTask(fabric=TASK.fabric, extra=extra, start=0, rows=8) for extra in EXTRA]
     for task in (TASK, *extra):
         dyed, rough = (
@@ -70,12 +85,12 @@ def test_identity_follows_optics_and_parameters_and_not_colours():
         assert task.model_copy(update={"fabric": rough}).identity() != task.identity()
         assert task.model_copy(update={"start": 1}).identity() != task.identity() and "version" in task.identity()
     assert len({json.dumps(task.identity()) for task in extra}) == len({task.split for task in extra}) == 3
-
-
-def test_splits_and_fabrics_draw_different_queries(folder):
-    generate_shard(TASK.model_copy(update={"split": "train"}), folder / "train.parquet")
-    first, second = (read_shard(folder / name)[0] for name in ("part-a.parquet", "train.parquet"))
-    assert not np.intersect1d(first.u, second.u).size
+    facts = {"fabric": 'a "cloth" –,\n {}', "split": "test", "rows": 2, "sha256": ""}
+    entries = [ShardEntry(file=f"part-{start}.parquet", start=start, **facts) for start in (4, 2, 0)]
+    for shards in ([], entries):
+        manifest = _manifest(*shards)
+        expected = manifest.model_copy(update={"shards": shards[::-1]}).model_dump(mode="json")
+        assert manifest.encoded().decode() == json.dumps(expected, indent=1, sort_keys=True) + "\n"
 
 
 def flipped(content, position):
@@ -100,27 +115,10 @@ def test_damage_is_named(folder):
     position = column.data_page_offset + column.total_compressed_size - 20
     for content in (flipped(sound, position), sound[: len(sound) // 2]):
         path.write_bytes(content)
-        with pytest.raises(BadInput, match="not a whole Parquet file"):
-            read_shard(path)
+        assert "not a whole Parquet file" in refusal(read_shard, path)
     path.unlink()
-    with pytest.raises(BadInput, match="does not exist"):
-        read_shard(path)
+    assert "does not exist" in refusal(read_shard, path)
     assert "does not exist" in check_shard(folder, entry, manifest)[0]
-
-
-def test_manifest_round_trip_reads_rows_in_stream_order(folder):
-    generate_shard(TASK.model_copy(update={"start": 0, "rows": 32}), folder / "part-b.parquet")
-    _manifest(_entry(folder / "part-a.parquet", 32, 100), _entry(folder / "part-b.parquet", 0, 32)).save(folder)
-    loaded = Manifest.load(folder)
-    assert [entry.start for entry in loaded.shards] == [0, 32]
-    queries, answers = loaded.read(folder, "denim", "test")
-    np.testing.assert_array_equal(queries.u[:32], read_shard(folder / "part-b.parquet")[0].u)
-    assert answers.mean.shape == (132, 4)
-    before = (folder / "manifest.json").read_bytes()
-    loaded.save(folder)
-    assert (folder / "manifest.json").read_bytes() == before
-    with pytest.raises(BadInput, match="no rows"):
-        loaded.read(folder, "denim", "train")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", json.dumps({"name": "x"})])
@@ -128,8 +126,7 @@ def test_a_broken_manifest_is_one_sentence(tmp_path, text):
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(BadInput, match=r"manifest is needed|not a manifest"):
         Manifest.load(tmp_path)
-    with pytest.raises(BadInput, match="does not exist"):
-        Manifest.load(tmp_path / "nowhere")
+    assert "does not exist" in refusal(Manifest.load, tmp_path / "nowhere")
 
 
 def _extra(folder, extra):
@@ -155,8 +152,7 @@ def test_extra_rows_are_shards_like_all_others(folder, extra):
     assert read.keys() == whole.keys()
     for name, column in whole.items():
         np.testing.assert_array_equal(read[name], column)
-    with pytest.raises(BadInput, match="no rows"):
-        manifest.columns(folder, "denim", set_name(SAMPLES.model_copy(update={"samples": 5})))
+    assert "no rows" in refusal(manifest.columns, folder, "denim", set_name(SAMPLES.model_copy(update={"samples": 5})))
 
 
 def test_damaged_extra_rows_are_named(folder):
@@ -171,12 +167,3 @@ def test_damaged_extra_rows_are_named(folder):
     # One kind read as another is refused, never misread.
     misread = entry.model_copy(update={"kind": "components"})
     assert "must be schema version" in check_shard(folder, misread, manifest)[-1]
-
-
-def test_a_manifest_is_written_as_json_writes_it():
-    facts = {"fabric": 'a "cloth" –,\n {}', "split": "test", "rows": 2, "sha256": ""}
-    entries = [ShardEntry(file=f"part-{start}.parquet", start=start, **facts) for start in (4, 2, 0)]
-    for shards in ([], entries):
-        manifest = _manifest(*shards)
-        expected = manifest.model_copy(update={"shards": shards[::-1]}).model_dump(mode="json")
-        assert manifest.encoded().decode() == json.dumps(expected, indent=1, sort_keys=True) + "\n"

@@ -35,12 +35,6 @@ def coloured(cloth, **order):
     return Fabric.model_validate(fabric.model_dump() | {"colours": {"palette": PALETTE} | order})
 
 
-def direction(theta, phi):
-    """Return the unit vector at a polar angle and an azimuth, degrees."""
-    theta, phi = math.radians(theta), math.radians(phi)
-    return (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
-
-
 def equal_queries(wi, wo, sigma=2.0, rows=1, centre=(0.3, 0.7)):
     """Return equal queries about one round footprint."""
     ones = np.ones(rows, np.float32)

@@ -44,7 +44,7 @@ def test_the_exact_answers_are_what_is_known_without_an_integral():
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_answers_are_exact_within_the_errors_they_state(estimator):
+def test_answers_are_exact_within_the_errors_they_state_also_under_a_lamp_at_the_eye(estimator):
     """3 of 1,000 lie beyond their bounds; the rms error is at most about that of the standard errors, and 1 %. For a
     table without refinement cylinders are the worst cloth: all borders of shadows lie alike, across nodes. Without the
     neighbour's shadow diffuse light would be 17 % off."""
@@ -60,6 +60,13 @@ def test_answers_are_exact_within_the_errors_they_state(estimator):
     rms = np.sqrt(np.mean(np.square(wrong[:, :2] / size[:, None]).sum(axis=1)))
     assert rms < (0.02 if estimator == "node_table" else 0.01)
     assert np.sqrt(np.mean(wrong**2)) < 1.5 * np.sqrt(np.mean(stated**2)) + 1e-6
+    # Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction.
+    fabric, least = woven("cotton_twill", blend=0.0), 1.5 if estimator == "node_table" else 0.3
+    queries = draw_queries(QueryOptions(sigma=(least, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 40)
+    options = answering(estimator, max_count=256)
+    found = estimate(fabric, queries._replace(wi=queries.wo), options, 1).mean[:, 2:].sum(axis=1)
+    # Tables interpolate the horizon of light and viewer alike: a node is seen and lit, or neither.
+    np.testing.assert_allclose(found * math.pi, queries.wo[:, 2], rtol=2e-3)
 
 
 def order(counts, errors):
@@ -80,7 +87,7 @@ def test_points_converge_by_their_order(estimator, low, high):
     assert low < order(counts, errors) < high, errors
 
 
-def test_cut_rules_converge_faster_than_uncut_ones():
+def test_cut_rules_converge_faster_than_uncut_ones_and_tables_with_their_nodes():
     """Nodes an axis 4, 8, 16, 32: a shadow's edge on a line that is not cut there errs by a node, of order 1."""
     model, columns = cloth_side(ROUND, TruthOptions()), columns_of(ASKED)
     levels, errors = np.arange(1, 5), {}
@@ -93,10 +100,7 @@ def test_cut_rules_converge_faster_than_uncut_ones():
     nodes = 2.0 ** (levels + 1)
     assert 0.5 < order(nodes, errors[9]) < 1.6, errors
     assert order(nodes, errors[2]) > 1.7 and errors[2][-1] < 0.2 * errors[9][-1], errors
-
-
-def test_tables_converge_with_their_nodes():
-    """A border of a shadow is placed between two nodes by their margins: of order 1 at least, 2 at best."""
+    # A border of a shadow is placed between two nodes by their margins: of order 1 at least, 2 at best.
     cloth, columns, index = cloth_side(ROUND, TruthOptions()), columns_of(ASKED), np.arange(len(ASKED.u))
     counts, errors = [8, 16, 32, 64], []
     for count in counts:
@@ -104,14 +108,3 @@ def test_tables_converge_with_their_nodes():
         found = table.answer(cloth, columns, index, *NOT_REFINED, 0)
         errors.append(rms(of_warp(found.mean[:, :4], found.mean[:, 4])))
     assert order(counts, errors) > 1.0 and errors[2] < 2e-3, errors
-
-
-@pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_a_lamp_at_the_eye_lights_all_that_is_seen(estimator):
-    """Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction."""
-    fabric, least = woven("cotton_twill", blend=0.0), 1.5 if estimator == "node_table" else 0.3
-    queries = draw_queries(QueryOptions(sigma=(least, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 40)
-    options = answering(estimator, max_count=256)
-    found = estimate(fabric, queries._replace(wi=queries.wo), options, 1).mean[:, 2:].sum(axis=1)
-    # Tables interpolate the horizon of light and viewer alike: a node is seen and lit, or neither.
-    np.testing.assert_allclose(found * math.pi, queries.wo[:, 2], rtol=2e-3)

@@ -125,7 +125,7 @@ def test_a_slab_that_is_not_reciprocal_and_colour_that_does_not_add_up_are_found
     assert broken(getattr(invariants, test)) == [found]
 
 
-def test_the_worst_of_many_is_called_broken_as_rarely_as_stated():
+def test_the_worst_of_many_with_its_error_is_broken_as_rarely_as_stated_and_exact_numbers_at_once():
     """Under Student's t with 15 degrees of freedom, 4,000 families of 24 numbers: Poisson, mean 4,000 SIGNIFICANCE."""
     families = 4000
     numbers = np.random.default_rng(1).standard_t(15, (families, 24))
@@ -135,9 +135,6 @@ def test_the_worst_of_many_is_called_broken_as_rarely_as_stated():
         # And not much more rarely: numbers twice as far off are called broken many times.
         wide = sum(worst("t", 2 * row, 0.0, np.ones(24), 15, relation).status == "broken" for row in numbers)
         assert wide > 20
-
-
-def test_the_worst_is_returned_with_its_own_error():
     item = worst("x", [1.0, 1.2, 0.7], 1.0, [0.1, 0.1, 0.5], 15)
     assert (item.measured, item.standard_error, item.status) == (1.2, 0.1, "statistics")
     assert item.sigmas == pytest.approx(2.0)
@@ -145,9 +142,6 @@ def test_the_worst_is_returned_with_its_own_error():
     assert worst("x", [0.5, 1.2], 1.0, [0.01, 0.01], 15, "<=").status == "broken"
     assert worst("x", [1.0, math.nan], 1.0, [0.1, 0.1], 15).status == "broken"
     assert worst("x", 1.0, 1.0, math.nan, 15).status == "broken"
-
-
-def test_numbers_without_error_are_exact_or_broken():
     assert exact("x", 1e-7, 0.0, 1e-6).status == "exact"
     assert exact("x", 2e-6, 0.0, 1e-6).status == "broken"
     assert exact("x", -5.0, 0.0, 0.0, "<=").status == "exact"

@@ -15,9 +15,10 @@ from pipeline.truth.geometry.pieces import reference_plane
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.scattering.thread_colours import component_colours
-from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, direction, equal_queries, woven
+from tests.directions import unit
+from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, equal_queries, woven
 from tests.presets import slow
-from weaves.errors import BadInput
+from tests.refusals import refusal
 from weaves.validation import validated
 
 COLOUR = np.array([0.2, 0.2, 0.5, 0.5])
@@ -50,7 +51,7 @@ def test_rays_and_displaced_points_of_the_fabric_have_the_same_mean(fabric, sigm
 @pytest.mark.parametrize("estimator", ["mc", "r2", "owen", "auto"])
 @pytest.mark.parametrize("degrees", [slow(0.0), slow(50.0), 80.0])
 def test_a_footprint_of_a_repeat_sees_no_parallax(estimator, degrees):
-    query = equal_queries(direction(35.0, 200.0), direction(degrees, 70.0), sigma=4.0)
+    query = equal_queries(unit(35.0, 200.0), unit(degrees, 70.0), sigma=4.0)
     rays, flat = (_answers(LOPSIDED, query, parallax, estimator, walls="left_out") for parallax in (True, False))
     assert (np.abs(rays.mean - flat.mean) < 4 * np.hypot(rays.standard_error, flat.standard_error) + 1e-6).all()
     doubt = np.hypot(rays.transparency_standard_error, flat.transparency_standard_error)
@@ -62,7 +63,7 @@ def test_the_mean_over_places_does_not_depend_on_the_size_of_the_footprint(degre
     """Where no ray meets a wall: warps that never bend, side by side, seen across, of which each hides a part. The mean
     over a lattice of 256 places errs by less than .2 % for a smooth integrand with a few kinks."""
     fabric = woven("denim", ("##", "##"), {"width": 1.0})
-    wi, wo = direction(30.0, 120.0), direction(degrees, 0.0)
+    wi, wo = unit(30.0, 120.0), unit(degrees, 0.0)
     small = equal_queries(wi, wo, sigma=0.03, rows=256)
     small = small._replace(u=np.float32(np.arange(256) / 128))
     wide = equal_queries(wi, wo, sigma=4.0)
@@ -76,7 +77,7 @@ def test_the_mean_over_places_does_not_depend_on_the_size_of_the_footprint(degre
 @pytest.mark.parametrize("walls", [slow("left_out"), "rim"])
 def test_with_rims_no_place_weighs_less(walls):
     """A satin, of which a tenth of the rays meet walls; 4,096 places of a lattice, whose mean has an error of .5 %."""
-    fabric, wi, wo = woven("satin_8"), direction(30.0, 115.0), direction(60.0, 29.0)
+    fabric, wi, wo = woven("satin_8"), unit(30.0, 115.0), unit(60.0, 29.0)
     wide, number = equal_queries(wi, wo, sigma=24.0), np.arange(4096)
     small = equal_queries(wi, wo, sigma=0.03, rows=4096)
     small = small._replace(u=np.float32(number * 0.75487767 % 1 * 8), v=np.float32(number * 0.56984029 % 1 * 8))
@@ -91,10 +92,8 @@ def test_with_rims_no_place_weighs_less(walls):
     {"estimator": "quadrature"}, {"estimator": "quadrature", "walls": "left_out", "footprint": "box"},
 ])  # fmt: skip
 def test_rays_need_the_ply_model_estimators_of_rays_and_a_viewer_not_too_low(options):
-    with pytest.raises(BadInput, match="parallax"):
-        validated(TruthOptions, options, "recipe.toml")
-    with pytest.raises(BadInput, match="89 degrees"):
-        _answers(LOPSIDED, equal_queries(direction(20.0, 0.0), direction(89.5, 50.0)))
+    assert "parallax" in refusal(validated, TruthOptions, options, "recipe.toml")
+    assert "89 degrees" in refusal(_answers, LOPSIDED, equal_queries(unit(20.0, 0.0), unit(89.5, 50.0)))
 
 
 @pytest.mark.parametrize("walls", [slow("left_out"), "rim"])
@@ -120,10 +119,10 @@ def test_a_crest_has_its_own_colour_where_the_viewer_sees_it():
     cloth = coloured(woven("basket", ("##.", ".##", "#.#")), ends=[["red", 1], ["blue", 2]])
     field = height_field(cloth)
     crest = surface_at(field, 0.5, 0.5, 0, 0)
-    wo = direction(78.0, 0.0)
+    wo = unit(78.0, 0.0)
     shift = (crest[2] - reference_plane(field)) * wo[0] / wo[2]
     assert 0.5 < shift < 1.5
-    query = equal_queries(direction(50.0, 0.0), wo, sigma=0.002, centre=((0.5 - shift) % 3, 0.5))
+    query = equal_queries(unit(50.0, 0.0), wo, sigma=0.002, centre=((0.5 - shift) % 3, 0.5))
     options = TruthOptions(relative_error=0.01)
     found = component_colours(cloth, query, options, 1).mean[0, 2]
     np.testing.assert_allclose(found, PALETTE["red"]["diffuse"], atol=1e-6)

@@ -70,14 +70,10 @@ def test_a_cloth_drawn_in_another_way_has_the_same_answers(estimator):
 
 
 @pytest.mark.parametrize("estimator", ALL)
-def test_translation_by_repeats_changes_nothing(estimator):
+def test_translation_by_repeats_changes_nothing_and_a_viewer_behind_sees_the_back(estimator):
     near, far = (answers(LOPSIDED, queries, estimator) for queries in moved_far(any_asked(estimator)))
     np.testing.assert_allclose(far, near, rtol=1e-5, atol=1e-6 * near.max())
-
-
-@pytest.mark.parametrize("estimator", ALL)
-def test_a_viewer_behind_sees_the_back(estimator):
-    """Whatever side the light is on: the back is a cloth of its own."""
+    # Whatever side the light is on: the back is a cloth of its own.
     queries = any_asked(estimator)
     own = answers(LOPSIDED.back(), queries, estimator)
     np.testing.assert_allclose(answers(LOPSIDED, queries.turned(), estimator), own, rtol=1e-5, atol=1e-6)

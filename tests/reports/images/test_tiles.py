@@ -22,19 +22,23 @@ def exr(rgb, alpha):
     return Exr({**{c: rgb[..., i] for i, c in enumerate("RGB")}, "A": np.asarray(alpha, np.float32)}, {})
 
 
-def test_tone_mapping_is_exposure_and_the_srgb_curve():
+def test_tones_are_those_of_the_page_or_of_reinhard_and_a_difference_is_blue_where_dark():
     """Linear .21404 is sRGB 127.5/255 by IEC 61966-2-1; 0 stays 0, what is too bright is cut, no cloth is clear."""
     linear = np.array([[[0.21404 / tiles.EXPOSURE] * 3, [0.0] * 3, [9.0] * 3, [1.0] * 3]])
     shown = decoded(tiles.picture(exr(linear, [[1, 1, 1, 0]])))[0, :: tiles.SCALE]
     assert shown[0, :3].tolist() in ([127] * 3, [128] * 3) and shown[1].tolist() == [0, 0, 0, 255]
     assert shown[2].tolist() == [255, 255, 255, 255] and shown[3].tolist() == [0, 0, 0, 0]
-
-
-def test_difference_is_blue_where_dark_and_red_where_bright():
     truth = exr(np.full((1, 4, 3), 0.5), [[1, 1, 1, 0]])
     shown = exr(np.array([[[0.5] * 3, [0.2] * 3, [0.9] * 3, [5.0] * 3]]), [[1, 1, 1, 0]])
     same, dark, bright, outside = decoded(tiles.difference(shown, truth))[0, :: tiles.SCALE]
     assert np.ptp(same[:3]) < 4 and dark[2] > dark[0] and bright[0] > bright[2] and outside[3] == 0
+    # Grey of luminance L becomes L / (1 + L): 1 becomes a half, and no grey becomes 1.
+    linear = np.linspace(0.0, 1.0, 60).reshape(4, 5, 3)
+    np.testing.assert_array_equal(displayed(linear), encoded(EXPOSURE * linear))
+    grey = np.array([1.0, 1.0, 1.0]) / EXPOSURE
+    np.testing.assert_array_equal(displayed(grey, "reinhard"), encoded(np.full(3, 0.5)))
+    bright = displayed(1e3 * grey, "reinhard", -3.0), displayed(1e3 * grey, "srgb", -3.0)
+    assert bright[0].max() < 255 == bright[1].max()
 
 
 def centres(pixels, rows, columns, top=0, left=0):
@@ -43,7 +47,7 @@ def centres(pixels, rows, columns, top=0, left=0):
     return found[:, (left + np.arange(columns)) * SIDE + SIDE // 2, :3]
 
 
-def test_a_draft_shows_the_loom_that_weaves_its_drawdown_in_the_colours_of_the_threads():
+def test_a_draft_shows_the_loom_in_the_colours_of_the_threads_and_the_largest_one_fits():
     """Threading, tie-up and treadling, read from the picture, lift what the drawdown shows; first end left, below."""
     fabric = load_fabric("houndstooth")
     pixels, count = decoded(draft.draft(fabric)), 16
@@ -57,10 +61,7 @@ def test_a_draft_shows_the_loom_that_weaves_its_drawdown_in_the_colours_of_the_t
     lifted = treadling @ tie_up.T @ threading > 0
     assert (lifted[::-1] == np.tile(fabric.weave.warp_over, (4, 4))).all()
     assert (cells == np.where(lifted, warp, weft)).all() and warp[0].tolist() == [1, 1, 1, 1, 0, 0, 0, 0] * 2
-
-
-def test_floats_have_outlines_and_the_largest_draft_fits():
-    """In a draft of one colour, lines run along the thread on top; 256 ends and shafts are three pixels each."""
+    # In a draft of one colour, lines run along the thread on top; 256 ends and shafts are three pixels each.
     plain = load_fabric("voile")
     white = plain.model_copy(update={"warp": plain.weft})
     pixels = decoded(draft.drawdown(white))[..., 0]
@@ -88,13 +89,3 @@ def test_a_stop_doubles_the_light(tone):
     linear = np.geomspace(1e-3, 0.4, 30).reshape(10, 3)
     for stops in (1.0, -2.0):
         np.testing.assert_array_equal(displayed(linear, tone, stops), displayed(2.0**stops * linear, tone))
-
-
-def test_the_default_is_the_page_and_reinhard_keeps_the_hue_and_never_ends():
-    """Grey of luminance L becomes L / (1 + L): 1 becomes a half, and no grey becomes 1."""
-    linear = np.linspace(0.0, 1.0, 60).reshape(4, 5, 3)
-    np.testing.assert_array_equal(displayed(linear), encoded(EXPOSURE * linear))
-    grey = np.array([1.0, 1.0, 1.0]) / EXPOSURE
-    np.testing.assert_array_equal(displayed(grey, "reinhard"), encoded(np.full(3, 0.5)))
-    bright = displayed(1e3 * grey, "reinhard", -3.0), displayed(1e3 * grey, "srgb", -3.0)
-    assert bright[0].max() < 255 == bright[1].max()

@@ -7,23 +7,6 @@ X = np.arange(96)
 Y = np.arange(64)[:, None]
 
 
-def test_variances_of_pixels_average_to_the_variance():
-    random = np.random.default_rng(5)
-    shown, noise = random.random((4, 6, 7)), 0.1 * random.random((4, 6, 7))
-    variances = temporal_variances(shown, noise)
-    assert variances.shape == (6, 7) and variances.mean() == pytest.approx(temporal_variance(shown, noise), rel=1e-12)
-    # Two frames that differ by d have the variance d^2 / 2.
-    assert temporal_variances(np.array([[1.0, 2.0], [1.0, 5.0]]), 0.5) == pytest.approx([-0.25, 4.5 - 0.25])
-
-
-def test_flicker_of_a_known_sinusoid():
-    """L = 2 + a cos(2 pi f / 8 + phase): over 8 frames the variance is a^2/2 · 8/7; the truth stands still at 2."""
-    moving = 2 + 0.3 * np.cos(2 * np.pi * np.arange(8)[:, None] / 8 + np.linspace(0, 6, 50))
-    still = np.full_like(moving, 2.0)
-    assert flicker(moving, still) == pytest.approx(0.3**2 / 2 * 8 / 7 / 4)
-    assert flicker(still, moving) == pytest.approx(-(0.3**2) / 2 * 8 / 7 / moving.mean() ** 2)
-
-
 @pytest.mark.parametrize(("cycles", "high"), [(0.125, 0.0), (0.375, 1.0)])
 def test_spectrum_of_a_known_sinusoid(cycles, high):
     """a cos(2 pi k x) has the variance a^2/2, all of it at its own frequency: beyond 1/4 or not at all."""
@@ -53,7 +36,7 @@ def test_noise_of_the_truth_is_subtracted():
     assert abs(spectrum(noisy, noise).high) < 5 * energy * np.sqrt(2 * 3 / noisy.size)
 
 
-def test_power_sums_to_the_windowed_variance():
+def test_power_sums_to_the_windowed_variance_and_flicker_is_that_of_a_known_sinusoid():
     random = np.random.default_rng(5)
     picture = random.standard_normal((1, 40, 56))
     window = np.outer(np.hanning(42)[1:-1], np.hanning(58)[1:-1])
@@ -66,6 +49,17 @@ def test_power_sums_to_the_windowed_variance():
     assert (found.power * rings).sum() < variance
     low = (found.power * rings)[found.frequency < 0.25].sum()
     assert low + found.high == pytest.approx(variance, rel=0.01)
+    random = np.random.default_rng(5)
+    shown, noise = random.random((4, 6, 7)), 0.1 * random.random((4, 6, 7))
+    variances = temporal_variances(shown, noise)
+    assert variances.shape == (6, 7) and variances.mean() == pytest.approx(temporal_variance(shown, noise), rel=1e-12)
+    # Two frames that differ by d have the variance d^2 / 2.
+    assert temporal_variances(np.array([[1.0, 2.0], [1.0, 5.0]]), 0.5) == pytest.approx([-0.25, 4.5 - 0.25])
+    # L = 2 + a cos(2 pi f / 8 + phase): over 8 frames the variance is a^2/2 · 8/7; the truth stands still at 2.
+    moving = 2 + 0.3 * np.cos(2 * np.pi * np.arange(8)[:, None] / 8 + np.linspace(0, 6, 50))
+    still = np.full_like(moving, 2.0)
+    assert flicker(moving, still) == pytest.approx(0.3**2 / 2 * 8 / 7 / 4)
+    assert flicker(still, moving) == pytest.approx(-(0.3**2) / 2 * 8 / 7 / moving.mean() ** 2)
 
 
 def test_both_figures_fall_as_one_over_the_number_of_points():

@@ -26,20 +26,31 @@ def test_intervals_cover_under_correlated_noise():
     assert by_blocks >= 170 and by_pixels < 100
 
 
-def test_independent_pixels_have_the_usual_standard_error():
+def test_intervals_are_those_of_the_difference_and_of_independent_pixels():
     """Its own relative error is 1 / sqrt(2 · 90 blocks) = 7 % and that of 500 draws 3 %: 25 % allowed."""
     rows = np.random.default_rng(1).standard_normal(DISC.sum())
     spread, low, high = block_interval(rows, DISC, ImageOptions())
     assert spread == pytest.approx(1 / np.sqrt(rows.size), rel=0.25)
     assert high - low == pytest.approx(2 * 1.96 * spread, rel=0.2)
-
-
-def test_blocks_part_the_mask_and_equal_values_have_an_interval_of_no_width():
     mask = np.ones((64, 96), dtype=bool)
     mask[:, :16] = False
     assert np.bincount(blocks(mask, 16)).tolist() == [256] * (4 * 5)
     assert np.bincount(blocks(mask[:20, 16:], 16)).tolist() == [25] * (4 * 16)  # a quarter of 20 is 5
     assert block_interval(np.full(DISC.sum(), 0.5), DISC, ImageOptions()) == (0, 0.5, 0.5)
+    # Exactly, whatever the noise of the truth is: it enters linearly, and has no bias.
+    a, b = TRUTH + 0.1 * HARD, TRUTH + 0.2 * HARD
+    difference, low, high = mse_difference(a, b, TRUTH, MASK, OPTIONS)
+    assert difference == pytest.approx((0.04 - 0.01) * np.mean(HARD[MASK] ** 2), rel=1e-12)
+    assert low < difference < high and mse_difference(b, a, TRUTH, MASK, OPTIONS)[0] == -difference
+    assert mse_difference(a, a, TRUTH, MASK, OPTIONS) == (0.0, 0.0, 0.0)
+    # Both are off by the same pattern; b by a little more. The pattern varies, the difference hardly does.
+    a = TRUTH + 1.0
+    a[:, :32] += 1.0
+    b = a + 0.01
+    difference, low, high = mse_difference(a, b, TRUTH, MASK, OPTIONS)
+    assert difference == pytest.approx(0.03, rel=0.1)
+    # By itself, a picture's MSE is 1 in one half and 4 in the other.
+    assert low > 0.0 and high - low < 0.02
 
 
 RANDOM = np.random.default_rng(5)
@@ -48,23 +59,3 @@ MASK = RANDOM.random(SIZE) < 0.8
 TRUTH = RANDOM.random((*SIZE, 3)) + 0.5
 HARD = RANDOM.standard_normal((*SIZE, 3)) * np.linspace(0.1, 3.0, SIZE[1])[:, None]
 OPTIONS = ImageOptions(block=8, resamples=300)
-
-
-def test_it_is_the_difference_of_both_mean_squared_errors():
-    """Exactly, whatever the noise of the truth is: it enters linearly, and has no bias."""
-    a, b = TRUTH + 0.1 * HARD, TRUTH + 0.2 * HARD
-    difference, low, high = mse_difference(a, b, TRUTH, MASK, OPTIONS)
-    assert difference == pytest.approx((0.04 - 0.01) * np.mean(HARD[MASK] ** 2), rel=1e-12)
-    assert low < difference < high and mse_difference(b, a, TRUTH, MASK, OPTIONS)[0] == -difference
-    assert mse_difference(a, a, TRUTH, MASK, OPTIONS) == (0.0, 0.0, 0.0)
-
-
-def test_what_both_err_alike_does_not_widen_the_interval():
-    """Both are off by the same pattern; b by a little more. The pattern varies, the difference hardly does."""
-    a = TRUTH + 1.0
-    a[:, :32] += 1.0
-    b = a + 0.01
-    difference, low, high = mse_difference(a, b, TRUTH, MASK, OPTIONS)
-    assert difference == pytest.approx(0.03, rel=0.1)
-    # By itself, a picture's MSE is 1 in one half and 4 in the other.
-    assert low > 0.0 and high - low < 0.02

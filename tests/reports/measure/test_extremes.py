@@ -58,7 +58,7 @@ def test_far_places_are_the_same_places_to_the_last_bit(repeat):
     assert {math.degrees(math.acos(z)) > 89.8 for z in asked.queries.wi[~asked.grazing, 2]} == {False}
 
 
-def test_closed_forms():
+def test_closed_forms_and_places_and_sizes_that_change_the_answer():
     """The truth itself; 1.1 times the truth, 10 % wrong everywhere; and what that one is from the first."""
     found = measured(Scaled(), Scaled(1.1, "brighter"))
     assert found["", "extreme_error"].value == 0.0 and found["", "extreme_grazing"].value == 0.0
@@ -70,6 +70,16 @@ def test_closed_forms():
     for metric in ("extreme_far", "extreme_not_finite", "extreme_negative"):
         assert found["", metric].value == 0.0
     assert {record.fabric for record in found.values()} == {LINING.name}, "what is not covered is not asked"
+    drift = Scaled(spoil=lambda answers, queries: answers * np.float32(1.0 + 1e-7 * queries.u[:, None]))
+    assert measured(drift)["", "extreme_far"].value == pytest.approx(0.1, rel=0.01)
+    shrink = Scaled(spoil=lambda answers, queries: answers * np.where(queries.sigma > 1e4, 0.75, 1.0)[:, None])
+    found = measured(shrink)
+    assert found["", "extreme_far"].value == 0.0 and found["", "extreme_large"].value == pytest.approx(0.25, rel=0.02)
+    found = measured(Scaled(spoil=spoilt))
+    # Near and far: 18 queries a footprint, each twice.
+    assert found["", "extreme_not_finite"].value == 2 * 2 * 18 and found["", "extreme_negative"].value == 2 * 18
+    assert [size for size, _ in found["", "extreme_error"].curve] == [1e-2, 1.0, 1e4]
+    assert ("", "extreme_large") not in found, "no pair is finite"
 
 
 def test_viewers_too_low_for_parallax_have_no_truth(monkeypatch):
@@ -93,22 +103,6 @@ def spoilt(answers, queries):
     answers[queries.sigma > 1e4, 2] = -1.0
     answers[(queries.sigma > 100) & (queries.sigma < 1e3), 0] = np.inf
     return answers
-
-
-def test_what_cannot_be_is_counted_and_leaves_the_rest_to_be_measured():
-    found = measured(Scaled(spoil=spoilt))
-    # Near and far: 18 queries a footprint, each twice.
-    assert found["", "extreme_not_finite"].value == 2 * 2 * 18 and found["", "extreme_negative"].value == 2 * 18
-    assert [size for size, _ in found["", "extreme_error"].curve] == [1e-2, 1.0, 1e4]
-    assert ("", "extreme_large") not in found, "no pair is finite"
-
-
-def test_places_and_sizes_that_change_the_answer_are_seen():
-    drift = Scaled(spoil=lambda answers, queries: answers * np.float32(1.0 + 1e-7 * queries.u[:, None]))
-    assert measured(drift)["", "extreme_far"].value == pytest.approx(0.1, rel=0.01)
-    shrink = Scaled(spoil=lambda answers, queries: answers * np.where(queries.sigma > 1e4, 0.75, 1.0)[:, None])
-    found = measured(shrink)
-    assert found["", "extreme_far"].value == 0.0 and found["", "extreme_large"].value == pytest.approx(0.25, rel=0.02)
 
 
 @pytest.mark.parametrize("cloth", [LINING, lustrous(TWILL)], ids=lambda fabric: fabric.name)

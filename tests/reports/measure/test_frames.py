@@ -12,12 +12,16 @@ def frames(tmp_path_factory, options):
     return path
 
 
-def test_frames_lie_one_below_the_other_and_move(frames, options):
+def test_frames_move_one_below_the_other_and_their_truth_has_the_motions_variance(frames, options):
     width, height = options.frame_size
     plane = read_exr(frames).channels["Y"]
     assert plane.shape == (3 * height, width)
     first, second = plane[:height], plane[height : 2 * height]
     assert (first[-1] > 0).all() and (first != second).any()
+    motion, spectrum = measure_truth_frames(load_fabric("denim"), options, frames)
+    assert (motion.metric, spectrum.metric) == ("motion", "spectrum") and 0 < motion.value < 0.2
+    frequency = [k for k, _ in spectrum.curve]
+    assert frequency == sorted(frequency) and 0 < frequency[0] < frequency[-1] < 0.5
 
 
 def test_point_sampling_aliases_and_the_truth_does_not(frames, options, points, oracle):
@@ -34,10 +38,3 @@ def test_point_sampling_aliases_and_the_truth_does_not(frames, options, points, 
     own = measured(oracle)
     for metric in ("flicker", "excess_energy"):
         assert one[metric] > 4 * sixteen[metric] > 0 and abs(own[metric]) < 0.1 * sixteen[metric]
-
-
-def test_truth_has_a_spectrum_and_the_motions_variance(frames, options):
-    motion, spectrum = measure_truth_frames(load_fabric("denim"), options, frames)
-    assert (motion.metric, spectrum.metric) == ("motion", "spectrum") and 0 < motion.value < 0.2
-    frequency = [k for k, _ in spectrum.curve]
-    assert frequency == sorted(frequency) and 0 < frequency[0] < frequency[-1] < 0.5

@@ -22,15 +22,23 @@ def lambertian(queries):
     return np.stack([0 * cosine + 0.1, 0 * cosine, cosine / math.pi, 0 * cosine], axis=1)
 
 
-def test_closed_forms():
+def test_closed_forms_both_sides_add_up_and_a_method_may_know_one():
     """A white Lambertian surface returns all, f = .1 returns .2 pi; R2 with 256 points is good to half a per cent."""
     values = {record.metric: record.value for record in measure_furnace(FakeMethod(lambertian), load_fabric("denim"))}
     assert values["furnace_diffuse"] == pytest.approx(1.0, abs=5e-3)
     assert values["furnace_specular"] == pytest.approx(0.2 * math.pi, rel=1e-5)
 
+    def front(queries):
+        refuse_other(queries, "fake answers")
+        return lambertian(queries)
 
-def test_both_sides_and_what_goes_straight_through_add_up():
-    """A quarter back, a third through, diffuse; half of what is behind is seen straight: in colours of one channel."""
+    metrics = [record.metric for record in measure_furnace(FakeMethod(front), load_fabric("denim"))]
+    assert metrics == ["furnace_diffuse", "furnace_specular", "furnace_colour"]
+    queries = furnace_queries((4, 4))
+    lights = queries.wi.reshape(-1, DIRECTIONS, 3)
+    np.testing.assert_array_equal(lights, np.broadcast_to(lights[0], lights.shape))
+    assert (queries.wo.reshape(-1, DIRECTIONS, 3) == queries.wo[::DIRECTIONS, None]).all()
+    # A quarter back, a third through, diffuse; half of what is behind is seen straight: in colours of one channel.
     denim = load_fabric("denim")
     black, red = (0.0, 0.0, 0.0), (0.5, 0.0, 0.0)
     warp = denim.warp.model_copy(update={"specular": black, "diffuse": red, "diffuse_transmission": red})
@@ -45,22 +53,6 @@ def test_both_sides_and_what_goes_straight_through_add_up():
     values = {record.metric: record.value for record in measure_furnace(method, fabric)}
     assert values["furnace_colour"] == pytest.approx(0.5 / 4, abs=2e-3)
     assert values["furnace_all"] == pytest.approx(0.5 / 4 + 0.5 / 3 + 0.5, abs=4e-3)
-
-
-def test_a_method_that_knows_one_side_has_no_figure_of_both():
-    def front(queries):
-        refuse_other(queries, "fake answers")
-        return lambertian(queries)
-
-    metrics = [record.metric for record in measure_furnace(FakeMethod(front), load_fabric("denim"))]
-    assert metrics == ["furnace_diffuse", "furnace_specular", "furnace_colour"]
-
-
-def test_every_patch_sees_the_same_lights():
-    queries = furnace_queries((4, 4))
-    lights = queries.wi.reshape(-1, DIRECTIONS, 3)
-    np.testing.assert_array_equal(lights, np.broadcast_to(lights[0], lights.shape))
-    assert (queries.wo.reshape(-1, DIRECTIONS, 3) == queries.wo[::DIRECTIONS, None]).all()
 
 
 def test_the_truth_makes_no_light(monkeypatch):

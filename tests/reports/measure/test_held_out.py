@@ -23,13 +23,10 @@ def test_more_points_err_less_and_the_truth_hardly(dataset, points, oracle):
     }
 
 
-def test_repeats_agree_and_random_methods_draw_anew_with_another_seed(dataset, points):
+def test_repeats_agree_random_methods_draw_anew_and_truth_reports_its_own_error(dataset, points):
     few = HeldOutFabric(dataset[0].fabric, dataset[0].queries.take(slice(100)), dataset[0].truth.take(slice(100)))
     first, again, other = (measure_errors(points[0], few, seed) for seed in (0, 0, 1))
     assert first == again and first[0].count == 100 and first[0].value != other[0].value
-
-
-def test_truth_reports_its_own_error(dataset):
     record, truth = measure_truth(dataset[0]), dataset[0].truth
     size = np.linalg.norm(truth.mean, axis=1)
     ratio = np.linalg.norm(truth.standard_error, axis=1)[size > 0] / size[size > 0]

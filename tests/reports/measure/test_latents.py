@@ -41,7 +41,7 @@ def measured():
     return [record for pair in (yarns, draft) for record in measure_paths(Truth(), pair, ASKED, TRUTH, rows=128)]
 
 
-def test_pairs_differ_in_one_thing_and_have_one_repeat():
+def test_pairs_differ_in_one_thing_and_between_are_the_numbers_in_between():
     chosen = pairs()
     assert {pair.about for pair in chosen} == {f"{pair.differs} of {pair.second.name}" for pair in chosen}
     assert {pair.differs for pair in chosen} == {"yarns", "draft"}
@@ -50,9 +50,6 @@ def test_pairs_differ_in_one_thing_and_have_one_repeat():
         assert (pair.first.weave == pair.second.weave) == (pair.differs == "yarns")
         same = (pair.first.warp, pair.first.weft) == (pair.second.warp, pair.second.weft)
         assert same == (pair.differs == "draft") and Fabric.model_validate(between(pair, 0.5).model_dump())
-
-
-def test_between_are_the_numbers_in_between():
     pair = pairs()[0]
     assert between(pair, 0.0).optics() == pair.first.optics() and between(pair, 1.0).optics() == pair.second.optics()
     quarter = between(pair, 0.25)

@@ -21,8 +21,6 @@ def flat():
 
 
 class Truth(FakeMethod):
-    """The truth as a method."""
-
     def predict(self, fabric, queries, seed=0):
         return estimate(fabric, queries, TINY.truth, TINY.seed).mean
 
@@ -30,7 +28,7 @@ class Truth(FakeMethod):
         return coverage(fabric, looks, TINY.truth, TINY.seed)[0]
 
 
-def test_pixels_see_the_cylinder_as_the_camera_does():
+def test_pixels_see_the_cylinder_and_a_flat_method_is_black_where_the_light_is_behind():
     queries = edge_queries(TINY, (4, 4))
     assert len(queries.u) == 5 * 6
     distance = 10.0 - 0.025 * (np.arange(6)[::-1] + 0.5)
@@ -44,6 +42,10 @@ def test_pixels_see_the_cylinder_as_the_camera_does():
     np.testing.assert_allclose((queries.wi * queries.wo).sum(axis=1), expected, atol=1e-6)
     # Light from the edge's side: straight into the normal where the normal is turned to it.
     assert (queries.wi[:, 2] > 0.7).all()
+    lit_from_behind = TINY.model_copy(update={"light": (-120.0, 0.0)})
+    method = flat()
+    edge = edge_of(method, DENIM, lit_from_behind)
+    assert len(method.asked[0].u) == 0 and (edge.light == 0).all() and (edge_of(method, DENIM, TINY).light > 0).all()
 
 
 @pytest.fixture(scope="module")
@@ -53,15 +55,12 @@ def rendered(tmp_path_factory):
     return path
 
 
-def test_the_file_holds_the_edge_and_the_truth_finds_it(rendered):
+def test_the_file_holds_the_edge_which_the_truth_finds_and_a_flat_method_does_not(rendered):
     truth, found = true_edge(DENIM, TINY), read_edge(rendered)
     np.testing.assert_allclose(found.coverage, truth.coverage, atol=1e-7)
     np.testing.assert_allclose(found.light, truth.light, rtol=1e-6, atol=1e-9)
     values = [record.value for record in measure_silhouette(Truth(), DENIM, TINY, rendered)]
     assert values == pytest.approx([0.0, 0.0, 0.0], abs=1e-7)
-
-
-def test_a_flat_method_covers_everything_and_is_asked_flat(rendered):
     method, truth = flat(), read_edge(rendered)
     records = measure_silhouette(method, DENIM, TINY, rendered)
     assert {(r.method, r.fabric) for r in records} == {("fake", "denim")}
@@ -71,10 +70,3 @@ def test_a_flat_method_covers_everything_and_is_asked_flat(rendered):
     assert values["displacement"] == pytest.approx(0.15 * (1 - truth.coverage.mean()))
     wrong = edge_of(flat(), DENIM, TINY).light - truth.light
     assert values["light"] == pytest.approx(np.sqrt((wrong**2).mean())) and (method.asked[0].curvature == 0).all()
-
-
-def test_a_flat_method_is_black_where_the_light_is_behind():
-    lit_from_behind = TINY.model_copy(update={"light": (-120.0, 0.0)})
-    method = flat()
-    edge = edge_of(method, DENIM, lit_from_behind)
-    assert len(method.asked[0].u) == 0 and (edge.light == 0).all() and (edge_of(method, DENIM, TINY).light > 0).all()

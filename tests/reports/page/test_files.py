@@ -14,13 +14,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_what_is_listed_is_read(folder):
+def test_what_is_listed_is_read_and_files_of_an_earlier_page_are_removed(folder):
     write_files(folder, ["records.json", "figures/a.png"])
     assert read_files(folder) == {"figures/a.png": ABC, "records.json": ABC}
-
-
-def test_files_of_an_earlier_page_are_removed_and_others_kept(folder):
-    write_files(folder, ["records.json", "figures/a.png"])
     (folder / "results.md").write_text("by another hand")
     write_files(folder, ["records.json"])
     assert sorted(path.name for path in folder.rglob("*.*")) == [FILES, "records.json", "results.md"]

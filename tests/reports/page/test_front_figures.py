@@ -23,7 +23,7 @@ def costs(table):
     return table[table["role"] == "seen"].set_index(["method", "setting"])["ns"]
 
 
-def test_the_front_and_the_settings_of_methods_are_curves(table, costs):
+def test_settings_are_curves_flicker_a_distance_and_bytes_have_a_front_of_their_own(table, costs):
     """Made up: points of k cost 400 k and err 1/k, woven and NeuMIP lie at k = 9 like points: all are on the front
     but NeuMIP, which costs more than woven at the same error."""
     figure = front_figures.error_against_time(LIGHT, table)
@@ -35,10 +35,7 @@ def test_the_front_and_the_settings_of_methods_are_curves(table, costs):
     assert {text.get_text() for text in figure.axes[0].texts} == {"1", "2", "64", ""}  # 2 is the baseline, "" the arrow
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     assert names == ["woven", "NeuMIP", "points", "woven in its paper: 2.0× lower at 0.83× the time"]
-
-
-def test_flicker_is_drawn_as_its_distance_from_the_truths(table, costs):
-    """Made up: points flicker by .3 / k at 400 k ns; woven, whose flicker is -.001, is on the front at k = 9's time."""
+    # Made up: points flicker by .3 / k at 400 k ns; woven, whose flicker is -.001, is on the front at k = 9's time.
     figure = front_figures.aliasing_against_time(LIGHT, table)
     band = dict(zip(*(figure.axes[0].lines[0].get_xydata().T), strict=True))
     assert band[costs["woven", ""]] == pytest.approx(1e-3)
@@ -46,16 +43,13 @@ def test_flicker_is_drawn_as_its_distance_from_the_truths(table, costs):
     # Beyond woven nothing flickers less: 64 points flicker by .3 / 64.
     assert costs["point_sampled", "k = 64"] not in band and costs["neumip", ""] not in band
     assert not any("paper" in text.get_text() for text in figure.legends[0].get_texts())
-
-
-def test_error_against_bytes_has_a_front_of_its_own(table):
-    """Made up: methods store 2,000 bytes and their index: woven the fewest; points err less than it from 16 on."""
+    # Made up: methods store 2,000 bytes and their index: woven the fewest; points err less than it from 16 on.
     figure = front_figures.error_against_bytes(LIGHT, table)
     band = figure.axes[0].lines[0].get_xydata()
     assert list(band[:, 0]) == [2000.0, 2005.0, 2006.0]  # woven, then 16 and 64 points
 
 
-def test_scenes_mark_their_fronts_and_the_papers_step():
+def test_scenes_mark_their_fronts_and_what_cannot_be_drawn_has_no_panel():
     attic = [
         ("attic", "point_sampled", "k = 2", 0.2, 0.4, -0.1, 10.0),
         ("attic", "point_sampled", "k = 16", 0.02, 0.2, 0.01, 80.0),
@@ -70,10 +64,7 @@ def test_scenes_mark_their_fronts_and_the_papers_step():
     (arrow,) = [text for text in above.texts if text.arrow_patch]
     assert arrow.xy == pytest.approx((8.3, 0.2 / 4.1)) and not below.texts
     assert figure.legends[0].get_texts()[-1].get_text() == "woven in its paper: 4.1× lower at 0.83× the time"
-
-
-def test_what_cannot_be_drawn_has_no_panel():
-    """One scene was not timed; in the other nothing flickers."""
+    # One scene was not timed; in the other nothing flickers.
     scenes = [("attic", "woven", "", 0.2, 0.4, -0.1, math.nan), ("cellar", "woven", "", 0.2, 0.4, 0.0, 5.0)]
     table = pd.DataFrame(scenes, columns=SCENES)
     figure = front_figures.scenes(LIGHT, table)

@@ -31,7 +31,7 @@ def drawn():
     return figure, texts, [Text.get_window_extent(text, canvas.get_renderer()) for text in texts]
 
 
-def test_no_label_covers_another_or_a_mark_or_leaves_its_panel(drawn):
+def test_no_label_covers_another_or_a_mark_and_those_far_off_are_joined_to_theirs(drawn):
     figure, texts, boxes = drawn
     assert len(boxes) == 20 and not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
     half = MARK * figure.dpi / 72
@@ -42,11 +42,7 @@ def test_no_label_covers_another_or_a_mark_or_leaves_its_panel(drawn):
             for x, y in text.axes.transData.transform(line.get_xydata()):
                 away = max(box.x0 - x, x - box.x1, box.y0 - y, y - box.y1)
                 assert away >= half - 1e-6
-
-
-def test_labels_far_from_their_marks_are_joined_to_them(drawn):
-    """A label without a line touches the ring of `UNJOINED` points round its mark."""
-    figure, texts, boxes = drawn
+    # A label without a line touches the ring of `UNJOINED` points round its mark.
     joined = [text.arrow_patch.get_visible() for text in texts]
     assert any(joined) and not all(joined)
     for text, box, line in zip(texts, boxes, joined, strict=True):

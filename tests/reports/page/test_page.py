@@ -31,7 +31,7 @@ def sizes(folder):
     return {path.name: size_of(path.read_bytes()) for path in (folder / "figures").iterdir()}
 
 
-def test_page_is_whole_and_needs_nothing_else(folder, page):
+def test_a_page_is_whole_with_plots_on_a_clear_ground(folder, page):
     assert not [link for link in page.files if urlparse(link).scheme or not (folder / link).is_file()]
     assert set(page.targets) <= set(page.ids) and len(set(page.ids)) == len(page.ids)
     (script,) = page.all("script")
@@ -40,20 +40,25 @@ def test_page_is_whole_and_needs_nothing_else(folder, page):
     assert made <= set(page.files)
     assert (folder / "live" / "denim.html").read_bytes() == b"<title>denim</title>"
     assert "live/denim.html" in page.files and "live/denim.html" in read_files(folder)
-
-
-def test_plots_have_a_clear_ground_and_ink_on_it(folder):
     for name, scheme in itertools.product(WORDS["plots"], ("light", "dark")):
         picture = matplotlib.image.imread(folder / "figures" / f"{name}-{scheme}.png")
         assert picture.shape[1] > 1500 and picture[0, 0, 3] == 0, name
         assert (picture[..., 3] == 1).mean() > 0.002, name
 
 
-def test_equal_data_give_equal_bytes(folder, page_input):
+def test_equal_data_give_equal_bytes_and_records_and_their_machine_are_kept(folder, page_input):
     timing = summary.timing_table(page_input.records)
     for name, scheme in schemes(page_input).items():
         drawn = render(figures.timing, scheme, timing)
         assert drawn == (folder / "figures" / f"timing-{name}.png").read_bytes() and b"Software" not in drawn
+    assert read_records([folder / OF_A_PAGE]) == page_input.records
+    machine = read_machine(folder / OF_A_PAGE)
+    assert machine.model_copy(update={"sha256": ""}) == page_input.machine
+    table = pd.read_csv(folder / "tables" / "records.csv")
+    assert table["value"].to_numpy() == pytest.approx([record.value for record in page_input.records])
+    assert {"dataset", "seed", "threads"} < {*table} and {"curve", "samples"}.isdisjoint(table)
+    for csv in (folder / "tables").glob("*.csv"):
+        assert list(pd.read_csv(csv)) == list(pd.read_parquet(csv.with_suffix(".parquet")))
 
 
 @pytest.mark.slow
@@ -63,17 +68,6 @@ def test_the_same_records_give_the_same_bytes(folder, page_input, tmp_path):
         {path.relative_to(where): path.read_bytes() for path in where.rglob("*.*")} for where in (folder, tmp_path)
     )
     assert first == second
-
-
-def test_page_keeps_its_records_and_the_machine_of_the_times(folder, page_input):
-    assert read_records([folder / OF_A_PAGE]) == page_input.records
-    machine = read_machine(folder / OF_A_PAGE)
-    assert machine.model_copy(update={"sha256": ""}) == page_input.machine
-    table = pd.read_csv(folder / "tables" / "records.csv")
-    assert table["value"].to_numpy() == pytest.approx([record.value for record in page_input.records])
-    assert {"dataset", "seed", "threads"} < {*table} and {"curve", "samples"}.isdisjoint(table)
-    for csv in (folder / "tables").glob("*.csv"):
-        assert list(pd.read_csv(csv)) == list(pd.read_parquet(csv.with_suffix(".parquet")))
 
 
 def test_the_headline_and_the_front(folder, page):
@@ -206,7 +200,7 @@ def test_every_picture_has_its_size_and_what_is_not_seen_at_first_can_be_opened(
     assert all("summary" in title["within"] for title in page.all("h2") if title["text"] == "Energy")
 
 
-def test_headings_and_landmarks(page):
+def test_headings_landmarks_and_names_of_everything(page):
     levels = [int(heading["tag"][1]) for heading in page.all("h1", "h2", "h3", "h4", "h5", "h6")]
     assert levels[0] == 1 and levels.count(1) == 1
     assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
@@ -217,10 +211,7 @@ def test_headings_and_landmarks(page):
     assert page.all("html")[0]["lang"] == "en" and page.all("title")[0]["text"]
     first, (main,) = page.all("a")[0], page.all("main")
     assert first["href"] == f"#{main['id']}" and first["class"] == "skip" and main["tabindex"] == "-1"
-
-
-def test_everything_has_a_name(page):
-    """Headings, links, pictures, tables, and what scrolls; a link round a picture has the words of the picture."""
+    # Headings, links, pictures, tables, and what scrolls; a link round a picture has the words of the picture.
     assert all(heading["text"].strip() for heading in page.all("h1", "h2", "h3", "caption"))
     assert all(link["text"].strip() or link["pictures"] for link in page.all("a", "button", "summary"))
     sources = {}
@@ -237,17 +228,14 @@ def test_everything_has_a_name(page):
             assert element["tabindex"] == "0" and element["role"] == "region" and element["aria-label"].strip()
 
 
-def test_pictures_are_enlarged_in_a_dialog_without_other_files(page):
+def test_pictures_are_enlarged_in_a_dialog_and_the_style_takes_its_colours_from_the_schemes(page):
     (dialog,) = page.all("dialog")
     assert dialog["aria-label"] and any("data-close" in button for button in page.all("button"))
     enlarged = {link["href"] for link in page.all("a") if link.get("class") == "enlarge"}
     for stem in ("denim-sphere-truth", "denim-plane-woven", "scene-attic-woven", "denim-drawdown"):
         assert f"figures/{stem}.png" in enlarged
     assert "http" not in "".join(element["text"] for element in page.all("script", "style"))
-
-
-def test_the_style_has_no_motion_and_takes_its_colours_from_the_schemes(page):
-    """Smooth scrolling is the only motion, and stands within its media query; contrast is tested in test_colours.py."""
+    # Smooth scrolling is the only motion, and stands within its media query; contrast is tested in test_colours.py.
     style = page.all("style")[0]["text"]
     assert not re.search(r"animation|transition", style)
     outside = re.sub(r"@media \(prefers-reduced-motion: no-preference\) \{.*?\} \}", "", style)

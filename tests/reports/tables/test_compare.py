@@ -34,23 +34,20 @@ def verdicts(a, b):
     return [one.result for one in (*found.times, *found.errors)]
 
 
-def test_a_shift_of_5_percent_is_marked_and_only_where_it_is():
+def test_a_shift_of_5_percent_is_marked_and_nothing_where_nothing_differs():
     """25 readings with 2 % noise: the shift is 2.5 sigmas, U lies 5.6 sigmas off, and is missed once in 500 times."""
     random = np.random.default_rng(1)
     a, b = readings(random), readings(random)
     slower, faster = readings(random, 1050.0), readings(random, 950.0)
     found = verdicts(a, [slower[0], faster[1], *b[2:]])
     assert found == ["slower", "faster", *["no difference shown"] * 6]
-
-
-def test_nothing_is_marked_where_nothing_differs():
-    """Of 200 comparisons of 8 equal methods at most 5 % mark any: 19 or more do with a chance below 1 %."""
+    # Of 200 comparisons of 8 equal methods at most 5 % mark any: 19 or more do with a chance below 1 %.
     random = np.random.default_rng(2)
     marked = sum(set(verdicts(readings(random), readings(random))) != {"no difference shown"} for _ in range(200))
     assert LEVEL == 0.05 and marked < 19
 
 
-def test_errors_are_held_against_their_standard_errors():
+def test_errors_are_held_against_their_standard_errors_and_not_tested_without():
     """Gaps of 2.2, 2.2, 4.5 and -4.5 standard errors of the difference; 2.2 would be shown alone, and not in pairs."""
     a = [error_of(name, value, 0.3) for name, value in (("m", 1.0), ("n", 1.0), ("worse", 1.0), ("better", 3.0))]
     b = [error_of(name, value, 0.4) for name, value in (("m", 2.1), ("n", 2.1), ("worse", 3.25), ("better", 0.75))]
@@ -58,6 +55,14 @@ def test_errors_are_held_against_their_standard_errors():
     assert verdicts(a[:1], b[:1]) == ["higher"]
     assert compare(a[:1], b[:1]).errors[0].p == pytest.approx(0.0278, abs=1e-4)  # 2 (1 - Phi(2.2))
     assert compare(a[2:3], b[2:3]).errors[0].ratio == 3.25 and verdicts(a, a) == ["no difference shown"] * 4
+    with_samples = time_of("m", [1.0, 2.0, 3.0])
+    without = with_samples.model_copy(update={"samples": ()})
+    exact = error_of("m", 1.0, None)
+    found = compare([with_samples, exact], [without, error_of("m", 9.0, 0.1)])
+    assert [one.result for one in (*found.times, *found.errors)] == ["not tested"] * 2
+    # What is not tested does not make the others stricter.
+    more = compare([without, error_of("m", 1.0, 0.1)], [without, error_of("m", 2.0, 0.1)])
+    assert more.errors[0].p == compare([error_of("m", 1.0, 0.1)], [error_of("m", 2.0, 0.1)]).errors[0].p
 
 
 def trained(values, standard_error, fabric="denim"):
@@ -97,18 +102,7 @@ def test_the_range_of_three_trainings_is_exceeded_by_chance_as_often_as_stated()
     assert len(results) == 4000 and 132 <= results.count("lower") + results.count("higher") <= 256
 
 
-def test_what_lacks_samples_or_standard_errors_is_not_tested():
-    with_samples = time_of("m", [1.0, 2.0, 3.0])
-    without = with_samples.model_copy(update={"samples": ()})
-    exact = error_of("m", 1.0, None)
-    found = compare([with_samples, exact], [without, error_of("m", 9.0, 0.1)])
-    assert [one.result for one in (*found.times, *found.errors)] == ["not tested"] * 2
-    # What is not tested does not make the others stricter.
-    more = compare([without, error_of("m", 1.0, 0.1)], [without, error_of("m", 2.0, 0.1)])
-    assert more.errors[0].p == compare([error_of("m", 1.0, 0.1)], [error_of("m", 2.0, 0.1)]).errors[0].p
-
-
-def test_like_is_compared_with_like():
+def test_like_is_compared_with_like_and_nothing_in_common_is_bad_input():
     """Threads, settings, fabrics and edits are kept apart; pictures and other metrics are left out."""
     fast, slow = [1.0 + 0.01 * i for i in range(9)], [2.0 + 0.01 * i for i in range(9)]
     one, two = time_of("m", fast), time_of("m", slow).model_copy(update={"threads": 2})
@@ -122,13 +116,10 @@ def test_like_is_compared_with_like():
     assert len(found.times) == 4 and len(found.errors) == 1
     assert all(row.a == row.b and row.result == "no difference shown" for row in (*found.times, *found.errors))
     assert (found.only_a, found.only_b) == (1, 2)
-
-
-def test_nothing_in_common_is_bad_input():
     assert "share no measurement" in refusal(compare, [error_of("m", 1.0, 0.1)], [error_of("n", 1.0, 0.1)])
 
 
-def test_what_else_differs_is_said():
+def test_what_else_differs_is_said_and_holm_is_that_of_its_textbook():
     a = time_of("m", [1.0, 2.0], note="512 queries a fabric", provenance=Provenance(dataset="a"))
     b = time_of("m", [1.0, 2.0], note="1024 queries a fabric", provenance=Provenance(dataset="b", version=1))
     assert compare([a], [a]).unlike == []
@@ -136,6 +127,8 @@ def test_what_else_differs_is_said():
     once = "one training in A and B: another training of net may differ by more than is marked here"
     assert compare(trained([1.0], 0.1), trained([2.0], 0.1)).unlike == [once]
     assert compare(trained([1.0], 0.1), trained([2.0, 2.1], 0.1)).unlike == []
+    # Four p-values .01, .04, .03, .005 at their ranks: .005 x 4, .01 x 3, .03 x 2, and .04 no less than that.
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02]) and holm([]) == []
 
 
 @pytest.mark.parametrize("change", [{"cpu": "another"}, {"cores": 99}, {"threads": 7}])
@@ -149,11 +142,6 @@ def test_another_machine_is_refused_unless_asked_for(change):
     assert str(value) in sentence
     later = here.model_copy(update={"date": "2000-01-01T00:00:00+00:00", "packages": {}})
     assert refuse_other_machine(here, later) == []
-
-
-def test_holm_on_its_textbook_example():
-    """Four p-values .01, .04, .03, .005 at their ranks: .005 x 4, .01 x 3, .03 x 2, and .04 no less than that."""
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02]) and holm([]) == []
 
 
 @given(st.lists(st.floats(0, 1) | st.just(math.nan), max_size=12))

@@ -74,21 +74,23 @@ def test_a_fresh_run_changes_no_byte_while_times_are_within_a_quarter(records):
     changed = readme_block(slower(records, "woven", 1.3), MACHINE, old, "file")
     expected = [line.replace("4.3×", "5.6×") if "`woven`" in line else line for line in old.splitlines()]
     assert changed.splitlines() == expected
-
-
-def test_a_time_is_kept_within_a_quarter_and_numbers_have_no_sign_at_zero():
     assert [documents.kept_time("2×", fresh) for fresh in (2.5, 1.6, 2.6, 1.5)] == ["2×", "2×", "2.6×", "1.5×"]
     assert [documents.kept_time("–", 3.21), documents.kept_time("12×", 11.8)] == ["3.2×", "12×"]
     assert [documents.two_decimals(value) for value in (-0.004, 0.0, -0.123)] == ["0.00", "0.00", "−0.12"]
 
 
-def test_records_without_the_baseline_or_of_no_recipe_are_refused(records, made_up):
+def test_records_without_the_baseline_are_refused_and_without_two_random_points_have_no_ratios(records, made_up):
     rest = [record for record in records if record.method != "point_sampled"]
     assert "two random points" in refusal(readme_block, rest, MACHINE, "", "file")
     assert "names no recipe" in refusal(results_page, made_up, MACHINE, "file")
+    page = results_page([record for record in records if record.method != "point_sampled"], MACHINE, "file")
+    unseen = page.partition("### Errors, unseen")[2].partition("##")[0]
+    (line,) = (line for line in unseen.splitlines() if line.startswith("| woven"))
+    assert [cell.strip() for cell in line.split("|")][4] == "–"
+    assert "\n\n\n" not in page, "a section without sentences has no empty paragraph"
 
 
-def test_the_file_says_where_its_numbers_come_from(made_up):
+def test_the_file_says_where_its_numbers_come_from_and_a_block_is_replaced_alone(made_up):
     rate = Record(method="truth", setting="everything").of("rate", 4.5e8, 1).model_copy(update={"unit": "points/s"})
     about = {"recipe": "standard", "recipe_fingerprint": "0123456789abcdef" * 4}
     page = results_page(named([*made_up, rate], **about), MACHINE, "file")
@@ -100,24 +102,13 @@ def test_the_file_says_where_its_numbers_come_from(made_up):
     assert "## Scenes" not in page, "what was not measured has no section"
     for table in page.split("\n\n"):
         assert len({line.count("|") for line in table.splitlines() if line.startswith("|")}) <= 1, table
-
-
-def test_without_two_random_points_there_are_no_ratios(records):
-    page = results_page([record for record in records if record.method != "point_sampled"], MACHINE, "file")
-    unseen = page.partition("### Errors, unseen")[2].partition("##")[0]
-    (line,) = (line for line in unseen.splitlines() if line.startswith("| woven"))
-    assert [cell.strip() for cell in line.split("|")][4] == "–"
-    assert "\n\n\n" not in page, "a section without sentences has no empty paragraph"
+    assert block(TEXT, "speeds", "file") == "old\n"
+    assert documents.with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
+    assert documents.with_block(TEXT, "speeds", "old", "file") == TEXT
 
 
 FIRST, LAST = markers("speeds")
 TEXT = f"before\n{FIRST}\nold\n{LAST}\nafter\n"
-
-
-def test_a_block_is_replaced_and_nothing_else():
-    assert block(TEXT, "speeds", "file") == "old\n"
-    assert documents.with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
-    assert documents.with_block(TEXT, "speeds", "old", "file") == TEXT
 
 
 @pytest.mark.parametrize("text", ["nothing", f"{FIRST}\nno end", f"{LAST}\n{FIRST}\n"])

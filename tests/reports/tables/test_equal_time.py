@@ -7,7 +7,7 @@ from reports.record import Record
 from reports.tables.equal_time import equal_time_table, error_at, size_table
 
 
-def test_the_curve_of_a_parameter_is_straight_in_both_logarithms():
+def test_curves_are_straight_in_both_logarithms_and_methods_compared_at_their_own_time():
     """Error falls as time^-1/2, as that of random points does: exactly so at times between the settings.
 
     A setting that a faster one beats does not help its family; from what is lost in noise on nothing is left to beat.
@@ -18,6 +18,17 @@ def test_the_curve_of_a_parameter_is_straight_in_both_logarithms():
     assert error_at([(100.0, 0.1), (200.0, 0.5), (400.0, 0.05)], 200.0) == pytest.approx(math.sqrt(0.1 * 0.05))
     curve = [(100.0, 0.2), (200.0, 0.0), (400.0, 0.1)]
     assert error_at(curve, 150.0) == pytest.approx(0.2) and error_at(curve, 300.0) == error_at(curve, 500.0) == 0.0
+    table = equal_time_table(size_table(list(records())))
+    assert set(table["method"]) == {"ours"} and set(table["rival"]) == {"points"}
+    ratio = table[table["measure"] == "specular"].set_index("size")["ratio"]
+    assert ratio["below .1"] == pytest.approx(0.5) and ratio["1 to 3"] == pytest.approx(4.0)
+    table = equal_time_table(size_table(list(records(TIMES | FRONT_TIMES, ERRORS | FRONT_ERRORS))))
+    assert set(zip(table["method"], table["rival"], strict=True)) == {
+        ("ours", "points"), ("ours", "soft_nodes"), ("soft_nodes", "points"),
+    }  # fmt: skip
+    own = table[(table["method"] == "soft_nodes") & (table["measure"] == "specular")].set_index(["setting", "size"])
+    assert own["ratio"]["k = 1", "1 to 3"] == pytest.approx(4.0)
+    assert own["ratio"]["k = 2", "below .1"] == pytest.approx(0.5)
 
 
 TIMES = {("ours", ""): 200.0, ("points", "k = 1"): 100.0, ("points", "k = 4"): 400.0}
@@ -34,20 +45,3 @@ def records(times=TIMES, errors=ERRORS):
         small, large = errors[method, setting]
         for metric, _ in MEASURES.values():
             yield subject.of(metric, 0.1, 10, curve=((0.0, small), (1.0, large)))
-
-
-def test_a_method_is_compared_with_every_setting_at_its_own_time():
-    table = equal_time_table(size_table(list(records())))
-    assert set(table["method"]) == {"ours"} and set(table["rival"]) == {"points"}
-    ratio = table[table["measure"] == "specular"].set_index("size")["ratio"]
-    assert ratio["below .1"] == pytest.approx(0.5) and ratio["1 to 3"] == pytest.approx(4.0)
-
-
-def test_each_setting_of_the_front_is_compared_with_all_but_itself():
-    table = equal_time_table(size_table(list(records(TIMES | FRONT_TIMES, ERRORS | FRONT_ERRORS))))
-    assert set(zip(table["method"], table["rival"], strict=True)) == {
-        ("ours", "points"), ("ours", "soft_nodes"), ("soft_nodes", "points"),
-    }  # fmt: skip
-    own = table[(table["method"] == "soft_nodes") & (table["measure"] == "specular")].set_index(["setting", "size"])
-    assert own["ratio"]["k = 1", "1 to 3"] == pytest.approx(4.0)
-    assert own["ratio"]["k = 2", "below .1"] == pytest.approx(0.5)

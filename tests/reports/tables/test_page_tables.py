@@ -24,16 +24,13 @@ def cells_of(table, label):
     return dict(zip(titles, row.cells, strict=True))
 
 
-def test_a_table_has_numbers_on_the_right_and_settings_of_a_method_are_a_group():
+def test_a_table_groups_settings_of_a_method_and_a_paragraph_without_its_value_is_left_out():
     table = markdown_table(("method", "ns"), [("points", "12"), ("woven", "3")])
     assert table.splitlines() == ["| method | ns |", "| :-- | --: |", "| points | 12 |", "| woven | 3 |"]
     settings = ("a", "1"), ("a", "2"), ("b", "")
     rows = [TableRow(f"{name}", (TableCell("1"),), name, setting) for name, setting in settings]
     groups = ResultTable("t", ("method", "x"), tuple(rows)).groups
     assert [(head, len(part)) for head, part in groups] == [("a", 2), ("", 1)]
-
-
-def test_a_paragraph_without_its_value_is_left_out():
     assert paragraphs(["a {b}", "c"], {"b": 1}) == ["a 1", "c"] and paragraphs(["a {b}", "c"], {}) == ["c"]
 
 
@@ -74,11 +71,14 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
     assert shown["processor s a million"] == ".400" and "J a million" not in shown
 
 
-def test_records_of_before_intervals_are_shown_without_one():
+def test_records_of_before_intervals_have_none_and_what_an_eye_sees_a_column_where_measured():
     records = CALIBRATIONS.to_records([Calibration("auto", "solid", 0.9, 0.002, 0.8, 1.0, 1.0, 0.0, 100)])
     old = [record.model_copy(update={"low": None, "high": None}) for record in records]
     shown = [str(sections_of(found)["accuracy"][0].rows[0].cells[1]) for found in (old, records)]
     assert shown == ["0.90", "0.90 (0.80 … 1.00)"]
+    assert "FovVideoVDP, JOD" not in cells_of(attic(RECORDS), "woven")
+    more = attic([*RECORDS, *measured("woven", fovvideovdp=9.12)])
+    assert [cells_of(more, name)["FovVideoVDP, JOD"].text for name in ("woven", "points, k = 2")] == ["9.12", "–"]
 
 
 def measured(method, setting="", **numbers):
@@ -99,12 +99,11 @@ RECORDS = [
 
 
 def attic(records):
-    """Return the table of the attic."""
     (table,) = sections_of(records)["scenes"]
     return table
 
 
-def test_a_scene_has_the_range_over_trainings_beside_its_interval():
+def test_numbers_of_a_scene_have_intervals_and_ranges_and_the_last_row_is_the_truths_noise():
     several = [
         one.model_copy(update={"value": factor * one.value, "provenance": Provenance(model="net", seed=factor)})
         for one in RECORDS[:4]
@@ -118,9 +117,6 @@ def test_a_scene_has_the_range_over_trainings_beside_its_interval():
     assert ranges["MSE"] == "[2.00 … 6.00]e−3" and ranges["PSNR, dB"] == "[31.2 … 93.8]"
     assert ranges["colour"] == "[0 … 0]" and ranges["ms a frame"] == "" and ranges["flicker"] == "[−6.00 … −2.00]e−3"
     assert not any(cell.range for cell in cells_of(attic(records), "points, k = 2").values())
-
-
-def test_numbers_of_a_scene_have_their_intervals_and_the_last_row_is_the_truths_noise():
     table = attic(RECORDS)
     shown = {title: (cell.text, cell.interval) for title, cell in cells_of(table, "woven").items()}
     assert shown["MSE"] == ("2.00e−3", "(1.80 … 2.30)e−3") and shown["PSNR, dB"] == ("31.2", "(30.1 … 32.9)")
@@ -132,12 +128,6 @@ def test_numbers_of_a_scene_have_their_intervals_and_the_last_row_is_the_truths_
     noise = {title: cell.text for title, cell in cells_of(table, "noise of the truth").items()}
     assert noise["MSE"] == "1.00e−5" and noise["PSNR, dB"] == "40.0" and table.rows[-1].kind == "noise"
     assert noise["flicker"] == noise["ms a frame"] == noise["SSIM"] == "–"
-
-
-def test_what_an_eye_sees_of_the_frames_has_a_column_where_it_was_measured():
-    assert "FovVideoVDP, JOD" not in cells_of(attic(RECORDS), "woven")
-    more = attic([*RECORDS, *measured("woven", fovvideovdp=9.12)])
-    assert [cells_of(more, name)["FovVideoVDP, JOD"].text for name in ("woven", "points, k = 2")] == ["9.12", "–"]
 
 
 def test_an_error_in_the_noise_has_no_ratio_and_is_on_no_front():

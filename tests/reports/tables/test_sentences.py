@@ -43,7 +43,7 @@ SCENES = pd.DataFrame(
 )
 
 
-def test_scenes_name_the_cheapest_and_what_is_in_the_noise():
+def test_the_trade_and_scenes_name_the_cheapest_and_what_is_in_the_noise():
     """An error lost in the noise counts as the end of its interval; a flicker below the truth's is as far as above."""
     found = {name: [t.replace("\u00a0", " ") for t in texts] for name, texts in told.scene_sentences(SCENES).items()}
     assert found["attic"] == [
@@ -55,9 +55,6 @@ def test_scenes_name_the_cheapest_and_what_is_in_the_noise():
     ]
     assert found["cellar"] == []  # nobody was timed there
     assert told.scene_sentences(SCENES[:0]) == {}
-
-
-def test_the_trade_names_the_cheapest_methods_and_what_two_points_get():
     rows = [("point_sampled", "k = 2", 500.0, 0.4), ("soft_nodes", "k = 1", 1000.0, 0.045), ("woven", "", 4000.0, 0.03)]
     table = pd.DataFrame(rows, columns=["method", "setting", "ns", "error"]).assign(role="seen", fabrics=8)
     lead, figures = told.trade(table)
@@ -77,13 +74,22 @@ def tables(ratio, time_ratio=math.nan, role="seen", fabrics=8, seeds=0, least=ma
     return pd.DataFrame([errors]), pd.DataFrame([timing])
 
 
-def test_the_headline_admits_a_defeat_and_calls_one_training_one():
+def test_the_headline_admits_a_defeat_and_says_only_what_was_measured():
     defeat = told.headline("woven", "", *tables(0.5, 1.66), paper=False)
     once = told.headline("woven", "", *tables(9.13, 0.8, seeds=1), paper=False)
     where = "than point sampling at 2 points on the 8 seen fabrics"
     assert defeat == f"Woven reaches 2.0× higher MSE {where}, at 1.7× its time."
     assert once == f"Woven reaches 9.1× lower MSE {where}, at 0.8× its time (one training)."
     assert "8 seen fabrics (one training); the paper" in told.headline("woven", "", *tables(9.13, seeds=1))
+    assert told.headline("woven", "", *tables(math.nan, 1.0)) == ""
+    assert "its time" not in told.headline("woven", "", *tables(3.0), paper=False)
+    assert "on one unseen fabric" in told.headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
+    methods = [("point_sampled", "k = 1"), ("point_sampled", "k = 2"), ("woven", ""), ("neumip", "")]
+    methods += [("woven", "bounded"), ("curved", ""), ("curved", "eager-bf16")]
+    errors = pd.DataFrame(methods, columns=["method", "setting"])
+    assert told.learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("curved", "")]
+    assert told.learnt(errors, {"woven", "neumip", "curved"}) == [("point_sampled", "k = 1")]
+    assert Bounded(SoftNodes()).setting == f"k = 2 {told.BOUNDED}"
 
 
 def test_several_trainings_have_a_range():
@@ -112,32 +118,8 @@ def test_several_unseen_fabrics_have_a_geometric_mean_and_an_interval(mean, low,
     assert text.endswith(f"on the 9 unseen fabrics (geometric mean, 95 % interval over fabrics {ends}).")
 
 
-def test_headline_says_only_what_was_measured():
-    assert told.headline("woven", "", *tables(math.nan, 1.0)) == ""
-    assert "its time" not in told.headline("woven", "", *tables(3.0), paper=False)
-    assert "on one unseen fabric" in told.headline("woven", "", *tables(3.0, role="unseen", fabrics=1))
-
-
-def test_the_headline_is_of_what_is_learnt_and_bounded_where_that_was_measured():
-    methods = [("point_sampled", "k = 1"), ("point_sampled", "k = 2"), ("woven", ""), ("neumip", "")]
-    methods += [("woven", "bounded"), ("curved", ""), ("curved", "eager-bf16")]
-    errors = pd.DataFrame(methods, columns=["method", "setting"])
-    assert told.learnt(errors) == [("woven", "bounded"), ("neumip", ""), ("curved", "")]
-    assert told.learnt(errors, {"woven", "neumip", "curved"}) == [("point_sampled", "k = 1")]
-    assert Bounded(SoftNodes()).setting == f"k = 2 {told.BOUNDED}"
-
-
 def of(*shares):
     return [Record(method=f"m{k}").of("waited", share, 20) for k, share in enumerate(shares)]
-
-
-def test_the_median_over_methods_is_said():
-    assert told.waited(of(0.0, 0.25, 0.9)) == 0.25
-    none = pd.DataFrame()
-    assert {"waited": "25.0 %", "busy": "25.0 %"}.items() <= told.facts(of(0.0, 0.25, 0.9), none).items()
-    quiet = told.facts(of(0.001), none)
-    assert quiet["waited"] == "0.1 %" and "busy" not in quiet
-    assert told.facts([], none) == {} and math.isnan(told.waited([]))
 
 
 @pytest.mark.parametrize(
@@ -149,7 +131,7 @@ def test_a_comparison_warns_of_busy_machines_alone(a, b, words):
     assert told.busy(of(told.QUIET), []) and told.busy([], []) == []
 
 
-def test_facts_name_trainings_unseen_fabrics_and_the_energy_bound():
+def test_facts_name_trainings_unseen_fabrics_the_energy_bound_and_the_median_over_methods():
     errors = pd.DataFrame({"method": ["woven", "neumip", "soft_nodes"], "setting": "", "zero_answers": 0.0})
     errors = errors.assign(role="unseen", fabrics=[9, 1, 1])
     values = told.facts([], errors.assign(seeds=[1, 3, 0]))
@@ -157,6 +139,12 @@ def test_facts_name_trainings_unseen_fabrics_and_the_energy_bound():
     assert values["unseen_fabrics"] == 9 and "one_unseen" not in values and "bounded" not in values
     values = told.facts([], errors.assign(seeds=0, fabrics=1, setting=told.BOUNDED))
     assert values["one_unseen"] == "One" and values["bounded"] and "once" not in values and "several" not in values
+    assert told.waited(of(0.0, 0.25, 0.9)) == 0.25
+    none = pd.DataFrame()
+    assert {"waited": "25.0 %", "busy": "25.0 %"}.items() <= told.facts(of(0.0, 0.25, 0.9), none).items()
+    quiet = told.facts(of(0.001), none)
+    assert quiet["waited"] == "0.1 %" and "busy" not in quiet
+    assert told.facts([], none) == {} and math.isnan(told.waited([]))
 
 
 def test_a_measure_that_was_not_installed_is_known_where_scenes_were_measured():

@@ -15,12 +15,9 @@ from weaves.fabric import load_fabric
 
 def error(method, setting, fabric, role, mse, noise=0.0, spread=0.0):
     subject = Record(method=method, setting=setting, fabric=fabric, role=role, scene="queries")
-    return [
-        subject.of("mse", mse, 100, standard_error=spread),
-        subject.of("mse_measured", mse + noise, 100),
-        subject.of("truth_noise", noise, 100),
-        subject.of("colour_rrmse", math.sqrt(abs(mse)), 100),
-    ]
+    others = {"mse_measured": mse + noise, "truth_noise": noise, "colour_rrmse": math.sqrt(abs(mse))}
+    records = [subject.of(name, value, 100) for name, value in others.items()]
+    return [subject.of("mse", mse, 100, standard_error=spread), *records]
 
 
 PICTURES = [("denim", "sphere", "mse", 0.5), ("denim", "plane", "mse", 0.7), ("denim", "plane", "flicker", 0.1)]
@@ -48,7 +45,7 @@ def row(table, **keys):
     return found
 
 
-def test_unseen_fabrics_have_geometric_means():
+def test_errors_are_means_and_those_of_unseen_fabrics_geometric():
     """The baseline errs 5 and 8, woven 2 and .8: ratios 2.5 and 10, colour errors sqrt(2) and sqrt(.8)."""
     more = [*error("woven", "", "crepe", "unseen", 0.8), *error("point_sampled", "k = 2", "crepe", "unseen", 8.0)]
     table = summary.error_table([*RECORDS, *more])
@@ -56,32 +53,12 @@ def test_unseen_fabrics_have_geometric_means():
     assert woven.fabrics == 2 and woven.ratio == pytest.approx(13.0 / 2.8)
     assert (woven.ratio_fabrics, woven.mse_fabrics) == pytest.approx((5.0, math.sqrt(1.6)))
     assert summary.summary_table([*RECORDS, *more]).loc[("woven", ""), "× lower, unseen"] == pytest.approx(5.0)
-
-
-def test_errors_are_means_over_fabrics():
     woven = row(summary.error_table(RECORDS), method="woven", role="seen")
     assert (woven.fabrics, woven.queries) == (2, 200) and woven.mse == pytest.approx(2.0)
     assert woven.standard_error == pytest.approx(0.05 / 2)  # sqrt(.03^2 + .04^2) / 2
     assert (woven.low, woven.high) == pytest.approx((2 - 1.96 * 0.025, 2 + 1.96 * 0.025))
     assert woven.noise_share == pytest.approx(0.5 / 2.5) and woven.ratio == pytest.approx(8.0 / 2.0)
     assert woven.ratio_low < 4 < woven.ratio_high
-
-
-def test_a_ratio_compares_the_fabrics_that_both_cover():
-    """NeuMIP answers for denim alone: there 2 points have 6, not the 8 of both fabrics."""
-    table = summary.error_table(RECORDS)
-    assert row(table, method="neumip").ratio == pytest.approx(3.0)
-    assert row(table, method="woven", role="unseen").ratio == pytest.approx(2.5)
-
-
-def test_without_the_baseline_or_below_the_noise_there_is_no_ratio():
-    alone = [record for record in RECORDS if record.setting != "k = 2" or record.fabric != "basket"]
-    assert math.isnan(row(summary.error_table(alone), method="woven", role="seen").ratio)
-    table = summary.error_table([*error("m", "", "denim", "seen", -0.1), *error("p", "k = 2", "denim", "seen", 1.0)])
-    assert math.isnan(row(table, method="m").ratio)
-
-
-def test_fabrics_and_pictures():
     by_fabric = summary.fabric_table(RECORDS)
     assert by_fabric["fabric"].tolist() == ["denim", "basket", "twill_4_4"]
     assert by_fabric["point_sampled k = 2"].tolist() == [6.0, 10.0, 5.0] and math.isnan(by_fabric["neumip"][1])
@@ -89,7 +66,18 @@ def test_fabrics_and_pictures():
     assert pictures[["scene", "mse"]].to_numpy().tolist() == [["sphere", 0.5], ["plane", 0.7]]
 
 
-def test_aliasing_and_timing():
+def test_a_ratio_compares_the_fabrics_that_both_cover_above_the_noise():
+    """NeuMIP answers for denim alone: there 2 points have 6, not the 8 of both fabrics."""
+    table = summary.error_table(RECORDS)
+    assert row(table, method="neumip").ratio == pytest.approx(3.0)
+    assert row(table, method="woven", role="unseen").ratio == pytest.approx(2.5)
+    alone = [record for record in RECORDS if record.setting != "k = 2" or record.fabric != "basket"]
+    assert math.isnan(row(summary.error_table(alone), method="woven", role="seen").ratio)
+    table = summary.error_table([*error("m", "", "denim", "seen", -0.1), *error("p", "k = 2", "denim", "seen", 1.0)])
+    assert math.isnan(row(table, method="m").ratio)
+
+
+def test_summary_is_one_row_a_method_with_aliasing_timing_and_mean_spectra():
     alias = row(summary.aliasing_table(RECORDS), method="woven")
     assert (alias.fabrics, alias.flicker, alias.excess_energy) == pytest.approx((2, 0.2, -0.2))
     timing = summary.timing_table(RECORDS)
@@ -99,15 +87,17 @@ def test_aliasing_and_timing():
     # 400 ns a query are .83 s a frame of 1920 by 1080.
     assert woven.frame_ms == pytest.approx(829.44)
     assert math.isnan(woven.most_threads_ns) and math.isnan(woven.prepare_ms) and math.isnan(woven.memory)
-
-
-def test_spectra_are_averaged():
     curves = [((0.1, 1.0), (0.2, 2.0)), ((0.1, 3.0), (0.2, 4.0))]
     records = [Record(method="m", metric="spectrum", fabric=f"f{i}", curve=curve) for i, curve in enumerate(curves)]
     assert summary.spectra(records) == {("m", ""): [(0.1, 2.0), (0.2, 3.0)]}
+    table = summary.summary_table(RECORDS)
+    assert list(table.index) == [("woven", ""), ("neumip", ""), ("point_sampled", "k = 1"), ("point_sampled", "k = 2")]
+    assert table.loc[("woven", ""), "× lower, seen"] == pytest.approx(4.0)
+    assert table.loc[("woven", ""), "× time"] == pytest.approx(0.8)
+    assert math.isnan(table.loc[("neumip", ""), "MSE unseen"]) and summary.summary_table([]).empty
 
 
-def test_the_table_of_extremes_keeps_the_worst_and_lustrous_cloth_apart():
+def test_extremes_keep_the_worst_energy_too_and_silhouettes_are_means_over_fabrics():
     shiny = lustrous(load_fabric("polyester_lining"))
     assert (shiny.warp.roughness, shiny.weft.roughness) == (LUSTROUS, LUSTROUS)
     subject = Record(method="m", setting="s")
@@ -121,17 +111,6 @@ def test_the_table_of_extremes_keeps_the_worst_and_lustrous_cloth_apart():
     assert (row[error_name(1e-4)], row[error_name(1.0)], row["lustrous"]) == (0.5, 0.2, 0.9)
     assert math.isnan(row[error_name(1e4)]) and math.isnan(row["rounding"])
     assert (row["not_finite"], row["answers"], row["negative"]) == (4, 180, 0)
-
-
-def test_summary_is_one_row_a_method():
-    table = summary.summary_table(RECORDS)
-    assert list(table.index) == [("woven", ""), ("neumip", ""), ("point_sampled", "k = 1"), ("point_sampled", "k = 2")]
-    assert table.loc[("woven", ""), "× lower, seen"] == pytest.approx(4.0)
-    assert table.loc[("woven", ""), "× time"] == pytest.approx(0.8)
-    assert math.isnan(table.loc[("neumip", ""), "MSE unseen"]) and summary.summary_table([]).empty
-
-
-def test_energy_is_the_worst_and_silhouettes_are_the_mean_over_fabrics():
     records = []
     for fabric, value in (("denim", 0.5), ("basket", 0.9), ("voile", 0.7)):
         subject = Record(method="m", fabric=fabric, scene="queries")
@@ -182,7 +161,7 @@ def test_a_network_trained_once_has_no_range_on_a_single_unseen_fabric():
         assert summary.unranged(summary.error_table(records)) == set()
 
 
-def test_intervals_over_fabrics():
+def test_intervals_and_ratios_are_those_over_the_same_fabrics():
     """Logarithms -1, 0 and 1: s = 1, and t_{.975, 2} = 4.302653 (tables of Student's distribution)."""
     reach = 4.302653 / math.sqrt(3)
     expected = (1.0, math.exp(-reach), math.exp(reach))
@@ -191,10 +170,7 @@ def test_intervals_over_fabrics():
     assert summary.over_fabrics([0.3]) == pytest.approx((0.3, math.nan, math.nan), nan_ok=True)
     for lost in ([], [0.1, 0.0], [0.1, -0.2], [0.1, math.nan], [0.1, math.inf]):
         assert all(map(math.isnan, summary.over_fabrics(lost))), "errors lost in the noise have no mean"
-
-
-def test_ratios_are_those_of_the_same_fabric():
-    """The baseline errs 100 and 1; the method a thousandth and a tenth of it: geometric mean 100."""
+    # The baseline errs 100 and 1; the method a thousandth and a tenth of it: geometric mean 100.
     base = pd.DataFrame({"fabric": ["b", "a"], "mse": [100.0, 1.0]})
     errors = pd.DataFrame(
         {"fabric": ["a", "b"], "mse": [0.1, 0.1], "colour_rrmse": [0.04, 0.01], "rrmse_specular_warp": [0.3, math.nan]}

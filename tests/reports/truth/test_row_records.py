@@ -27,7 +27,7 @@ FOUND = [
 ]
 
 
-def test_rows_are_one_record_a_number_and_come_back_equal():
+def test_rows_are_one_record_a_number_and_come_back_equal_also_with_nan_and_methods():
     records = ROWS.to_records(FOUND)
     subject = Record(method="truth", setting="front | warp", fabric="denim", count=7)
     assert records[:3] == [
@@ -35,12 +35,11 @@ def test_rows_are_one_record_a_number_and_come_back_equal():
         for metric, value, note in (("worst_error", 0.5, "x = 3"), ("naive_error", 0.25, ""), ("not_finite", 2.0, ""))
     ]
     assert ROWS.from_records(records) == FOUND and type(ROWS.from_records(records)[0].failures) is int
-
-
-def test_nan_has_no_record_and_comes_back_as_the_default():
     records = ROWS.to_records([Row("front", "warp", "denim", 0.5, "", 2, 7, math.nan)])
     assert [record.metric for record in records] == ["worst_error", "not_finite"]
     assert ROWS.from_records(records)[0].rival == math.inf
+    by_part = RowRecords(Row, setting=("light",), method_field="part")
+    assert {(record.method, record.setting) for record in by_part.to_records(FOUND[:1])} == {("warp", "front")}
 
 
 @pytest.mark.parametrize("about", [("front | warp", "mse"), ("front", "worst_error"), ("back | weft", "worst_error")])
@@ -48,8 +47,3 @@ def test_records_that_are_no_row_are_left_out(about):
     """Of another metric, of another setting, and of a row of which the rest is missing."""
     stray = Record(method="truth", setting=about[0], fabric="denim", metric=about[1], value=1.0)
     assert ROWS.from_records([stray, *ROWS.to_records(FOUND[:1])]) == FOUND[:1]
-
-
-def test_the_method_can_be_a_field():
-    by_part = RowRecords(Row, setting=("light",), method_field="part")
-    assert {(record.method, record.setting) for record in by_part.to_records(FOUND[:1])} == {("warp", "front")}

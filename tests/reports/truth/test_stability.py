@@ -69,21 +69,18 @@ def found(value, reference, **more) -> Finding:
     return judge("x", "corner", "float32", {"x": np.arange(len(value))}, value, reference, 1e-6, **more)
 
 
-def test_judgement():
+def test_judgement_of_numbers_and_of_normals_that_may_point_down():
     good, wrong = found([1.0, 2.0], [1.0, 2.000002]), found([1.0, 2.0, 3.0], [1.0, 2.00001, 3.0])
     assert (good.holds, good.worst, good.at) == (True, pytest.approx(1e-6, rel=1e-3), "x 1")
     assert (wrong.holds, wrong.at) == (False, "x 1") and "beyond the limit 2.0e-06" in wrong.fault
+    finding = found([[0.0, -1.0, 1e-9]], [[0.0, -1.0, 0.0]], signed=True)
+    assert (finding.holds, finding.worst) == (True, pytest.approx(1e-9))
 
 
 @pytest.mark.parametrize(("value", "fault"), [(math.nan, "NaN"), (math.inf, "NaN"), (-1e-12, "negative")])
 def test_impossible_values_fail_however_small_their_error(value, fault):
     finding = found([1.0, 1.0, value], [1.0, 1.0, 1e-12], floor=1.0)
     assert (finding.holds, finding.at) == (False, "x 2") and f"1 of 3 values are {fault}" in finding.fault
-
-
-def test_normals_may_point_down_and_count_as_vectors():
-    finding = found([[0.0, -1.0, 1e-9]], [[0.0, -1.0, 0.0]], signed=True)
-    assert (finding.holds, finding.worst) == (True, pytest.approx(1e-9))
 
 
 def test_records_hold_the_findings_and_the_textbooks_lost_values_apart():

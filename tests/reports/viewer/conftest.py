@@ -44,7 +44,6 @@ def whole():
 
 @pytest.fixture(scope="session")
 def page(whole, tmp_path_factory):
-    """The page, opened from the disk."""
     with viewer(whole, tmp_path_factory.mktemp("viewer")) as own:
         yield own
 

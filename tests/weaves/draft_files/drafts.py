@@ -25,5 +25,4 @@ def wif(**changes):
 
 
 def numbered(values):
-    """Return values as the lines of a section."""
     return "\n".join(f"{number}={value}" for number, value in enumerate(values, 1))

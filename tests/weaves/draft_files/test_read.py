@@ -40,16 +40,13 @@ def rows(draft):
     return Draft(smallest_repeat(draft.warp_over)).rows()
 
 
-def test_the_sections_of_a_twill(read):
+def test_sections_liftplans_several_treadles_and_falling_sheds(read):
     draft = read(wif())
     assert rows(draft) == BALANCED_ROWS and draft.warp_over.shape == (8, 8)
     assert (draft.title, draft.program, draft.remarks) == ("Small cloth", "Loom 2", ())
     assert draft.ends.colours == ("#ffffff",) * 8 and draft.picks.colours == ("#aa1020",) * 8
     assert (draft.ends.width, draft.picks.width) == pytest.approx((0.75, 0.5))
     assert draft.ends.per_cm == pytest.approx(720 / 12 / 2.54) and draft.picks.per_cm == pytest.approx(1 / 0.254)
-
-
-def test_liftplans_several_treadles_and_falling_sheds(read):
     lifts = numbered(["1,2", "2,3", "3,4", "4,1"] * 2)
     assert rows(read(wif(TIEUP=None, TREADLING=None, LIFTPLAN=lifts))) == BALANCED_ROWS
     assert rows(read(wif(TIEUP="1=1\n2=2\n3=3\n4=4", TREADLING=lifts))) == BALANCED_ROWS
@@ -120,14 +117,11 @@ def test_a_real_draft_without_default_colours(read):
     assert rows(draft) == BALANCED_ROWS
 
 
-def test_text_before_the_first_section_and_others_sections_are_skipped(read):
+def test_text_before_the_first_section_is_skipped_and_what_cannot_be_used_a_remark(read):
     private = "[PRIVATE PICTURE]\n" + "x" * 100_000 + "\n=\n[NOTES]\n1=100 %\nno number\n"
     text = "\ufeffsaved by a mail program\r\n" + wif() + private + "   [text]\n   title = 20 % wool\n"
     draft = read(text)
     assert rows(draft) == BALANCED_ROWS and draft.title == "20 % wool"
-
-
-def test_what_cannot_be_used_is_a_remark(read):
     draft = read(
         wif(WARP="Threads=8\nColor=1\nUnits=Decipoints", WARP_SPACING="1=20", WEFT="Color=2\nSpacing=3\nUnits=ells")
     )
@@ -232,14 +226,11 @@ def test_a_malformed_file_is_one_sentence_that_names_its_section(read):
         assert named in refusal(read, content, suffix), case
 
 
-def test_a_fiberworks_file_by_hand(read):
+def test_a_fiberworks_file_by_hand_and_a_weavepoint_file_without_yarns_per_inch(read):
     draft = read(DTX + "@@Treadling\n1 2\n", ".dtx")
     assert draft.warp_over.tolist() == [[True, False], [False, True]]
     assert draft.ends.colours == ("#010203",) * 2 and draft.picks.colours == ("#040506",) * 2
     assert [("default" in remark) for remark in draft.remarks] == [True, True]
-
-
-def test_a_weavepoint_file_without_yarns_per_inch(read):
     content = bytearray(SAMPLES[next(name for name in VALID if name.endswith("two color liftplan.wpo"))].read_bytes())
     content[9] = content[10] = 0
     assert read(bytes(content), ".wpo").ends.per_cm is None

@@ -72,13 +72,20 @@ def test_the_largest_draft_reads_back_from_its_fabric_file(imported, tmp_path):
     assert load_fabric(tmp_path / "large.toml") == found.fabric
 
 
-def test_stripes_in_the_ends_alone(imported):
+def test_stripes_in_the_ends_alone_and_a_shipped_twill_of_four_and_four(imported):
     fabric = imported(wif(WARP_COLORS=numbered([1, 1, 1, 2] * 2))).fabric
     assert fabric.colours.ends == (("colour_1", 3), ("colour_2", 1)) and fabric.colours.picks == ()
     assert fabric.warp.diffuse == fabric.colours.palette["colour_1"].diffuse != fabric.weft.diffuse
+    path = PRESETS.parent / "examples" / "houndstooth.wif"
+    fabric = fabric_of(read_draft(path), denim, "houndstooth", "houndstooth.wif", NOTHING).fabric
+    assert fabric.weave.rows() == ["..##", ".##.", "##..", "#..#"]
+    assert fabric.colours is not None and fabric.yarns_per_cm == (18.0, 16.0)
+    order = [name for name, count in fabric.colours.ends for _ in range(count // 4)]
+    brown, cream, red = dict.fromkeys(order)
+    assert order == [brown, cream, brown, cream, brown, red] and fabric.colours.picks == fabric.colours.ends
 
 
-def test_colours_that_would_make_light_are_dimmed_alike_and_others_stay(imported):
+def test_colours_that_would_make_light_are_dimmed_alike_and_leave_none_to_go_through(imported):
     found = imported(wif())
     warp, weft = found.fabric.warp, found.fabric.weft
     factor = min(warp.most_diffuse(2.0))
@@ -89,6 +96,10 @@ def test_colours_that_would_make_light_are_dimmed_alike_and_others_stay(imported
     dull = imported(wif(COLOR_TABLE="1=200,200,200\n2=170,16,32"))
     assert (dull.fabric.warp.diffuse, dull.fabric.weft.diffuse) == ("#c8c8c8", "#aa1020")
     assert not any("light than arrives" in sentence for sentence in dull.assumed)
+    found = imported(wif(), like=voile)
+    assert found.fabric.warp.diffuse_transmission_rgb == (0.0, 0.0, 0.0)
+    assert found.fabric.weft.diffuse_transmission_rgb[1] == pytest.approx(voile.weft.diffuse_transmission_rgb[1])
+    assert any("the light through" in sentence for sentence in found.assumed)
 
 
 def test_everything_assumed_is_said_and_kept(imported):
@@ -103,20 +114,10 @@ def test_everything_assumed_is_said_and_kept(imported):
     assert "'Small cloth', written by Loom 2, from small.wif" in found.fabric.source
 
 
-def test_a_bright_colour_leaves_no_light_to_go_through(imported):
-    found = imported(wif(), like=voile)
-    assert found.fabric.warp.diffuse_transmission_rgb == (0.0, 0.0, 0.0)
-    assert found.fabric.weft.diffuse_transmission_rgb[1] == pytest.approx(voile.weft.diffuse_transmission_rgb[1])
-    assert any("the light through" in sentence for sentence in found.assumed)
-
-
-def test_a_last_repeat_that_is_not_whole_is_left_out(imported):
+def test_a_last_repeat_that_is_not_whole_is_left_out_and_loose_layers_are_said(imported):
     found = imported(wif(WARP="Threads=131\nColor=1", THREADING=numbered([end % 4 + 1 for end in range(131)])))
     assert found.fabric.weave.rows() == BALANCED_ROWS
     assert "The last 3 ends do not fill a repeat and are left out." in found.assumed
-
-
-def test_layers_that_lie_loose_are_said(imported):
     # Ends 1 and 3 weave with picks 1 and 3, ends 2 and 4 with picks 2 and 4, the first layer on top.
     found = imported(wif(TIEUP="1=1\n2=1,3,2\n3=3\n4=1,3,4"))
     assert not found.fabric.weave.hangs_together() and any("loose" in sentence for sentence in found.assumed)
@@ -141,13 +142,3 @@ MANY = numbered([f"{k % 256},{k // 256},0" for k in range(300)])
 )  # fmt: skip
 def test_what_is_no_cloth_is_refused(imported, change, named):
     assert named in refusal(imported, wif(**change))
-
-
-def test_the_shipped_houndstooth_is_a_twill_of_four_and_four():
-    path = PRESETS.parent / "examples" / "houndstooth.wif"
-    fabric = fabric_of(read_draft(path), denim, "houndstooth", "houndstooth.wif", NOTHING).fabric
-    assert fabric.weave.rows() == ["..##", ".##.", "##..", "#..#"]
-    assert fabric.colours is not None and fabric.yarns_per_cm == (18.0, 16.0)
-    order = [name for name, count in fabric.colours.ends for _ in range(count // 4)]
-    brown, cream, red = dict.fromkeys(order)
-    assert order == [brown, cream, brown, cream, brown, red] and fabric.colours.picks == fabric.colours.ends

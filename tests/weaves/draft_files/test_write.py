@@ -21,8 +21,6 @@ PALETTE = {"a": {"diffuse": "#102030"}, "b": {"diffuse": "#e88000"}, "c": {"diff
 
 @pytest.fixture
 def again(tmp_path):
-    """Return a fabric written to a draft file and read back."""
-
     def call(fabric):
         path = tmp_path / "cloth.wif"
         path.write_text(wif_text(fabric), encoding="utf-8", newline="")
@@ -32,7 +30,6 @@ def again(tmp_path):
 
 
 def levels(fabric):
-    """Return the colours of ends and picks in 8 bits."""
     return [np.rint(255 * encoded(threads.diffuse)).astype(int) for threads in fabric.thread_colours()]
 
 
@@ -74,7 +71,7 @@ def test_any_cloth_reads_back(again, matrix, ends, picks, size):
     same_cloth(fabric, again(fabric))
 
 
-def test_the_file_is_as_other_programs_want_it():
+def test_the_file_is_as_other_programs_want_it_and_colours_that_never_fit_are_refused():
     text = wif_text(denim.model_copy(update={"yarns_per_cm": (24.0, 20.0)}))
     parts = re.split(r"^\[(.+)\]\n", text, flags=re.M)
     found = dict(zip(parts[1::2], parts[2::2], strict=True))
@@ -84,9 +81,6 @@ def test_the_file_is_as_other_programs_want_it():
     assert found["TIEUP"].split() == ["1=1,3,4", "2=1,2,4", "3=1,2,3", "4=2,3,4"]
     assert f"Spacing={720 / 2.54 / 24:.3f}\nThickness={720 / 2.54 / 24:.3f}\nUnits=Decipoints" in found["WARP"]
     assert "Rising Shed=true" in found["WEAVING"] and "Shafts=4" in found["WEAVING"]
-
-
-def test_colours_that_never_fit_the_structure_are_refused():
     colours = {"palette": PALETTE, "ends": [["a", 1], ["b", 1400]]}
     fabric = validated(Fabric, denim.model_dump() | {"colours": colours}, "cloth")
     assert "5,604 ends: at most 4,096" in refusal(wif_text, fabric)

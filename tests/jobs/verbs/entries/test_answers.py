@@ -26,7 +26,6 @@ def out(tmp_path, recipe):
 
 
 def measured(recipe, folder, out):
-    """Measure an entry alone; return its Records."""
     (task,) = (one for one in plan(load_recipe(recipe, [str(folder / "entry.toml")])) if isinstance(one, OfAnswers))
     task.run(out, lambda share: None)
     assert all((out / path).is_file() for path in task.products)
@@ -77,10 +76,8 @@ def test_answers_in_colour_have_the_same_mse_and_no_error_of_components(recipe, 
     second = numbers(records, errors)
     assert [one[:2] for one in first] == [one[:2] for one in second]
     np.testing.assert_allclose([one[2] for one in first], [one[2] for one in second], rtol=1e-6)
-    assert {r.metric for r in records} == {
-        *errors,
-        *(f"stated_{n}" for n in ("time", "bytes", "multiply_adds", "tries")),
-    }
+    stated = {f"stated_{name}" for name in ("time", "bytes", "multiply_adds", "tries")}
+    assert {record.metric for record in records} == {*errors} | stated
 
 
 def test_an_entry_is_a_row_of_the_page_and_what_it_states_is_marked(recipe, entry, out):
@@ -173,10 +170,6 @@ def test_questions_change_with_what_is_right_and_not_with_how_exactly_it_is_know
 
     first, plane = known(), {"parallax": False}
     assert known(truth={"relative_error": 0.5}) == known(rows={"train": 1, "test": 64}) == first
-    others = [
-        known(seed=1),
-        known(seen=["voile"]),
-        known(rows={"train": 1, "test": 65}),
-        known(truth=plane, bench=dict.fromkeys(("truth", "frame_truth"), plane)),
-    ]
+    others = [known(seed=1), known(seen=["voile"]), known(rows={"train": 1, "test": 65})]
+    others.append(known(truth=plane, bench=dict.fromkeys(("truth", "frame_truth"), plane)))
     assert len({first, *others}) == 5

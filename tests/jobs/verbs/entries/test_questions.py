@@ -37,14 +37,11 @@ def test_the_questions_are_those_of_the_shards_without_their_answers(folder, rec
     text = csv.read_csv(folder / "questions.csv")
     for name in ("id", *QUERY_COLUMNS):
         np.testing.assert_array_equal(text[name].to_numpy().astype(table[name].to_numpy().dtype), table[name])
-    assert text["fabric"].to_pylist() == table["fabric"].to_pylist() and set(text.column_names).isdisjoint(
-        SCHEMA.names[13:]
-    )
+    assert text["fabric"].to_pylist() == table["fabric"].to_pylist()
+    assert set(text.column_names).isdisjoint(SCHEMA.names[13:])
     listed = json.loads((folder / "questions.json").read_text())
-    dataset, coarse = (
-        load_recipe(recipe).dataset,
-        TruthOptions(estimator="mc", relative_error=1, min_count=64, max_count=64),
-    )
+    dataset = load_recipe(recipe).dataset
+    coarse = TruthOptions(estimator="mc", relative_error=1, min_count=64, max_count=64)
     voile = listed["fabrics"][1]
     assert (voile["name"], voile["role"], voile["first_id"], voile["last_id"]) == ("voile", "unseen", 64, 127)
     task = ShardTask(fabric=load_fabric("voile"), start=0, rows=64, split="test", seed=dataset.seed, truth=coarse)
@@ -54,7 +51,7 @@ def test_the_questions_are_those_of_the_shards_without_their_answers(folder, rec
         np.testing.assert_array_equal(table[name].to_numpy()[64:128], drawn[name])
 
 
-def test_a_folder_has_all_that_is_known_of_the_fabrics_and_no_other_file(folder):
+def test_a_folder_has_all_that_is_known_of_the_fabrics_a_form_to_be_filled_in_and_no_other_file(folder):
     names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     listed = json.loads((folder / "questions.json").read_text())
     assert names == listed["files"].keys() | {"questions.json"}
@@ -73,6 +70,11 @@ def test_a_folder_has_all_that_is_known_of_the_fabrics_and_no_other_file(folder)
     words = (folder / "README.md").read_text(encoding="utf-8")
     assert "f_P ALREADY CONTAINS" in words.replace("`", "") and "Ids are 0 to 255" in words
     assert all(f"`{key}`" in words for key in Yarn.model_fields) and "{" not in words
+    text = (folder / FORM).read_text(encoding="utf-8")
+    blank = tomllib.loads(text)
+    assert blank.keys() == EntryForm.model_fields.keys() and text.count("\n# ") >= len(blank)
+    with pytest.raises(BadInput, match=r"name.*more"):
+        validated(EntryForm, blank, FORM)
 
 
 def test_the_same_recipe_gives_the_same_bytes_and_other_files_are_refused(folder, recipe, refused, call, tmp_path):
@@ -85,11 +87,3 @@ def test_the_same_recipe_gives_the_same_bytes_and_other_files_are_refused(folder
     assert "is not empty" in refused("questions", recipe, "--to", tmp_path / "mine")
     (folder / "questions.csv").write_text("id\n")
     assert "was changed" in refused("questions", recipe, "--to", folder)
-
-
-def test_a_form_that_is_not_filled_in_is_refused_and_every_field_says_what_is_allowed(folder):
-    text = (folder / FORM).read_text(encoding="utf-8")
-    blank = tomllib.loads(text)
-    assert blank.keys() == EntryForm.model_fields.keys() and text.count("\n# ") >= len(blank)
-    with pytest.raises(BadInput, match=r"name.*more"):
-        validated(EntryForm, blank, FORM)

@@ -12,7 +12,7 @@ from weaves.fabric import load_fabric
 from weaves.mesh import repeat_mesh
 
 
-def test_a_draft_becomes_a_fabric_that_other_verbs_load(twillight, tmp_path):
+def test_a_draft_becomes_a_fabric_that_other_verbs_load_with_numbers_of_single_yarns_replaced(twillight, tmp_path):
     (tmp_path / "Scarf #2.wif").write_text(wif(WARP_COLORS=numbered([1, 2] * 4)), encoding="utf-8")
     code, text, complaint = twillight("import", "Scarf #2.wif", "--out", "deep/scarf.toml", "--like", "denim")
     assert (code, complaint) == (0, "")
@@ -21,9 +21,6 @@ def test_a_draft_becomes_a_fabric_that_other_verbs_load(twillight, tmp_path):
     assert fabric.name == "Scarf_2" and fabric.warp.bend == load_fabric("denim").warp.bend
     code, text, _ = twillight("show", "deep/scarf.toml")
     assert code == 0 and "4 ends × 4 picks" in text
-
-
-def test_options_replace_numbers_of_single_yarns(twillight, tmp_path):
     (tmp_path / "a.wif").write_text(wif(), encoding="utf-8")
     options = ["--warp.bend", "7", "--weft.width", "0.6", "--weft.roughness", "0.2", "--name", "own"]
     assert twillight("import", "a.wif", "--out", "a.toml", *options)[0] == 0
@@ -55,7 +52,6 @@ def test_a_fabric_that_was_exported_is_imported(twillight, tmp_path):
 
 
 def read_ply(path):
-    """Return places, colours and triangles of a binary PLY."""
     assert path.read_bytes().startswith(b"ply\nformat binary_little_endian 1.0\n")
     mesh = trimesh.load(path, process=False)
     return mesh.vertices.astype(np.float32), mesh.visual.vertex_colors, mesh.faces

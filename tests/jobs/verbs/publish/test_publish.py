@@ -81,7 +81,7 @@ def test_the_folder_holds_what_it_should_and_its_hashes(published):
     assert held_out == {file for file in found if "/test_only-" in file}
 
 
-def test_no_row_is_lost_or_changed(published, dataset):
+def test_no_row_is_lost_or_changed_and_the_door_reads_it_as_the_data_set_itself(published, dataset):
     def rows(frame):
         return frame.sort_values(list(frame.columns)).reset_index(drop=True)
 
@@ -89,6 +89,14 @@ def test_no_row_is_lost_or_changed(published, dataset):
     after = pd.concat([pq.read_table(path).to_pandas() for path in published.rglob("*.parquet")])
     before["fabric"] = before["fabric"].astype(str)
     pd.testing.assert_frame_equal(rows(before), rows(after.astype({"fabric": str})), check_dtype=False)
+    ours, theirs = twillight.open_dataset(dataset), twillight.open_dataset(published)
+    assert (ours.fabrics, ours.roles) == (theirs.fabrics, theirs.roles)
+    for split in ("train", "validation", "test"):
+        assert ours.pandas(split).equals(theirs.pandas(split))
+    for mine, other in zip(ours.numpy("own", "train"), theirs.numpy("own", "train"), strict=True):
+        assert all(np.array_equal(*columns) for columns in zip(mine, other, strict=True))
+    batches = list(theirs.torch("train", rows=50))
+    assert sum(len(batch["u"]) for batch in batches) == ROWS["seen", "train"] + ROWS["population", "train"]
 
 
 def test_pandas_and_the_loader_read_it(published):
@@ -103,17 +111,6 @@ def test_pandas_and_the_loader_read_it(published):
     assert done.stdout.split() == ["320", "64", "3"], done.stderr
     lines = (published / "load.py").read_text().splitlines()
     assert len([line for line in lines if line.strip()]) <= 11  # and a docstring
-
-
-def test_the_door_reads_it_as_the_data_set_itself(published, dataset):
-    ours, theirs = twillight.open_dataset(dataset), twillight.open_dataset(published)
-    assert (ours.fabrics, ours.roles) == (theirs.fabrics, theirs.roles)
-    for split in ("train", "validation", "test"):
-        assert ours.pandas(split).equals(theirs.pandas(split))
-    for mine, other in zip(ours.numpy("own", "train"), theirs.numpy("own", "train"), strict=True):
-        assert all(np.array_equal(*columns) for columns in zip(mine, other, strict=True))
-    batches = list(theirs.torch("train", rows=50))
-    assert sum(len(batch["u"]) for batch in batches) == ROWS["seen", "train"] + ROWS["population", "train"]
 
 
 def test_the_door_refuses_damaged_files(published, tmp_path):
@@ -223,10 +220,15 @@ def unpublished(refused, tmp_path):
     return unpublished
 
 
-def test_a_data_set_that_is_not_whole_or_a_folder_that_cannot_be_written_is_refused(tmp_path, unpublished):
+def test_a_data_set_that_is_old_or_not_whole_or_a_folder_that_cannot_be_written_is_refused(tmp_path, unpublished):
     folder = write_dataset(tmp_path / "made")
     manifest = Manifest.load(folder)
     first, second = manifest.shards[:2]
+    truth = manifest.about["truth"] | {"geometry": "torus"}
+    manifest.model_copy(update={"about": manifest.about | {"truth": truth}}).save(folder)
+    assert "is of another version (dataset.truth.geometry = 'torus')" in unpublished(folder)
+    manifest.model_copy(update={"about": manifest.about | {"shard_rows": 128}}).save(folder)
+    assert "its rows are not those of a recipe" in unpublished(folder)
     # Not finished: the manifest lists what is there.
     manifest.without({first.file}).save(folder)
     error = unpublished(folder)
@@ -244,16 +246,6 @@ def test_a_data_set_that_is_not_whole_or_a_folder_that_cannot_be_written_is_refu
     assert file_sha256(folder / first.file) == second.sha256 and "SHA-256" in unpublished(folder)
     (folder / "manifest.json").unlink()
     assert "generate the data set first" in unpublished(folder)
-
-
-def test_a_data_set_of_an_earlier_version_is_refused(tmp_path, unpublished):
-    folder = write_dataset(tmp_path / "made")
-    manifest = Manifest.load(folder)
-    truth = manifest.about["truth"] | {"geometry": "torus"}
-    manifest.model_copy(update={"about": manifest.about | {"truth": truth}}).save(folder)
-    assert "is of another version (dataset.truth.geometry = 'torus')" in unpublished(folder)
-    manifest.model_copy(update={"about": manifest.about | {"shard_rows": 128}}).save(folder)
-    assert "its rows are not those of a recipe" in unpublished(folder)
 
 
 def test_a_licence_that_hubs_do_not_know_has_a_name_and_an_address(dataset, tmp_path):

@@ -36,12 +36,9 @@ def test_a_table_has_the_second_bounce_of_walks():
         assert np.sqrt(np.mean((table - expected[:, :, family]) ** 2)) < 0.02 * scale
 
 
-def test_a_table_is_small(closed):
+def test_a_table_is_small_and_bounces_grow_with_every_colour(closed):
     assert sum(array.nbytes for array in closed) < 200_000
-
-
-def test_bounces_grow_with_every_colour(closed):
-    """Channels do not mix: grey of each albedo alone, and the three together."""
+    # Channels do not mix: grey of each albedo alone, and the three together.
     albedos = np.array([0.3, 0.6, 0.9])
     together = bounced(closed, LIGHTS, VIEWERS, np.tile(albedos, (2, 1)))
     alone = [bounced(closed, LIGHTS, VIEWERS, np.full((2, 1), albedo)) for albedo in albedos]

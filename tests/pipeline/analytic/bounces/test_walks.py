@@ -31,7 +31,7 @@ def test_starting_points_cover_what_is_seen_from_above(fabric):
     assert _gap_points(field, 4096)[2].sum() == pytest.approx(different_cells(field) * gap)
 
 
-def test_gaps_close_at_the_cut_off_angle():
+def test_gaps_count_where_neither_face_hides_them_and_close_at_the_cut_off_angle():
     """Straight elliptical yarns of width .6 hide .6 sqrt(cos^2 + .8^2 sin^2) / cos of what lies between them."""
     fabric = woven("gauze", bend=2.0, relief=0.8)
     closed, faces = cover(fabric.warp, fabric.weft), (height_field(fabric), height_field(fabric.back()))
@@ -43,6 +43,13 @@ def test_gaps_close_at_the_cut_off_angle():
         passed = seen / cosine / different_cells(faces[0])
         np.testing.assert_allclose(passed, (1.0 - hidden) * 0.4, atol=0.006)
         assert passed[0] == pytest.approx(closed.openness) and passed[2] > 0.0 == passed[3]
+    # From straight above all of them: what is seen is the plane. At 85 degrees yarns hide all gaps.
+    fabric = woven("gauze")
+    sums = transport(height_field(fabric), 1 << 10, np.array([unit(0, 0), unit(85, 0), unit(85, 90)]), unit(0, 0)[None])
+    field = height_field(fabric)
+    start = starting_points(field, 1 << 10)
+    assert sums.seen[0] - start.area.sum() == pytest.approx(0.16 * different_cells(field), rel=2e-2)
+    assert (sums.seen[1:] < 2.0 * math.cos(math.radians(85.0)) * different_cells(field)).all()
 
 
 def test_round_yarns_side_by_side_give_each_other_what_lines_of_sight_say():
@@ -61,26 +68,13 @@ def test_round_yarns_side_by_side_give_each_other_what_lines_of_sight_say():
     assert (leaves + sums.reached[0].sum()) / sums.seen[0] == pytest.approx(expected, rel=0.02)
 
 
-def test_light_takes_each_way_in_both_directions():
+def test_light_takes_each_way_in_both_directions_and_leaves_where_it_is_not_sent_on():
     """Lambertian yarns without walls, of which viewers see nothing: sun and viewer may change places."""
     ways = np.array([unit(*angles) for angles in ((20, 40), (55, 130), (70, 300), (40, 200))])
     sums = transport(height_field(cylinders(blend=1.0)), 1 << 16, ways, ways)
     there, back = sums.second, sums.second.transpose(3, 2, 1, 0)
     assert np.linalg.norm(there - back) < 0.03 * np.linalg.norm(there)
-
-
-def test_gaps_count_as_seen_where_neither_face_hides_them():
-    """From straight above all of them: what is seen is the plane. At 85 degrees yarns hide all gaps."""
-    fabric = woven("gauze")
-    sums = transport(height_field(fabric), 1 << 10, np.array([unit(0, 0), unit(85, 0), unit(85, 90)]), unit(0, 0)[None])
-    field = height_field(fabric)
-    start = starting_points(field, 1 << 10)
-    assert sums.seen[0] - start.area.sum() == pytest.approx(0.16 * different_cells(field), rel=2e-2)
-    assert (sums.seen[1:] < 2.0 * math.cos(math.radians(85.0)) * different_cells(field)).all()
-
-
-def test_light_that_is_not_sent_on_leaves():
-    """White closed cloth: of what comes from third yarns, the share that leaves and the share that goes on are 1."""
+    # White closed cloth: of what comes from third yarns, the share that leaves and the share that goes on are 1.
     above = sphere(16, 16)
     above = above[above[:, 2] > 0.0]
     sums = transport(height_field(CLOSED), 1 << 16, above[:1], above)

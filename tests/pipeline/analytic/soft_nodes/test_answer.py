@@ -75,7 +75,7 @@ def test_each_level_errs_less_on_wide_footprints():
     assert errors[2] < 0.75 * errors[1]
 
 
-def test_footprints_along_the_axes():
+def test_footprints_along_the_axes_and_long_ones_and_low_viewers_are_cut():
     """Stretched up to six times, either way round; the same through an angle of a right one."""
     fabric = load_fabric("cotton_twill")
     queries = draw_queries(QueryOptions(sigma=(0.3, 2.0), max_angle=70.0), fabric.weave.repeat, 9, 0, 60)
@@ -89,6 +89,22 @@ def test_footprints_along_the_axes():
     np.testing.assert_allclose(
         read_queries(table, turned).components, read_queries(table, swapped).components, rtol=1e-5
     )
+    # Under a wide footprint the projected area of all yarns is 1.
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(sigma=SIZES["wide"]), fabric.weave.repeat, 6, 0, 100)
+    sums, gaps = query_sums(tabulate(fabric), queries._replace(wo=np.tile(np.float32([0.0, 0.0, 1.0]), (100, 1))))
+    np.testing.assert_allclose(sums[:, :, AREA].sum(axis=1) + gaps, 1.0, atol=1e-3)
+    # A footprint longer than LONGEST and narrow across, or a viewer in the plane, answers as the nearest known one.
+    table, up = tabulate(load_fabric("denim")), [0.0, 0.0, 1.0]
+    for angle in (0.0, 0.3, math.pi / 2):
+        long = Queries.round([0.3] * 2, [0.4] * 2, [1e4, 48.0], [up] * 2, [[0.6, 0.0, 0.8]] * 2)
+        sums, _ = query_sums(table, long._replace(sigma_minor=np.float32([0.1, 0.1]), angle=np.float32([angle] * 2)))
+        assert np.isfinite(sums).all()
+        if angle != 0.3:
+            np.testing.assert_allclose(sums[0], sums[1], rtol=1e-4, atol=1e-6)
+    low = [[math.cos(x), 0.0, math.sin(x)] for x in (1e-5, 0.01745415)]
+    sums, _ = query_sums(table, Queries.round([0.3] * 2, [0.4] * 2, [0.1] * 2, [up] * 2, low))
+    np.testing.assert_allclose(sums[0], sums[1], rtol=1e-2, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -106,20 +122,6 @@ def test_footprints_at_an_angle(name, bound):
     wrong = colour_error(read_queries(table, queries).components, truth)
     assert wrong < bound
     assert colour_error(read_queries(table, rounded).components, truth) > 1.5 * wrong
-
-
-def test_long_footprints_and_low_viewers_are_cut():
-    """A footprint longer than LONGEST and narrow across, or a viewer in the plane, answers as the nearest known one."""
-    table, up = tabulate(load_fabric("denim")), [0.0, 0.0, 1.0]
-    for angle in (0.0, 0.3, math.pi / 2):
-        long = Queries.round([0.3] * 2, [0.4] * 2, [1e4, 48.0], [up] * 2, [[0.6, 0.0, 0.8]] * 2)
-        sums, _ = query_sums(table, long._replace(sigma_minor=np.float32([0.1, 0.1]), angle=np.float32([angle] * 2)))
-        assert np.isfinite(sums).all()
-        if angle != 0.3:
-            np.testing.assert_allclose(sums[0], sums[1], rtol=1e-4, atol=1e-6)
-    low = [[math.cos(x), 0.0, math.sin(x)] for x in (1e-5, 0.01745415)]
-    sums, _ = query_sums(table, Queries.round([0.3] * 2, [0.4] * 2, [0.1] * 2, [up] * 2, low))
-    np.testing.assert_allclose(sums[0], sums[1], rtol=1e-2, atol=1e-6)
 
 
 @pytest.mark.parametrize("width", [1.0, slow(0.7), slow(0.1)])
@@ -175,11 +177,3 @@ def test_shadows_take_light_away(sigma):
     sums, _ = query_sums(tabulate(fabric), queries)
     for lit, whole in ((DIFFUSE, OPEN_DIFFUSE), (SPECULAR, OPEN_SPECULAR)):
         assert (sums[:, :, lit] >= 0.0).all() and (sums[:, :, lit] <= 1.001 * sums[:, :, whole] + 1e-7).all()
-
-
-def test_straight_from_above_the_whole_cloth_is_seen():
-    """Under a wide footprint the projected area of all yarns is 1."""
-    fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=SIZES["wide"]), fabric.weave.repeat, 6, 0, 100)
-    sums, gaps = query_sums(tabulate(fabric), queries._replace(wo=np.tile(np.float32([0.0, 0.0, 1.0]), (100, 1))))
-    np.testing.assert_allclose(sums[:, :, AREA].sum(axis=1) + gaps, 1.0, atol=1e-3)

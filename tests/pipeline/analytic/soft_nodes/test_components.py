@@ -18,12 +18,17 @@ from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 
 
-def test_rows_do_not_depend_on_each_other():
+def test_rows_do_not_depend_on_each_other_nor_the_front_on_the_back():
     table = soft_table(LOPSIDED)
     asked = draw_queries(QueryOptions(), LOPSIDED.weave.repeat, 3, 0, 60)
     whole, part = read_queries(table, asked), read_queries(table, asked.take(slice(20, 40)))
     for all_rows, some in zip(whole, part, strict=True):
         np.testing.assert_array_equal(some, all_rows[20:40])
+    fabric = load_fabric("cotton_twill")
+    front, both = tabulate(fabric), tabulate(fabric, behind=True)
+    for name in ("nodes", "mean", "sharpness", "grid", "evenly"):
+        np.testing.assert_array_equal(getattr(front, name), getattr(both, name))
+    assert not front.behind_mean.size and both.behind_grid.shape == both.grid.shape
 
 
 @pytest.mark.parametrize("rows", [slow(("###", "#.#", ".#.")), slow(("#..", "#.#", "##.")), ("##", "##")])
@@ -62,15 +67,12 @@ def test_it_is_near_the_truth(name, sigma, bound, clear):
     assert math.sqrt(np.mean((found[:, 4] - truth.transparency) ** 2)) < clear
 
 
-def test_no_light_changes_the_transparency():
+def test_no_light_changes_the_transparency_and_only_thick_cloth_without_gaps_is_opaque():
     fabric = load_fabric("voile")
     table, queries = tabulate(fabric, behind=True), asked(fabric)
     found = read_behind(table, queries)[:, 4]
     np.testing.assert_allclose(found, read_behind(table, queries._replace(wi=-queries.wo))[:, 4], rtol=1e-5)
     assert (found >= 0).all() and (found <= 1).all()
-
-
-def test_a_thick_cloth_without_gaps_is_opaque_to_unscattered_light_and_a_thin_one_is_clear():
     thick, thin = (load_fabric("denim").model_copy(update={"optical_thickness": depth}) for depth in (100.0, 1e-3))
     queries = asked(thick)
     assert read_behind(tabulate(thick, behind=True), queries)[:, 4].max() < 1e-3
@@ -88,11 +90,3 @@ def test_a_sky_behind_lends_no_more_light_than_it_has():
         diffuse = read_behind(table, queries)[:, 2:4].sum(axis=1)
         # Directions are drawn in proportion to their cosine, within 75 degrees; the incident cosine is inside.
         assert math.sin(math.radians(75.0)) ** 2 * math.pi * np.mean(diffuse / -queries.wi[:, 2]) < 1.0
-
-
-def test_the_front_does_not_change():
-    fabric = load_fabric("cotton_twill")
-    front, both = tabulate(fabric), tabulate(fabric, behind=True)
-    for name in ("nodes", "mean", "sharpness", "grid", "evenly"):
-        np.testing.assert_array_equal(getattr(front, name), getattr(both, name))
-    assert not front.behind_mean.size and both.behind_grid.shape == both.grid.shape

@@ -25,7 +25,7 @@ def test_tables_stay_small(fabric, most):
     assert table.evenly.size <= 256 + 128 + 3 * BLOCK_NODES
 
 
-def test_horizons_of_narrow_and_wide_footprints_agree():
+def test_horizons_of_narrow_and_wide_footprints_agree_and_ramps_of_the_back_have_their_light():
     """A node's mean horizon is that of the grid over its box: both average to the same over a cell."""
     table = tabulate(load_fabric("polyester_lining"))
     for family in range(2):
@@ -40,10 +40,7 @@ def test_horizons_of_narrow_and_wide_footprints_agree():
         x, y = axes if family == 0 else axes[::-1]
         np.testing.assert_allclose(nodes, np.einsum("ayx,x,y->a", grid, x, y), atol=2e-3)
     assert table.grid.shape[1] == AZIMUTHS
-
-
-def test_ramps_of_the_back_have_the_light_of_its_horizons():
-    """Mixtures of horizons, many of them 1: the integral of z V differs by less than .01; for V = 1 it is .5."""
+    # Mixtures of horizons, many of them 1: the integral of z V differs by less than .01; for V = 1 it is .5.
     random, z = np.random.default_rng(3), np.linspace(0.0, 1.0, 2001)
     for share in random.uniform(0.0, 1.0, 60):
         sines = np.where(random.random(2000) < share, 1.0, random.uniform(*np.sort(random.random(2)), 2000))

@@ -81,7 +81,7 @@ def test_a_fault_of_predict_is_a_sentence_with_the_name(answers, sentence):
     assert "\n" not in str(failure.value)
 
 
-def test_sound_answers_are_those_of_the_method():
+def test_sound_answers_are_those_of_the_method_and_wrong_values_for_those_who_count_them():
     answers = some(0)
     method = guarded(answers)
     assert method.predict(DENIM, rows()) is answers
@@ -89,9 +89,6 @@ def test_sound_answers_are_those_of_the_method():
     assert method.covers(DENIM) is True
     assert guarded(some(1)[:0]).predict(DENIM, rows(0)).shape == (0, 4)
     assert guarded(np.int64(12)).bytes_stored(DENIM) == 12
-
-
-def test_a_measurement_that_counts_wrong_values_gets_them():
     method = unchecked(guarded(some(np.nan)))
     assert np.isnan(method.predict(DENIM, rows())).sum() == 1
     with pytest.raises(MethodFailed, match="is needed"):

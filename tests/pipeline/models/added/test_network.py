@@ -51,7 +51,7 @@ def trained(network, cloths, answer):
     return json.loads(json.dumps(card)), {"network.answer": torch.full((4,), float(answer))}
 
 
-def test_functions_that_are_missing_have_defaults(theirs):
+def test_functions_that_are_missing_have_defaults_and_random_numbers_are_those_of_the_step(theirs):
     network = build_added(theirs(), CLOTHS)
     network.start_at(torch.ones(5, 4))
     network.schedule(0.5)
@@ -59,6 +59,8 @@ def test_functions_that_are_missing_have_defaults(theirs):
     assert group["lr"] == 0.25 and group["params"][0] is network.network.answer
     about = network.architecture()
     assert (about["parameters"], about["layers"]) == ({"total": 4}, {"answer": [4]})
+    losses = [network.loss(batch(), np.random.default_rng(seed)).item() for seed in (1, 2, 1)]
+    assert losses[0] == losses[2] != losses[1]
 
 
 def test_its_own_functions_are_used(theirs):
@@ -82,12 +84,6 @@ def test_its_own_functions_are_used(theirs):
     assert network.network.answer.tolist() == [1.0, 1.5, 2.0, 2.5]
     assert network.parameter_groups(1.0)[0]["lr"] == 0.5
     assert network.architecture()["note"] == "tiny"
-
-
-def test_random_numbers_of_torch_are_those_of_the_step(theirs):
-    network = build_added(theirs(), CLOTHS)
-    losses = [network.loss(batch(), np.random.default_rng(seed)).item() for seed in (1, 2, 1)]
-    assert losses[0] == losses[2] != losses[1]
 
 
 LOSS = "(torch.rand(()) * self.answer - batch.target).square().mean()"
@@ -133,25 +129,19 @@ def test_a_fault_is_a_sentence_with_the_name_of_the_function(theirs, change, sen
     assert str(failure.value).startswith(f"theirs: {sentence}")
 
 
-def test_weights_are_loaded_into_the_method(theirs):
+def test_weights_are_loaded_and_fabrics_come_back_from_the_card_each_to_its_network(theirs):
     options = theirs()
     network = build_added(options, CLOTHS)
     method = restore_added(options, [trained(network, CLOTHS, 3)])
     assert not method.method.trained.training
     assert method.predict(CLOTHS[0], queries(2)).tolist() == [[3.0] * 4] * 2
     assert (method.name, method.domain, method.bytes_stored(CLOTHS[0])) == ("theirs", None, 16)
-
-
-def test_fabrics_come_back_from_the_card_without_their_colours(theirs):
     options = theirs("super().__init__()", "super().__init__(); self.seen = fabrics")
     network = build_added(options, CLOTHS)
     assert [cloth.optics() for cloth in network.network.seen] == [cloth.optics() for cloth in CLOTHS]
     assert network.network.seen[0].warp.diffuse != CLOTHS[0].warp.diffuse
     method = restore_added(options, [trained(network, CLOTHS, 3)])
     assert method.method.trained.seen == network.network.seen
-
-
-def test_networks_of_one_fabric_answer_for_theirs(theirs):
     options = theirs(has_one_fabric=True)
     parts = [trained(build_added(options, [cloth]), [cloth], index + 1) for index, cloth in enumerate(CLOTHS)]
     method = restore_added(options, parts)

@@ -20,7 +20,8 @@ from pipeline.truth.geometry.pieces import reference_plane
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices, directions_of, ray_share
-from tests.pipeline.truth.cloths import LOPSIDED, direction, equal_queries, woven
+from tests.directions import unit
+from tests.pipeline.truth.cloths import LOPSIDED, equal_queries, woven
 from tests.presets import slow
 
 RAYS = TruthOptions(estimator="owen", relative_error=0.01)
@@ -146,7 +147,7 @@ def test_the_area_of_a_footprint_is_that_of_its_rays(degrees):
     front, back, table = height_field(fabric), height_field(fabric.back()), tabulate(fabric)
     plane, choices = reference_plane(front), Choices(macro=False, shadows=True, rims=True)
     for x in (0.0, 0.5, 1.1, 1.7):
-        look = equal_queries(direction(20.0, 10.0), direction(degrees, 25.0), sigma=0.2, centre=(x, 0.7))
+        look = equal_queries(unit(20.0, 10.0), unit(degrees, 25.0), sigma=0.2, centre=(x, 0.7))
         sums, gaps = query_sums(table, look)
         towards = directions_of(*look.wi[0].astype(float), *look.wo[0].astype(float), 0.0)
         points = [x, 0.7] + 0.2 * ndtri(qmc.Sobol(2, rng=1).random(1024))
@@ -166,7 +167,7 @@ def test_light_does_not_depend_on_how_finely_one_looks(name, degrees):
     places = (qmc.Sobol(2, seed=1).random(1024) * fabric.weave.repeat).astype(np.float32)
     exact = RAYS.model_copy(update={"relative_error": 0.002, "max_count": 1 << 16})
     for azimuth, light in ((20.0, (40.0, 200.0)), (110.0, (60.0, 10.0)), (250.0, (20.0, 300.0))):
-        look = direction(*light), direction(degrees, azimuth)
+        look = unit(*light), unit(degrees, azimuth)
         asked = equal_queries(*look, sigma=0.03, rows=1024)._replace(u=places[:, 0], v=places[:, 1])
         narrow += nodes.predict(fabric, asked).sum(axis=1).mean(dtype=np.float64)
         wide += estimate(fabric, equal_queries(*look, sigma=3.0 * max(fabric.weave.repeat)), exact, 1).mean.sum()

@@ -9,12 +9,9 @@ from pipeline.truth.query import Queries
 from tests.pipeline.models.stand_ins import SMALL, batch_of, descend
 
 
-def test_pyramid_halves_down_to_one_texel():
+def test_textures_are_read_bilinearly_wrap_halve_and_blur_as_a_gaussian():
     assert level_shapes(4, 0, (5, 2)) == [(8, 20), (4, 10), (2, 5), (1, 3), (1, 2), (1, 1)]
     assert level_shapes(4, 2, (5, 2)) == [(8, 20), (4, 10)]
-
-
-def test_texture_is_read_bilinearly_and_wraps():
     texture = torch.arange(12.0).reshape(1, 3, 4)
     level = [torch.zeros(4, dtype=torch.int64)]
     # A texel's centre; half way to the next; half way across the right edge; the same a repeat further.
@@ -22,9 +19,6 @@ def test_texture_is_read_bilinearly_and_wraps():
     v = torch.full((4,), 1.5 / 3)
     expected = [[5.0], [5.5], [(7 + 4) / 2], [(7 + 4) / 2]]
     torch.testing.assert_close(read_texture([texture], u, v, level), torch.tensor(expected))
-
-
-def test_blur_keeps_the_mean_and_spreads_as_a_gaussian():
     texture = torch.zeros(1, 64, 64, dtype=torch.float64)
     texture[0, 32, 32] = 1.0
     smooth = blurred(texture, 2.0)[0]
@@ -34,9 +28,6 @@ def test_blur_keeps_the_mean_and_spreads_as_a_gaussian():
     assert blurred(texture, 0.2) is texture
     one = torch.ones(3, 1, 1)
     assert blurred(one, 9.0) is one
-
-
-def test_every_level_is_blurred_by_its_own_texels():
     fine = torch.zeros(1, 8, 8)
     fine[0, 4, 4] = 1.0
     sigma, place = torch.tensor([2.0 * 0.5 / 4]), torch.tensor([4.5 / 8])

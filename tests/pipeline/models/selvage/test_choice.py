@@ -31,23 +31,17 @@ def test_no_other_choice_in_the_same_time_has_less_error(time):
         assert of_other[1] > seconds * (1 + 1e-12) or of_other[0] >= error * (1 - 1e-6)
 
 
-def test_the_wished_time_is_used_up_over_many_queries():
+def test_the_wished_time_is_used_up_and_the_price_of_an_error_is_the_highest_that_keeps_it():
     squares, kinds = drawn(20_000)
     least, most = SECONDS[kinds].min(axis=1).mean(), totals(squares, kinds, squares.argmin(axis=1))[1]
     for share in (0.1, 0.5, 0.9):
         time = least + share * (most - least)
         _, seconds = totals(squares, kinds, within_time(squares, kinds, SECONDS, time))
         assert 0.93 * time < seconds <= time
-
-
-def test_times_at_the_ends_give_the_cheapest_and_the_best_answers():
     squares, kinds = drawn(100)
     cheapest = within_time(squares, kinds, SECONDS, SECONDS[kinds, 0].mean())
     np.testing.assert_array_equal(cheapest, np.zeros(100))
     np.testing.assert_array_equal(within_time(squares, kinds, SECONDS, 1.0), squares.argmin(axis=1))
-
-
-def test_the_price_of_an_error_is_the_highest_that_keeps_it():
     squares, kinds = drawn(1000)
     curve = error_curve(squares, kinds, SECONDS)
     assert (np.diff(curve) >= 0).all()

@@ -25,13 +25,23 @@ from weaves.population import Population, population_fabrics
 DENIM = load_fabric("denim")
 
 
-def test_the_table_has_a_row_for_every_case_and_answer():
+def test_the_table_has_a_row_for_every_case_and_a_query_errs_alike_alone_and_among_others():
     table = json.loads(ERROR_TABLE.read_text())
     assert [len(rows) for rows in table] == [5, 5, 4, 4] and len(table) == CASES
     assert {len(row) for rows in table for row in rows} == {TERMS + (NUMBERS - 1) * len(OF_CLOTH)}
+    queries = probes(DENIM, False, False, 16)
+    np.testing.assert_allclose(colours(DENIM, queries)[:, 4], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)
+    # Whatever side the others are lit from; mirrored queries have the same errors.
+    front, behind = probes(DENIM, False, False, 20), probes(DENIM, True, True, 20)
+    assert set(cases_of(front)) == {0} and set(cases_of(behind)) == {3}
+    whole = squared_errors(front, coefficients_of(DENIM, True))
+    np.testing.assert_array_equal(whole, squared_errors(front, coefficients_of(DENIM, False)))
+    mirrored = front._replace(wi=front.wi * np.float32([-1, 1, 1]), wo=front.wo * np.float32([-1, 1, 1]))
+    np.testing.assert_array_equal(whole, squared_errors(mirrored, coefficients_of(DENIM, True)))
+    assert (squared_errors(behind, coefficients_of(DENIM, True))[:, 4] > 1.0).all(), "no fallback of curved cloth"
 
 
-def test_numbers_of_a_cloth_are_differences_of_its_answers():
+def test_numbers_of_a_cloth_are_differences_of_its_answers_and_find_where_a_level_errs_more():
     """Equal answers have the least number; a difference e times as large adds 1."""
     same = np.full((10, 5), 0.2)
     numbers = numbers_of(same)
@@ -41,10 +51,7 @@ def test_numbers_of_a_cloth_are_differences_of_its_answers():
     other[:, 0] += 0.01 * np.e
     assert numbers_of(other)[1] - numbers_of(one)[1] == pytest.approx(1.0)
     np.testing.assert_array_equal(numbers_of(one)[2:], numbers[2:])
-
-
-def test_factors_find_where_a_level_errs_more_than_expected():
-    """Ten times as much as 1 % in one range of sizes; chi-square intervals of 4 deviations."""
+    # Ten times as much as 1 % in one range of sizes; chi-square intervals of 4 deviations.
     queries, random = probes(DENIM, False, False, 4000), np.random.default_rng(3)
     coefficients = np.zeros((CASES, 5, TERMS + len(SIZES) + 1), np.float32)
     coefficients[..., 0] = np.log(1e-4)
@@ -59,17 +66,6 @@ def test_factors_find_where_a_level_errs_more_than_expected():
     coefficients[..., TERMS:] = np.log(np.vstack([found, np.ones(len(rows))]))
     expected = squared_errors(queries, coefficients)[:, :4]
     assert expected[places == 1, 0].min() > 50.0 * expected[places == 1, 1].max()
-
-
-def test_a_query_errs_alike_alone_and_among_others():
-    """Whatever side the others are lit from; mirrored queries have the same errors."""
-    front, behind = probes(DENIM, False, False, 20), probes(DENIM, True, True, 20)
-    assert set(cases_of(front)) == {0} and set(cases_of(behind)) == {3}
-    whole = squared_errors(front, coefficients_of(DENIM, True))
-    np.testing.assert_array_equal(whole, squared_errors(front, coefficients_of(DENIM, False)))
-    mirrored = front._replace(wi=front.wi * np.float32([-1, 1, 1]), wo=front.wo * np.float32([-1, 1, 1]))
-    np.testing.assert_array_equal(whole, squared_errors(mirrored, coefficients_of(DENIM, True)))
-    assert (squared_errors(behind, coefficients_of(DENIM, True))[:, 4] > 1.0).all(), "no fallback of curved cloth"
 
 
 @pytest.mark.slow
@@ -100,8 +96,3 @@ def test_expected_errors_are_calibrated_on_cloth_never_seen(curved):
         for wished, parts in true.items():
             ratio = np.concatenate(parts).mean() / np.concatenate(expected[wished]).mean()
             assert 0.8 < np.sqrt(max(ratio, 0.0)) < 1.25, (behind, wished)
-
-
-def test_the_fallback_is_the_last_answer():
-    queries = probes(DENIM, False, False, 16)
-    np.testing.assert_allclose(colours(DENIM, queries)[:, 4], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)

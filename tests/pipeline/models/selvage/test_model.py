@@ -7,6 +7,7 @@ from pipeline.models.fallback import fallback_answers
 from pipeline.models.selvage import SelvageOptions
 from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
 from pipeline.models.selvage.model import Selvage
+from tests.refusals import refusal
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
@@ -24,7 +25,7 @@ def expected(selvage, queries, chosen):
     return np.sqrt(np.mean(np.square(errors, dtype=np.float64)))
 
 
-def test_every_query_gets_the_answer_that_is_chosen(selvage, queries):
+def test_every_query_gets_the_answer_chosen_by_itself_and_more_time_has_less_error(selvage, queries):
     chosen = selvage.choose(DENIM, queries, error=0.012)
     answers = selvage.predict(DENIM, queries, 5, error=0.012)
     assert len(np.unique(chosen)) >= 4
@@ -35,11 +36,12 @@ def test_every_query_gets_the_answer_that_is_chosen(selvage, queries):
     assert best.any()
     left = selvage.predict(DENIM, queries, 5, error=1e-6)[best]
     np.testing.assert_array_equal(left, fallback_answers(DENIM, queries.take(best), 5))
-
-
-def test_the_expected_error_is_the_wished_one(selvage, queries):
-    """Over other queries of the distribution that prices are found on, to chance; a smaller wish hardly ever has a
-    cheaper answer."""
+    whole = selvage.choose(DENIM, queries, error=0.012)
+    part = selvage.choose(DENIM, queries.take(slice(7, 20)), error=0.012)
+    np.testing.assert_array_equal(whole[7:20], part)
+    np.testing.assert_array_equal(Selvage(0.012).choose(DENIM, queries), whole)
+    # Over other queries of the distribution that prices are found on, to chance; a smaller wish hardly ever has a
+    # cheaper answer.
     queries = probes(DENIM, False, False, 2000, 8, ("projected_disc",))
     last = None
     for wished in (0.02, 0.015, 0.012, 0.01):
@@ -47,29 +49,23 @@ def test_the_expected_error_is_the_wished_one(selvage, queries):
         assert expected(selvage, queries, chosen) < 1.15 * wished
         assert last is None or (chosen >= last).mean() > 0.95
         last = chosen
-
-
-def test_a_choice_depends_on_the_query_alone(selvage, queries):
-    whole = selvage.choose(DENIM, queries, error=0.012)
-    part = selvage.choose(DENIM, queries.take(slice(7, 20)), error=0.012)
-    np.testing.assert_array_equal(whole[7:20], part)
-    np.testing.assert_array_equal(Selvage(0.012).choose(DENIM, queries), whole)
-
-
-def test_more_time_has_less_error(selvage, queries):
     errors = [expected(selvage, queries, selvage.choose(DENIM, queries, time=time)) for time in (1e-4, 3e-4, 1e-2)]
     assert errors[0] >= errors[1] >= errors[2]
     best = selvage.expected_errors(DENIM, queries).argmin(axis=1)
     np.testing.assert_array_equal(selvage.choose(DENIM, queries, time=1e-2), best)
 
 
-def test_light_from_behind_and_curved_cloth_are_answered(selvage):
+def test_light_from_behind_and_curved_cloth_are_answered_and_all_cores_pass_a_wish_on(selvage, queries):
     mixed = probes(DENIM, True, True, 40)
     answers = selvage.predict(DENIM, mixed)
     assert (selvage.choose(DENIM, mixed, error=1e-6) < 4).all(), "soft nodes alone"
     assert np.isfinite(answers).all() and (answers >= 0).all()
-    with pytest.raises(BadInput, match="viewers in front"):
-        selvage.predict(DENIM, mixed._replace(wo=-mixed.wo))
+    assert "viewers in front" in refusal(selvage.predict, DENIM, mixed._replace(wo=-mixed.wo))
+    options = SelvageOptions(errors=[0.1, 0.025])
+    assert [method.setting for method in options.methods()] == ["error 10 %", "error 2.5 %"]
+    assert not options.learns and options.single()[1].settings == (0.025,)
+    found = AllCores(selvage, 2).predict(DENIM, queries, error=0.012)
+    np.testing.assert_array_equal(found, selvage.predict(DENIM, queries, error=0.012))
 
 
 def test_another_meaning_of_walls_has_no_fallback(queries):
@@ -101,16 +97,4 @@ def test_wishes_that_cannot_be_kept_get_a_sentence(selvage, queries, wish, says)
 
 @pytest.mark.parametrize("wish", [{"error": 0.05}, {"time": 1e-4}])
 def test_other_methods_refuse_wishes(queries, wish):
-    with pytest.raises(BadInput, match="only selvage answers within a wished"):
-        AllCores(SoftNodes(1)).predict(DENIM, queries, **wish)
-
-
-def test_all_cores_pass_a_wish_on(selvage, queries):
-    found = AllCores(selvage, 2).predict(DENIM, queries, error=0.012)
-    np.testing.assert_array_equal(found, selvage.predict(DENIM, queries, error=0.012))
-
-
-def test_each_wished_error_is_a_method_of_its_own():
-    options = SelvageOptions(errors=[0.1, 0.025])
-    assert [method.setting for method in options.methods()] == ["error 10 %", "error 2.5 %"]
-    assert not options.learns and options.single()[1].settings == (0.025,)
+    assert "only selvage answers within a wished" in refusal(AllCores(SoftNodes(1)).predict, DENIM, queries, **wish)

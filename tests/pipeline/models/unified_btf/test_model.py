@@ -38,16 +38,13 @@ def test_decoder_has_the_published_weights(latent, published):
     assert NetworkMethod(UnifiedBtfNetwork(BTF)).bytes_stored(LINING) == 4 * (32 * (16 + 4 + 1) + weights)
 
 
-def test_pyramid_is_averaged_down_to_one_texel():
+def test_the_pyramid_is_averaged_and_read_and_what_differs_from_place_to_place_is_learnt():
     latents = torch.rand(6, 10, 3)
     pyramid = averaged(latents)
     assert [tuple(level.shape) for level in pyramid] == [(3, 6, 10), (3, 3, 5), (3, 2, 3), (3, 1, 2), (3, 1, 1)]
     torch.testing.assert_close(pyramid[1][:, 0, 0], latents[:2, :2].mean(dim=(0, 1)))
     torch.testing.assert_close(pyramid[-1][:, 0, 0], latents.mean(dim=(0, 1)))
-
-
-def test_footprint_chooses_the_level_and_place_the_texel():
-    """A texel's own footprint reads level 0, twice it level 1, a huge one the mean of all."""
+    # A texel's own footprint reads level 0, twice it level 1, a huge one the mean of all.
     model = UnifiedBtfNetwork(BTF.model_copy(update={"texel_sigma": 1.0}))
     pyramid = [torch.full((1, size, size), float(index)) for index, size in enumerate((4, 2, 1))]
     sigma = torch.tensor([1e-3, 0.5, 0.5 * math.sqrt(2), 1.0, 1e3])
@@ -57,10 +54,7 @@ def test_footprint_chooses_the_level_and_place_the_texel():
     centre_of_row_1_column_4 = torch.tensor([4.5 / 6]), torch.tensor([1.5 / 4])
     found = model.read(averaged(latents), *centre_of_row_1_column_4, torch.tensor([1e-3]))
     assert found.item() == pytest.approx(latents[1, 4, 0].item())
-
-
-def test_it_learns_what_differs_from_place_to_place():
-    """A target that follows which yarn of a plain weave is on top: four fifths of its variance are explained."""
+    # A target that follows which yarn of a plain weave is on top: four fifths of its variance are explained.
     model = untrained(BTF.model_copy(update={"texels_per_yarn": 4}), LINING).train()
     queries = draw_queries(QueryOptions(sigma=(0.1, 0.1)), LINING.weave.repeat, 3, 0, 256)
     warp = torch.from_numpy(np.sin(np.pi * queries.u) * np.sin(np.pi * queries.v))
@@ -70,9 +64,6 @@ def test_it_learns_what_differs_from_place_to_place():
     optimiser = torch.optim.Adam(model.parameters(), lr=1e-2)
     losses = descend(optimiser, 150, lambda step: model.loss(batch, np.random.default_rng(step)))
     assert np.mean(losses[-10:]) < 0.2 * losses[0]
-
-
-def test_loss_is_a_function_of_its_random_numbers():
     model, queries = untrained(BTF, LINING), draw_queries(QueryOptions(), LINING.weave.repeat, 3, 0, 16)
     batch = batch_of(queries, torch.rand(16, 4, generator=torch.Generator().manual_seed(0)))
     first, again, other = (model.loss(batch, np.random.default_rng(seed)).item() for seed in (1, 1, 2))

@@ -13,7 +13,7 @@ from weaves.surface import surface_at
 TWILL = load_fabric("cotton_twill")
 
 
-def test_surface_and_parameters_are_read_at_the_right_place():
+def test_surface_parameters_and_what_is_blended_are_read_at_the_right_place():
     """Texel (row, column) is the point (u, v) = (column + 1/2, row + 1/2)/side of the repeat."""
     options = WovenOptions(map_texels=32, standard=False)
     maps, parameters, _ = read_cloth([TWILL], options)
@@ -23,6 +23,18 @@ def test_surface_and_parameters_are_read_at_the_right_place():
     np.testing.assert_allclose(maps[0, 3:, 20, 5], point.tangent[0], atol=1e-6)
     expected = [TWILL.warp.roughness, TWILL.weft.roughness, TWILL.warp.relief, TWILL.weft.relief]
     np.testing.assert_allclose(parameters[0], expected, rtol=1e-6)
+    # Plain weave has many standard positions, and the yarns choose: both fabrics take the first one's. With the
+    # yarns exchanged, second = the first seen through the mirror x = y, whose own standard position is the same;
+    # in the first one's position it is another cloth.
+    plain = load_fabric("polyester_lining")
+    exchanged = plain.model_copy(update={"warp": plain.weft, "weft": plain.warp})
+    alone = [read_cloth([fabric], SMALL["woven"]) for fabric in (plain, exchanged)]
+    assert alone[0].placement.exchange.item() != alone[1].placement.exchange.item()
+    together = read_cloth([plain, exchanged], SMALL["woven"], like=plain)
+    for part in together.placement:
+        assert torch.equal(part[0], part[1])
+    torch.testing.assert_close(together.maps[:1], alone[0].maps)
+    torch.testing.assert_close(together.parameters[1], alone[0].parameters[0][[1, 0, 3, 2]])
 
 
 @pytest.mark.parametrize("standard", [False, True])
@@ -42,18 +54,3 @@ def test_cloth_begun_elsewhere_is_the_cloth_with_its_draft_rolled(standard):
     before, after = (one.placement.move(u, v, up, up)[:2] for one in (cloth, begun))
     assert after[0].item() == pytest.approx((before[0].item() + 1 / 4) % 1, abs=1e-6)
     assert after[1].item() == pytest.approx((before[1].item() + 3 / 4) % 1, abs=1e-6)
-
-
-def test_what_is_blended_lies_in_the_same_place():
-    """Plain weave has many standard positions, and the yarns choose: both fabrics take the first one's. With the yarns
-    exchanged, second = the first seen through the mirror x = y, whose own standard position is the same; in the first
-    one's position it is another cloth."""
-    plain = load_fabric("polyester_lining")
-    exchanged = plain.model_copy(update={"warp": plain.weft, "weft": plain.warp})
-    alone = [read_cloth([fabric], SMALL["woven"]) for fabric in (plain, exchanged)]
-    assert alone[0].placement.exchange.item() != alone[1].placement.exchange.item()
-    together = read_cloth([plain, exchanged], SMALL["woven"], like=plain)
-    for part in together.placement:
-        assert torch.equal(part[0], part[1])
-    torch.testing.assert_close(together.maps[:1], alone[0].maps)
-    torch.testing.assert_close(together.parameters[1], alone[0].parameters[0][[1, 0, 3, 2]])

@@ -7,10 +7,9 @@ import torch
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.encoder import read_cloth
 from pipeline.models.woven.model import Woven, WovenNetwork
-from pipeline.models.woven.standard_position import SYMMETRIES
+from pipeline.models.woven.standard_position import SYMMETRIES, moved, placement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
-from tests.pipeline.models.images import image_of
 from tests.pipeline.models.stand_ins import SMALL, batch_of
 from tests.pipeline.truth.cloths import woven
 from weaves.errors import BadInput
@@ -48,7 +47,7 @@ def test_both_readings_of_the_paper_have_their_counts(place, decoder, joined):
     assert sum(p.numel() for p in parts) == joined
 
 
-def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size():
+def test_bare_numbers_and_the_bias_are_at_their_start_and_transmission_sees_widths():
     """The decoder is handed u, v as shares and log2 of the size over its range: sigma = .4 of 4 yarns is .1 repeat."""
     network = WovenNetwork(WOVEN.model_copy(update={"one_blob": "none", "standard": False}))
     handed = []
@@ -57,6 +56,26 @@ def test_bare_numbers_are_the_place_in_the_repeat_and_the_encoded_size():
     size = math.log(0.1 / 0.005) / math.log(1.0 / 0.005)
     assert handed[0][1] is None
     assert handed[0][2].flatten().tolist() == pytest.approx([0.25, 0.75, size], abs=1e-6)
+    network = WovenNetwork(WOVEN)
+    before = network.decoder.last.weight.detach().clone()
+    target = torch.tensor([[0.02, 0.01, 0.1, 0.2], [0.04, 0.03, 0.1, 0.4]])
+    network.start_at(target)
+    k = WOVEN.log_k
+    expected = [(math.log1p(k * 0.02) + math.log1p(k * 0.04)) / 2, (math.log1p(k * 0.01) + math.log1p(k * 0.03)) / 2]
+    assert network.decoder.last.bias.tolist() == pytest.approx([*expected, 0.1, 0.3], rel=1e-5)
+    assert network.decoder.last.weight.abs().max() < 0.05 * before.abs().max()
+    # Cloths that differ in width alone have other latents; transparency stays in [0, 1]; off, it is 0.
+    options = WOVEN.model_copy(update={"transmission": True})
+    voile = load_fabric("voile")
+    method = Woven(WovenNetwork(options))
+    cloth = read_cloth([voile, woven("voile", warp={"width": 0.6})], options)
+    assert cloth.parameters.shape == (2, 7)
+    assert not torch.equal(cloth.parameters[0], cloth.parameters[1])
+    asked = draw_queries(QueryOptions(behind=0.5), voile.weave.repeat, 1, 0, 64)
+    share = method.transparency(voile, asked)
+    assert share.shape == (64,) and ((share >= 0) & (share <= 1)).all()
+    assert method.predict(voile, asked).shape == (64, 4)
+    assert not Woven(WovenNetwork(WOVEN)).transparency(voile, asked).any()
 
 
 @pytest.mark.parametrize("one_blob", ["none", "plain", "periodic", "local"])
@@ -76,8 +95,13 @@ def test_mirror_images_are_answered_alike(symmetry):
     method = Woven(WovenNetwork(WOVEN))
     cloth = woven("cotton_twill", ("##.#.", ".##.#", "#...#", ".#.##"))
     asked = draw_queries(QueryOptions(), cloth.weave.repeat, 1, 0, 200)
-    image, there, one = image_of(symmetry, cloth, asked)
-    expected = one.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
+    place, (ends, picks) = placement(cloth, symmetry, (0, 0)), cloth.weave.repeat
+    columns = asked.u / ends, asked.v / picks, asked.wi, asked.wo
+    u, v, wi, wo = (part[0].numpy() for part in place.move(*(torch.from_numpy(column)[None] for column in columns)))
+    image = moved(cloth, symmetry)
+    ends, picks = image.weave.repeat
+    there = Queries.round(u * ends, v * picks, asked.sigma, wi, wo)
+    expected = place.swap(torch.from_numpy(method.predict(cloth, asked))[None])[0]
     np.testing.assert_allclose(method.predict(image, there), expected, rtol=2e-3, atol=2e-5)
 
 
@@ -104,29 +128,3 @@ def test_a_colour_edit_needs_no_encoding_and_another_yarn_does():
     for changes, encoded in (({}, 1), ({"diffuse": (0.1, 0.2, 0.3)}, 1), ({"roughness": 0.31}, 2)):
         method.prepare(woven("cotton_twill", warp=changes))
         assert len(runs) == encoded
-
-
-def test_start_at_sets_the_bias_to_the_mean_in_network_space():
-    network = WovenNetwork(WOVEN)
-    before = network.decoder.last.weight.detach().clone()
-    target = torch.tensor([[0.02, 0.01, 0.1, 0.2], [0.04, 0.03, 0.1, 0.4]])
-    network.start_at(target)
-    k = WOVEN.log_k
-    expected = [(math.log1p(k * 0.02) + math.log1p(k * 0.04)) / 2, (math.log1p(k * 0.01) + math.log1p(k * 0.03)) / 2]
-    assert network.decoder.last.bias.tolist() == pytest.approx([*expected, 0.1, 0.3], rel=1e-5)
-    assert network.decoder.last.weight.abs().max() < 0.05 * before.abs().max()
-
-
-def test_transmission_sees_widths_and_answers_transparency():
-    """Cloths that differ in width alone have other latents; transparency stays in [0, 1]; off, it is 0."""
-    options = WOVEN.model_copy(update={"transmission": True})
-    voile = load_fabric("voile")
-    method = Woven(WovenNetwork(options))
-    cloth = read_cloth([voile, woven("voile", warp={"width": 0.6})], options)
-    assert cloth.parameters.shape == (2, 7)
-    assert not torch.equal(cloth.parameters[0], cloth.parameters[1])
-    asked = draw_queries(QueryOptions(behind=0.5), voile.weave.repeat, 1, 0, 64)
-    share = method.transparency(voile, asked)
-    assert share.shape == (64,) and ((share >= 0) & (share <= 1)).all()
-    assert method.predict(voile, asked).shape == (64, 4)
-    assert not Woven(WovenNetwork(WOVEN)).transparency(voile, asked).any()

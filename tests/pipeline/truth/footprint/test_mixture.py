@@ -29,7 +29,7 @@ def test_deviations_and_correlation_are_those_of_the_turned_covariance(major, ra
     assert narrow_axis(x, y, correlation) == pytest.approx(min(sides), rel=1e-4)
 
 
-def test_the_mixture_is_the_gaussian():
+def test_the_mixture_is_the_gaussian_of_a_round_footprint_and_a_wider_one_of_a_thin_ellipse():
     """Both kernels by their Fourier transforms, all that a sum over nodes can tell them apart by."""
     for sign in [-1.0, 1.0]:
         for correlation in CORRELATIONS:
@@ -45,9 +45,6 @@ def test_the_mixture_is_the_gaussian():
                     "p,pij->ij", shares, np.cos(np.multiply.outer(places, along))
                 )
                 assert np.abs(mixture - own).max() < bound
-
-
-def test_a_thin_ellipse_is_taken_wider_and_a_round_footprint_as_it_is():
     size = np.array([1.0, 1.0, 1.0], np.float32)
     minor, angle = np.array([1e-3, 1.0, 0.5], np.float32), np.array([0.7, 0.7, 0.0], np.float32)
     zero = np.zeros(3, np.float32)

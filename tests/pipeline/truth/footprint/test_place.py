@@ -7,7 +7,7 @@ from scipy import stats
 from pipeline.truth.footprint.place import BOX, BOX_SIDE, GAUSSIAN, Axis, place
 
 
-def test_moments_of_the_wrapped_kernel():
+def test_moments_of_the_wrapped_kernel_and_a_box_of_whole_repeats_is_the_repeat_average():
     for shape in [GAUSSIAN, BOX]:
         for sigma in [0.05, 0.4, 0.899, 0.901, 1.4, 2.9, 3.1, 40.0]:
             # The k-th circular moment of a wrapped kernel is that of the kernel itself: exp(-w^2 s^2 / 2), or a sinc.
@@ -19,9 +19,6 @@ def test_moments_of_the_wrapped_kernel():
                 gaussian, box = np.exp(-0.5 * (w * sigma) ** 2), np.sinc(w * sigma * BOX_SIDE / (2 * np.pi))
                 expected = (gaussian if shape == GAUSSIAN else box) * np.exp(1j * w * centre)
                 assert abs(np.mean(weight * np.exp(1j * w * x)) - expected) < 2e-4
-
-
-def test_a_box_of_whole_repeats_is_the_repeat_average():
     assert stats.uniform(0, BOX_SIDE).std() == pytest.approx(1.0) and math.isclose(BOX_SIDE, math.sqrt(12))
     for whole in (1, 2, 7):
         sigma = 2.0 * whole / BOX_SIDE

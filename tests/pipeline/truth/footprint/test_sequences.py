@@ -23,22 +23,16 @@ def _uniforms(key, count, dimension):
     return numbers
 
 
-def test_mix_is_splitmix64():
+def test_sequences_are_those_published_uniform_in_pairs_and_nets_in_every_aligned_run():
     # The first outputs of SplitMix64 seeded with 0, as its authors publish them.
     weyl = 0x9E3779B97F4A7C15
     outputs = [int(mix(np.uint64((n * weyl) % 2**64))) for n in (1, 2, 3)]
     assert outputs == [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F]
-
-
-def test_uniform_numbers_pass_a_chi_square_test_in_pairs_of_dimensions_and_of_indices():
     key = np.uint64(derive(np.uint64(7), 3))
     first, second = _uniforms(key, 200_000, 0), _uniforms(key, 200_000, 1)
     for a, b in ((first, second), (first[:-1], first[1:])):
         counts = np.histogram2d(a, b, bins=32, range=((0, 1), (0, 1)))[0]
         assert stats.chisquare(counts.ravel()).pvalue > LEVEL
-
-
-def test_every_aligned_run_is_a_net():
     for m in range(1, 11):
         # (0, m, 2)-net: every dyadic box of area 2^-m holds exactly one point.
         points = _pairs(np.uint64(derive(np.uint64(11), m)), 3 * 2**m)
@@ -47,9 +41,6 @@ def test_every_aligned_run_is_a_net():
             for a in range(m + 1):
                 box = (run[:, 0] * 2**a).astype(int) * 2 ** (m - a) + (run[:, 1] * 2 ** (m - a)).astype(int)
                 assert len(set(box)) == 2**m
-
-
-def test_a_point_is_uniform_over_keys():
     # Unbiasedness: one fixed index, many keys, both coordinates jointly uniform.
     points = np.array([owen_pair(np.uint64(derive(np.uint64(5), k)), 37) for k in range(40_000)])
     counts = np.histogram2d(*points.T, bins=16, range=((0, 1), (0, 1)))[0]

@@ -7,7 +7,8 @@ from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, ON_YARN, first_hi
 from pipeline.truth.geometry.heightfield import GAP, height_field, surface_at
 from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.pieces import reference_plane
-from tests.pipeline.truth.cloths import LOPSIDED, cylinders, direction, woven
+from tests.directions import unit
+from tests.pipeline.truth.cloths import LOPSIDED, cylinders, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at as oracle
@@ -57,19 +58,16 @@ def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
         assert slope < 1e-6
 
 
-def test_a_ray_along_the_normal_meets_what_is_seen_from_above():
+def test_a_ray_along_the_normal_meets_what_is_seen_from_above_and_others_walls_where_floats_end():
     field = height_field(load_fabric("voile"))
     down, along, _ = sinking(ray(0.0, 0.0, 1.0, 0.0), field.highest, 0.1)
     met = {first_hit(field, x, y, field.highest, down).what for x in np.linspace(0.0, 1.9, 20) for y in (0.02, 0.5)}
     assert along == 0.0 and met == {ON_YARN, MISSED}
-
-
-def test_rays_meet_walls_where_floats_end():
-    """Of denim, where the step between two floats faces the viewer; none along yarns that never end."""
+    # Of denim, where the step between two floats faces the viewer; none along yarns that never end.
     shares = []
     for fabric in (load_fabric("denim"), cylinders()):
         field = height_field(fabric)
-        towards, _, _ = sinking(ray(*direction(80.0, 20.0), 0.0), field.highest, field.highest)
+        towards, _, _ = sinking(ray(*unit(80.0, 20.0), 0.0), field.highest, field.highest)
         hits = [first_hit(field, 0.21 * k, 0.137 * k, field.highest, towards).what for k in range(400)]
         shares.append(np.mean(np.array(hits) == ON_WALL))
     assert 0.02 < shares[0] < 0.5 and shares[1] == 0.0
@@ -118,7 +116,7 @@ def test_a_ray_that_ends_on_a_wall_names_the_yarn_whose_wall_it_is(fabric):
     random = np.random.default_rng(4)
     walls = 0
     for x, y, azimuth in random.random((900, 3)) * np.array([*fabric.weave.repeat, 2.0 * math.pi]):
-        viewer = ray(*direction(65.0, math.degrees(azimuth)), 0.0)
+        viewer = ray(*unit(65.0, math.degrees(azimuth)), 0.0)
         towards, _, _ = sinking(viewer, field.highest, field.highest)
         hit = first_hit(field, x, y, field.highest, towards)
         if hit.what == ON_WALL:

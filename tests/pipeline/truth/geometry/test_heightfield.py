@@ -18,7 +18,7 @@ FABRICS = {
 
 
 @pytest.mark.parametrize("name", FABRICS)
-def test_surface_matches_the_oracle(name):
+def test_surface_matches_the_oracle_and_slopes_are_those_of_the_height(name):
     fabric = FABRICS[name]
     field = height_field(fabric)
     ends, picks = fabric.weave.repeat
@@ -33,10 +33,6 @@ def test_surface_matches_the_oracle(name):
     np.testing.assert_allclose(found[solid, 6:9], expected.tangent[solid], atol=1e-11)
     crown = field.crown[y.astype(int), x.astype(int)]
     assert field.crown.min() > 0 and (expected.height[solid] <= crown[solid] + 1e-12).all()
-
-
-@pytest.mark.parametrize("name", FABRICS)
-def test_slopes_are_those_of_the_height(name):
     field = height_field(FABRICS[name])
     generator, step = np.random.default_rng(5), 1e-6
     for _ in range(300):

@@ -13,15 +13,12 @@ from weaves.fabric import load_fabric
 FIELD = cloth_side(load_fabric("cotton_twill"), TruthOptions()).front
 
 
-def test_wrapped_positions_are_congruent_and_inside():
+def test_rays_enter_the_cells_of_their_points_and_pass_over_the_top_yarn_where_it_shows():
     for x in (0.0, 2.999, 3.0, -0.25, -3.0, 1e6 + 0.5, -1e-20):
         found = wrap(x, 3.0)
         assert 0.0 <= found < 3.0
         assert math.remainder(found - x, 3.0) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_ray_enters_the_cells_in_which_its_points_lie():
-    """The middle of the way through each cell lies in that cell, here and within the repeat of 3 x 5."""
+    # The middle of the way through each cell lies in that cell, here and within the repeat of 3 x 5.
     for turn in (0.0, 0.07, 0.25, 0.4, 0.5, 0.61, 0.75, 0.93):
         ends, picks = 3, 5
         field = FIELD._replace(top=np.zeros((picks, ends), np.int8))
@@ -36,10 +33,7 @@ def test_a_ray_enters_the_cells_in_which_its_points_lie():
             assert (cell.column, cell.row) == (column, row)
             assert (cell.end, cell.pick) == (column % ends, row % picks)
             cell, distance = next_cell(field, cell, towards), leave
-
-
-def test_the_way_over_the_top_yarn_is_where_the_top_yarn_shows():
-    """Points just inside both ends lie on the top yarn; points just outside do not."""
+    # Points just inside both ends lie on the top yarn; points just outside do not.
     field = cloth_side(woven("cotton_twill", width=0.6), TruthOptions()).front
     random, tested = np.random.default_rng(4), 0
     for _ in range(300):

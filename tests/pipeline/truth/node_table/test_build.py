@@ -28,7 +28,7 @@ def test_translations_leave_one_cell_of_each_orbit(name):
     assert len({tuple(cell) for piece in table.copies for cell in piece.tolist()}) == model.front.top.size
 
 
-def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
+def test_narrow_yarns_leave_gaps_of_the_right_area_and_the_table_says_what_it_does_not_know():
     model = cloth_side(woven("polyester_lining", width=0.7), TruthOptions())
     table = tabulate(model.front, model.back, False, nodes=16, azimuths=4)
     areas = dict.fromkeys(range(3), 0.0)
@@ -37,6 +37,12 @@ def test_narrow_yarns_leave_strips_and_gaps_of_the_right_area():
         areas[int(piece[PIECE_FAMILY])] += float(table.evenly[piece[0] : stop].sum())
     assert areas[GAP] == pytest.approx(0.3**2, rel=1e-4)
     assert areas[0] == pytest.approx(0.5 * (0.7 + 0.7 * 0.3), rel=1e-4)
+    fabric = load_fabric("denim")
+    queries = draw_queries(QueryOptions(sigma=(1.0, 8.0), max_angle=60.0), fabric.weave.repeat, 3, 0, 4)
+    curved = queries._replace(curvature=np.float32([0, 0, 0.1, 0]))
+    with pytest.raises(BadInput, match=r"node_table \(row 2\).*take auto"):
+        estimate(fabric, curved, TruthOptions(estimator="node_table"), 0)
+    assert np.isfinite(estimate(fabric, curved, TruthOptions(), 0).mean).all()
 
 
 @pytest.mark.parametrize(
@@ -68,15 +74,6 @@ def test_answers_match_converged_ones(fabric, behind, choices):
         size = np.linalg.norm(exact.mean, axis=1)
         assert np.median(np.linalg.norm(answers.mean - exact.mean, axis=1) / size) < (0.012 if behind else 0.006)
         assert np.median(np.abs(answers.transparency - exact.transparency)) < 1e-3
-
-
-def test_the_table_says_what_it_does_not_know():
-    fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=(1.0, 8.0), max_angle=60.0), fabric.weave.repeat, 3, 0, 4)
-    curved = queries._replace(curvature=np.float32([0, 0, 0.1, 0]))
-    with pytest.raises(BadInput, match=r"node_table \(row 2\).*take auto"):
-        estimate(fabric, curved, TruthOptions(estimator="node_table"), 0)
-    assert np.isfinite(estimate(fabric, curved, TruthOptions(), 0).mean).all()
 
 
 FENCED = """

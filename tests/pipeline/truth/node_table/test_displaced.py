@@ -12,7 +12,8 @@ from pipeline.truth.geometry.pieces import translations
 from pipeline.truth.node_table.build import tabulate
 from pipeline.truth.node_table.displaced import density_room, fill_displaced
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.truth.cloths import LOPSIDED, direction, equal_queries
+from tests.directions import unit
+from tests.pipeline.truth.cloths import LOPSIDED, equal_queries
 from weaves.fabric import load_fabric
 
 RAYS = TruthOptions(walls="left_out")
@@ -22,7 +23,7 @@ def _weights(fabric, sigma, minor, angle, degrees):
     """Return the weights of nodes, and what they are to be: areas times the Gaussian over all its images."""
     cloth = cloth_side(fabric, RAYS)
     table = tabulate(cloth.front, cloth.back, False, nodes=16, azimuths=4)
-    query = equal_queries(direction(30.0, 100.0), direction(degrees, 25.0), sigma, centre=(0.8, 1.3))
+    query = equal_queries(unit(30.0, 100.0), unit(degrees, 25.0), sigma, centre=(0.8, 1.3))
     query = query._replace(sigma_minor=np.float32([minor]), angle=np.float32([angle]))
     columns, weight = columns_of(query), np.zeros(len(table.evenly), np.float32)
     fill_displaced(table, cloth.plane, columns, 0, FINE_LINE, density_room(table, FINE_LINE), weight)

@@ -22,7 +22,6 @@ EVERY_PLACE = Known(False, False, True)
 
 
 def mean_of_points(cloth, directions, x, y, size, tilt):
-    """Return the mean of the sums over a square of 60 by 60 points."""
     sums = np.zeros((1, POINT_SUMS))
     for u in (np.arange(60) + 0.5) / 60:
         for v in (np.arange(60) + 0.5) / 60:

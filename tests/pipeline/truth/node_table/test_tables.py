@@ -19,31 +19,19 @@ def _columns(rows=6):
     return columns_of(draw_queries(QueryOptions(sigma=(0.5, 32.0), max_angle=60.0), DENIM.weave.repeat, 5, 0, rows))
 
 
-def test_a_table_is_built_once_and_again_only_for_light_from_behind():
+def test_a_table_is_built_once_and_knows_neither_curved_cloth_nor_tiny_footprints():
     cloth, table = cloth_side(DENIM, TruthOptions()), _table(nodes=4)
     front = table.table(cloth, False)
     assert table.table(cloth, False) is front
     both = table.table(cloth, True)
     assert len(both.slope_behind) == 4
     assert table.table(cloth, False) is both
-
-
-@pytest.mark.parametrize("options", [{"frame": "macro"}, {"shadows": False}], ids=str)
-def test_other_models_than_the_default_are_unknown(options):
-    assert _table().knows(cloth_side(DENIM, TruthOptions()), _columns()).all()
-    assert not _table().knows(cloth_side(DENIM, TruthOptions(parallax=False, **options)), _columns()).any()
-
-
-def test_curved_cloth_and_tiny_footprints_are_unknown():
     columns = _columns()
     bent, narrow = np.where(np.arange(6) == 1, 0.1, 0.0), np.where(np.arange(6) == 4, 0.01, 1.0)
     changed = columns._replace(curvature=bent, sigma=np.ones(6), sigma_minor=narrow)
     found = _table().knows(cloth_side(DENIM, TruthOptions()), changed)
     np.testing.assert_array_equal(found, [True, False, True, True, False, True])
-
-
-def test_rotated_footprints_are_known_up_to_what_the_mixture_resolves():
-    """At 45 degrees an ellipse with axes a and b has the correlation (a^2 - b^2) / (a^2 + b^2)."""
+    # At 45 degrees an ellipse with axes a and b has the correlation (a^2 - b^2) / (a^2 + b^2).
     columns = _columns(2)._replace(angle=np.full(2, np.pi / 4), sigma=np.full(2, 50.0))
     cloth = cloth_side(DENIM, TruthOptions())
     for line in (COARSE_LINE, FINE_LINE):
@@ -52,3 +40,9 @@ def test_rotated_footprints_are_known_up_to_what_the_mixture_resolves():
         np.testing.assert_array_equal(found, [False, True])
     boxes = cloth_side(DENIM, TruthOptions(footprint="box"))
     assert not _table().knows(boxes, columns._replace(sigma_minor=np.full(2, 20.0))).any()
+
+
+@pytest.mark.parametrize("options", [{"frame": "macro"}, {"shadows": False}], ids=str)
+def test_other_models_than_the_default_are_unknown(options):
+    assert _table().knows(cloth_side(DENIM, TruthOptions()), _columns()).all()
+    assert not _table().knows(cloth_side(DENIM, TruthOptions(parallax=False, **options)), _columns()).any()

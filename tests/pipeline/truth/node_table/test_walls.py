@@ -13,7 +13,8 @@ from pipeline.truth.node_table.displaced import density_room
 from pipeline.truth.node_table.kernels import no_shares, node_directions
 from pipeline.truth.node_table.seen_walls import sum_walls, wall_room
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.truth.cloths import cylinders, direction, woven
+from tests.directions import unit
+from tests.pipeline.truth.cloths import cylinders, woven
 from tests.presets import slow
 
 RIMS = TruthOptions()
@@ -40,8 +41,8 @@ def test_areas_of_nodes_and_walls_sum_to_the_cosine(cloth):
     even, sums = no_shares(len(table.evenly))._replace(weight=table.evenly), np.zeros((3, 5))
     rooms, of_walls = (density_room(table, FINE_LINE), wall_room(table)), []
     for degrees, azimuth in ((20.0, 10.0), (50.0, 100.0), (70.0, 215.0), (80.0, 300.0)):
-        wo = np.array(direction(degrees, azimuth))
-        towards = node_directions(np.array(direction(30.0, 50.0)), wo, len(table.slope))
+        wo = unit(degrees, azimuth)
+        towards = node_directions(unit(30.0, 50.0), wo, len(table.slope))
         sums[:] = 0.0
         area, *_ = sum_pieces(cloth, table, towards, even, *sums)
         walls, _ = sum_walls(cloth, table, towards, 0, *rooms, sums[0], sums[1])
@@ -50,13 +51,10 @@ def test_areas_of_nodes_and_walls_sum_to_the_cosine(cloth):
     assert max(of_walls) > 0.05
 
 
-def test_cylinders_side_by_side_have_no_walls():
+def test_cylinders_side_by_side_have_no_walls_and_a_straight_one_has_the_height_of_its_step():
     _, table = _table(cylinders(), nodes=8, azimuths=8)
     assert len(table.walls.height) == 0
-
-
-def test_a_straight_wall_has_the_height_of_its_step():
-    """Straight warps of half the width, one spacing apart: beside each, its edge stands over the straight weft."""
+    # Straight warps of half the width, one spacing apart: beside each, its edge stands over the straight weft.
     _, table = _table(woven("denim", ("##", "##"), {"width": 0.5, "bend": 0.0}, {"width": 1.0, "bend": 0.0}), 8, 8)
     walls = table.walls
     assert math.isclose(float(walls.evenly.sum()), 2.0, rel_tol=1e-5)

@@ -11,7 +11,8 @@ from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows, quadrature_rows
 from pipeline.truth.quadrature.rules import rectangles
-from tests.pipeline.truth.cloths import answering, direction, equal_queries, fixed, woven
+from tests.directions import unit
+from tests.pipeline.truth.cloths import answering, equal_queries, fixed, woven
 from weaves.fabric import load_fabric
 
 CUT, NEVER = 2, 9  # level from which on lines are cut; the second is never reached
@@ -41,7 +42,7 @@ def _specular_errors(roughness, split):
     fabric = woven("polyester_lining", roughness=roughness)
     pairs = [((30, 30), (30, 210)), ((40, 10), (35, 100)), ((20, 70), (45, 300)), ((10, 0), (25, 160))]
     model = cloth_side(fabric, TruthOptions(parallax=False, shadows=False))
-    wi, wo = (np.array([direction(*pair[k]) for pair in pairs], np.float32) for k in (0, 1))
+    wi, wo = (np.array([unit(*pair[k]) for pair in pairs], np.float32) for k in (0, 1))
     columns = columns_of(equal_queries((0, 0, 1), (0, 0, 1), rows=4)._replace(wi=wi, wo=wo))
     limits = Limits(1e-15, 0.0, 32, 1 << 30)
     different = first_cells(model.front)
@@ -64,7 +65,7 @@ def test_convergence_is_spectral_without_shadows(roughness, bounds):
 
 
 def _cases():
-    aslant = direction(50, 30), direction(40, 140)
+    aslant = unit(50, 30), unit(40, 140)
     behind = (*aslant[0][:2], -aslant[0][2])
     yield "plain", "polyester_lining", {}, {}, equal_queries(*aslant, sigma=0.6)
     yield "twill", "cotton_twill", {}, {}, equal_queries(*aslant, sigma=0.2)
@@ -72,7 +73,7 @@ def _cases():
     yield "gaps", "cotton_twill", {"width": 0.6}, {}, equal_queries(*aslant, sigma=0.5)
     yield "transmission", "polyester_lining", {"width": 0.8}, {}, equal_queries(behind, aslant[1], sigma=0.7)
     yield "from behind", "cotton_twill", {}, {}, equal_queries(aslant[0], (*aslant[1][:2], -aslant[1][2]), sigma=0.7)
-    curved = equal_queries(direction(70, 20), direction(60, 190), sigma=0.8)
+    curved = equal_queries(unit(70, 20), unit(60, 190), sigma=0.8)
     yield "curved", "wool_gabardine", {}, {}, curved._replace(curvature=np.full(1, 0.3, np.float32))
     yield "box", "polyester_lining", {}, {"footprint": "box"}, equal_queries(*aslant, sigma=0.4)
     yield "wide box", "polyester_lining", {}, {"footprint": "box"}, equal_queries(*aslant, sigma=0.9)
@@ -134,6 +135,6 @@ def test_extremes_stay_finite_and_not_negative(sigma, footprint):
     fabric = woven("silk_charmeuse", roughness=0.01)
     options = answering("quadrature", parallax=False, footprint=footprint, max_count=512)
     for theta in (0.0, 89.9):
-        queries = equal_queries(direction(theta, 13), direction(60.0, 200), sigma, rows=2, centre=(1e6 + 0.3, -1e6))
+        queries = equal_queries(unit(theta, 13), unit(60.0, 200), sigma, rows=2, centre=(1e6 + 0.3, -1e6))
         answers = estimate(fabric, queries, options, 1)
         assert all(np.isfinite(values).all() and (values >= 0).all() for values in answers)

@@ -45,7 +45,7 @@ def _exact_transmission(i, o, t, alpha, thickness):
     return float(flakes * crossing / (4 * (s_o * c_i - s_i * c_o)))
 
 
-def test_specular_matches_50_digits():
+def test_specular_and_transmission_match_50_digits_and_at_equal_lambda_the_limit():
     for alpha in [0.01, 0.1, 0.5, 1.0]:
         for thickness in [0.001, 2.0, 100.0]:
             worst = 0.0
@@ -58,14 +58,43 @@ def test_specular_matches_50_digits():
                 worst = max(worst, abs(ours - exact) / exact)
             # i, o, t are unit to 1e-16 only; alpha = .01 magnifies what the matrix form makes of that by alpha^-2.
             assert worst < 1e-12 / alpha
+    for alpha in [0.01, 0.1, 0.5, 1.0]:
+        for thickness in [0.001, 2.0, 100.0]:
+            worst = 0.0
+            for i, o, t in _crossing_pairs(60):
+                flakes, *sigmas = density(*(i + o), *t, alpha), sigma(*i, *t, alpha), sigma(*o, *t, alpha)
+                ours = transmission(flakes, *sigmas, i[2], -o[2], thickness)
+                exact = _exact_transmission(i, o, t, alpha, thickness)
+                if exact > 1e-300:
+                    worst = max(worst, abs(ours - exact) / exact)
+                else:
+                    assert 0.0 <= ours < 1.1e-300
+            # As for reflection: i, o, t are unit to 1e-16 only, which the matrix form magnifies by up to alpha^-2.
+            assert worst < 1e-12 / alpha
+    for thickness in [0.001, 2.0, 100.0]:
+        for degrees in [0.0, 45.0, 89.9]:
+            flakes, size, cosine = 0.7, 0.3, math.cos(math.radians(degrees))
+            limit = flakes * thickness * math.exp(-thickness * size / cosine) / (4 * cosine * cosine)
+            found = transmission(flakes, size, size, cosine, cosine, thickness)
+            assert found == pytest.approx(limit, rel=1e-14, abs=1e-300)
 
 
-def test_round_flakes_equal_the_lommel_seeliger_slab_and_opposite_directions_give_no_nan():
+def test_round_flakes_equal_the_slab_transmission_is_reciprocal_and_white_flakes_make_no_light():
     w = _unit(0.3, 0.2)
     assert density(*(w - w), 0.0, 1.0, 0.0, 0.1) == 0.0
     i, o, t = _unit(0.4, 0.1), _unit(1.1, 2.0), _unit(1.2, 0.5)
     ours = reflection(density(*(i + o), *t, 1.0), sigma(*i, *t, 1.0), sigma(*o, *t, 1.0), i[2], o[2], 2.0)
     assert ours == pytest.approx(-math.expm1(-2.0 * (1 / i[2] + 1 / o[2])) / (4 * math.pi * (i[2] + o[2])), rel=1e-13)
+    for i, o, t in _crossing_pairs(200):
+        s_i, s_o, flakes = sigma(*i, *t, 0.2), sigma(*o, *t, 0.2), density(*(i + o), *t, 0.2)
+        there, back = transmission(flakes, s_i, s_o, i[2], -o[2], 2.0), transmission(flakes, s_o, s_i, -o[2], i[2], 2.0)
+        assert there == back
+    # The rest met a second flake; a thin layer loses nothing, as that is of second order in T.
+    for alpha in [0.1, 0.5, 1.0]:
+        for degrees in [0.0, 50.0, 80.0]:
+            i, t = _unit(math.radians(degrees), 0.4), _unit(1.3, 0.9)
+            assert _energy(i, t, alpha, 2.0) < 1.0
+            assert _energy(i, t, alpha, 1e-4) == pytest.approx(1.0, abs=5e-3)
 
 
 def _crossing_pairs(count):
@@ -81,31 +110,6 @@ def _crossing_pairs(count):
         yield i, o * [1, 1, -math.copysign(1, o[2])], t
 
 
-def test_transmission_matches_50_digits():
-    for alpha in [0.01, 0.1, 0.5, 1.0]:
-        for thickness in [0.001, 2.0, 100.0]:
-            worst = 0.0
-            for i, o, t in _crossing_pairs(60):
-                flakes, *sigmas = density(*(i + o), *t, alpha), sigma(*i, *t, alpha), sigma(*o, *t, alpha)
-                ours = transmission(flakes, *sigmas, i[2], -o[2], thickness)
-                exact = _exact_transmission(i, o, t, alpha, thickness)
-                if exact > 1e-300:
-                    worst = max(worst, abs(ours - exact) / exact)
-                else:
-                    assert 0.0 <= ours < 1.1e-300
-            # As for reflection: i, o, t are unit to 1e-16 only, which the matrix form magnifies by up to alpha^-2.
-            assert worst < 1e-12 / alpha
-
-
-def test_transmission_at_equal_lambda_is_the_limit():
-    for thickness in [0.001, 2.0, 100.0]:
-        for degrees in [0.0, 45.0, 89.9]:
-            flakes, size, cosine = 0.7, 0.3, math.cos(math.radians(degrees))
-            limit = flakes * thickness * math.exp(-thickness * size / cosine) / (4 * cosine * cosine)
-            found = transmission(flakes, size, size, cosine, cosine, thickness)
-            assert found == pytest.approx(limit, rel=1e-14, abs=1e-300)
-
-
 @pytest.mark.parametrize("thickness", [0.001, 2.0, 100.0])
 def test_unscattered_matches_50_digits(thickness):
     mpmath.mp.dps = 50
@@ -114,22 +118,6 @@ def test_unscattered_matches_50_digits(thickness):
             cosine = math.cos(math.radians(degrees))
             exact = float(mpmath.exp(-mpmath.mpf(thickness) * mpmath.mpf(size) / mpmath.mpf(cosine)))
             assert unscattered(size, cosine, thickness) == pytest.approx(exact, rel=1e-12, abs=1e-300)
-
-
-def test_transmission_is_reciprocal_to_the_last_bit():
-    for i, o, t in _crossing_pairs(200):
-        s_i, s_o, flakes = sigma(*i, *t, 0.2), sigma(*o, *t, 0.2), density(*(i + o), *t, 0.2)
-        there, back = transmission(flakes, s_i, s_o, i[2], -o[2], 2.0), transmission(flakes, s_o, s_i, -o[2], i[2], 2.0)
-        assert there == back
-
-
-def test_white_flakes_return_no_more_than_they_receive():
-    """The rest met a second flake; a thin layer loses nothing, as that is of second order in T."""
-    for alpha in [0.1, 0.5, 1.0]:
-        for degrees in [0.0, 50.0, 80.0]:
-            i, t = _unit(math.radians(degrees), 0.4), _unit(1.3, 0.9)
-            assert _energy(i, t, alpha, 2.0) < 1.0
-            assert _energy(i, t, alpha, 1e-4) == pytest.approx(1.0, abs=5e-3)
 
 
 def _energy(i, t, alpha, thickness):

@@ -35,15 +35,12 @@ def test_reflection_and_transmission(name):
     np.testing.assert_allclose(found[clear], expected[clear], rtol=2e-5)
 
 
-def test_unscattered_light():
+def test_unscattered_light_and_a_density_as_a_quotient_and_light_that_arrives_behind_gives_nothing():
     _, _, sigma_o, _, cos_o, thickness = drawn(2)
     found = [slab_float32.unscattered(*row) for row in zip(sigma_o, cos_o, thickness, strict=True)]
     wide = (column.astype(np.float64) for column in (sigma_o, cos_o, thickness))
     expected = np.array([slab.unscattered(*row) for row in zip(*wide, strict=True)])
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-12)
-
-
-def test_a_density_may_come_as_a_quotient_and_light_that_arrives_behind_the_slab_gives_nothing():
     row = [np.float32(x) for x in (0.7, 0.4, 0.6, 0.3, 0.9)]
     whole = slab_float32.reflection(np.float32(6.0), np.float32(1.0), *row)
     assert slab_float32.reflection(np.float32(1.5), np.float32(0.25), *row) == pytest.approx(whole, rel=1e-6)

@@ -22,7 +22,7 @@ def queries(u, v, sigma, wi, wo=(0.0, 0.0, 1.0), minor=None, angle=0.0):
     return found._replace(sigma_minor=np.full(rows, minor, np.float32), angle=np.full(rows, angle, np.float32))
 
 
-def test_a_footprint_on_one_thread_has_its_colour():
+def test_colours_of_threads_add_up_and_one_thread_or_no_order_has_its_own():
     fabric = coloured("denim", ends=[["red", 3], ["blue", 5]])
     picks = fabric.weave.warp_over[:, 1].argmax() + 0.5  # ends 1, 5 and 9 are on top there
     found = component_colours(fabric, queries([1.5, 5.5, 9.5], [picks] * 3, 0.02, (0.3, 0.2, 0.93)), EXACT, 1)
@@ -30,10 +30,13 @@ def test_a_footprint_on_one_thread_has_its_colour():
     assert found.mean[:, 2] == pytest.approx(np.concatenate([red, blue, red]))
     assert found.mean[0, 0] == pytest.approx(PALETTE["red"]["specular"])
     assert found.mean[1, 0] == pytest.approx(fabric.warp.specular_rgb)
-
-
-def test_exchanged_colours_add_up_to_both():
-    """The same points weigh both, so that the sum is exact whatever the noise."""
+    denim = load_fabric("denim")
+    behind = queries([0.3], [2.2], 1.4, (0.0, 0.6, -0.8))
+    found = component_colours(denim, behind, EXACT, 1)
+    names, yarns = ("specular_rgb", "diffuse_transmission_rgb"), (denim.warp, denim.weft)
+    assert found.mean[0].tolist() == [list(getattr(yarn, name)) for name in names for yarn in yarns]
+    assert (found.standard_error == 0).all()
+    # The same points weigh both, so that the sum is exact whatever the noise.
     runs = [["red", 2], ["blue", 1], ["red", 1], ["blue", 3]]
     exchanged = [["blue" if name == "red" else "red", count] for name, count in runs]
     asked = queries([0.3, 2.2, 5.0], [0.1, 1.2, 2.9], 1.1, (0.5, -0.3, 0.81), (-0.6, 0.0, 0.8))
@@ -81,12 +84,3 @@ def test_standard_errors_are_those_of_independent_repetitions():
     patch = np.einsum("j,njc->nc", components, found.mean)
     ratio = patch.std(axis=0, ddof=1) / np.sqrt(np.square(found.standard_error).mean(axis=0))
     assert np.all((ratio > 0.7) & (ratio < 1.4)), ratio
-
-
-def test_a_cloth_without_an_order_has_the_colours_of_its_yarns():
-    denim = load_fabric("denim")
-    behind = queries([0.3], [2.2], 1.4, (0.0, 0.6, -0.8))
-    found = component_colours(denim, behind, EXACT, 1)
-    names, yarns = ("specular_rgb", "diffuse_transmission_rgb"), (denim.warp, denim.weft)
-    assert found.mean[0].tolist() == [list(getattr(yarn, name)) for name in names for yarn in yarns]
-    assert (found.standard_error == 0).all()

@@ -23,13 +23,19 @@ def written(tmp_path):
     return errors, read_exr(tmp_path / "differences.exr")
 
 
-def test_maps_come_back_from_the_file_and_average_to_the_errors(written):
+def test_maps_average_to_the_errors_and_tiles_are_red_where_bright_and_clear_where_nothing_counts(written):
     errors, exr = written
     assert (exr.channels["lit"] == MASK).all()
     for name in ("flip_ldr", "flip_hdr", "delta_e", "ssim"):
         assert exr.channels[name][MASK].mean() == pytest.approx(errors.perceived[name].value, rel=1e-5)
     squares = exr.stack("relative.R", "relative.G", "relative.B")[MASK].astype(float) ** 2
     assert squares.mean() == pytest.approx(errors.mse_relative.measured, rel=1e-5)
+    _, exr = written
+    for tile in (relative_tile(exr), flip_tile(exr), flip_tile(exr, "flip_hdr")):
+        rgba = matplotlib.image.imread(io.BytesIO(tile), format="png")[:: tiles.SCALE, :: tiles.SCALE]
+        assert ((rgba[..., 3] > 0) == MASK).all()
+    rgba = matplotlib.image.imread(io.BytesIO(relative_tile(exr)), format="png")[:: tiles.SCALE, :: tiles.SCALE]
+    assert (rgba[5:20, 5:14, 0] > rgba[5:20, 5:14, 2]).all() and (rgba[5:20, 18:27, 0] < rgba[5:20, 18:27, 2]).all()
 
 
 def test_relative_differences_are_signed_shares():
@@ -38,12 +44,3 @@ def test_relative_differences_are_signed_shares():
     for plane in maps.values():
         assert plane[:, :16][MASK[:, :16]] == pytest.approx(0.3)
         assert plane[:, 16:][MASK[:, 16:]] == pytest.approx(-0.3) and (plane[~MASK] == 0).all()
-
-
-def test_tiles_are_red_where_bright_and_clear_where_nothing_counts(written):
-    _, exr = written
-    for tile in (relative_tile(exr), flip_tile(exr), flip_tile(exr, "flip_hdr")):
-        rgba = matplotlib.image.imread(io.BytesIO(tile), format="png")[:: tiles.SCALE, :: tiles.SCALE]
-        assert ((rgba[..., 3] > 0) == MASK).all()
-    rgba = matplotlib.image.imread(io.BytesIO(relative_tile(exr)), format="png")[:: tiles.SCALE, :: tiles.SCALE]
-    assert (rgba[5:20, 5:14, 0] > rgba[5:20, 5:14, 2]).all() and (rgba[5:20, 18:27, 0] < rgba[5:20, 18:27, 2]).all()

@@ -28,28 +28,18 @@ def values(picture, truth=CLOTH):
     return perceived | {"mse": errors.mse.value, "mse_relative": errors.mse_relative.value}
 
 
-def test_equal_pictures_have_no_error():
+def test_known_errors_of_constant_pictures_of_colours_and_of_a_factor():
     exact = dict.fromkeys(("mse", "mse_relative", "flip_ldr", "flip_hdr", "delta_e"), 0)
     assert values(CLOTH) == exact | {"psnr": math.inf, "ssim": pytest.approx(1, abs=1e-12)}
-
-
-def test_psnr_and_ssim_of_constant_pictures():
-    """Codes 102 and 128 of 255 differ by 26/255 everywhere; the exposure cancels what the values were divided by.
-
-    Without variance, SSIM = (2 a b + C) / (a^2 + b^2 + C), C = .01^2.
-    """
+    # Codes 102 and 128 of 255 differ by 26/255 everywhere; the exposure cancels what the values were divided by.
+    # Without variance, SSIM = (2 a b + C) / (a^2 + b^2 + C), C = .01^2.
     a, b = 102 / 255, 128 / 255
     found = values(*(flat(*linear_rgb(code)) / 1.6 for code in ("#666666", "#808080")))
     assert found["psnr"] == pytest.approx(-20 * math.log10(b - a), abs=1e-9)
     assert found["ssim"] == pytest.approx((2 * a * b + 1e-4) / (a**2 + b**2 + 1e-4), abs=1e-9)
-
-
-def test_flip_of_green_and_blue_delta_e_of_black_and_white_and_relative_mse_of_a_factor():
-    """FLIP scales colour differences so that the one between the display's green and blue is its largest, 1.
-
-    L* are 0 and 100, mean 50: S_L = 1, so Delta E = 100. m = 1.1 t, t = 1 and 3 in halves: ((.1 t)^2 / (t^2 + eps 4))
-    averaged.
-    """
+    # FLIP scales colour differences so that the one between the display's green and blue is its largest, 1.  L*
+    # are 0 and 100, mean 50: S_L = 1, so Delta E = 100. m = 1.1 t, t = 1 and 3 in halves: ((.1 t)^2 / (t^2 + eps
+    # 4)) averaged.
     assert values(flat(0.0, 1.0, 0.0), flat(0.0, 0.0, 1.0))["flip_ldr"] == pytest.approx(1, abs=1e-5)
     assert values(flat(1.0, 1.0, 1.0), flat(1e-9, 1e-9, 1e-9))["delta_e"] == pytest.approx(100, abs=1e-3)
     truth = np.where(X[..., None] < 32, 1.0, 3.0) * np.ones(3)
@@ -57,16 +47,7 @@ def test_flip_of_green_and_blue_delta_e_of_black_and_white_and_relative_mse_of_a
     assert values(1.1 * truth, truth)["mse_relative"] == pytest.approx(expected)
 
 
-def test_measures_that_do_not_know_the_unit_of_light():
-    bright = values(4 * (CLOTH + 0.01), 4 * CLOTH)
-    found = values(CLOTH + 0.01)
-    assert bright["mse_relative"] == pytest.approx(found["mse_relative"])
-    assert bright["flip_hdr"] == pytest.approx(found["flip_hdr"], rel=1e-4)
-    assert bright["mse"] == pytest.approx(16 * found["mse"])
-    assert bright["delta_e"] != pytest.approx(found["delta_e"], rel=0.1)
-
-
-def test_every_measure_is_worse_with_noise_and_with_blur():
+def test_every_measure_is_worse_with_noise_and_with_blur_and_some_do_not_know_the_unit_of_light():
     noise = np.random.default_rng(1).standard_normal(CLOTH.shape)
     noisy = [CLOTH, *(CLOTH + size * noise for size in (0.005, 0.02, 0.08))]
     blurred = [CLOTH, *(ndimage.gaussian_filter(CLOTH, (size, size, 0)) for size in (0.5, 1.0, 2.0))]
@@ -74,6 +55,12 @@ def test_every_measure_is_worse_with_noise_and_with_blur():
         for better, worse in itertools.pairwise(map(values, pictures)):
             assert {name for name in better if better[name] > worse[name]} == {"psnr", "ssim"}
             assert all(better[name] != worse[name] for name in better)
+    bright = values(4 * (CLOTH + 0.01), 4 * CLOTH)
+    found = values(CLOTH + 0.01)
+    assert bright["mse_relative"] == pytest.approx(found["mse_relative"])
+    assert bright["flip_hdr"] == pytest.approx(found["flip_hdr"], rel=1e-4)
+    assert bright["mse"] == pytest.approx(16 * found["mse"])
+    assert bright["delta_e"] != pytest.approx(found["delta_e"], rel=0.1)
 
 
 def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores():
@@ -95,13 +82,17 @@ def test_noise_is_subtracted_and_the_floor_is_what_a_perfect_method_scores():
     assert noise_floor(CLOTH, EXACT, DISC)["ssim"] == pytest.approx(1)
 
 
-def test_what_is_outside_the_mask_does_not_matter():
+def test_what_is_outside_the_mask_does_not_matter_and_a_nearly_dark_truth_does_not_end_the_process():
     garbage = np.random.default_rng(3).choice([np.nan, -3.0, 1e30], CLOTH.shape)
     clean = image_errors(1.1 * CLOTH, CLOTH, 0.01 * CLOTH, DISC)
     found = image_errors(*(np.where(DISC[..., None], a, garbage) for a in (1.1 * CLOTH, CLOTH, 0.01 * CLOTH)), DISC)
     assert (found.mse, found.mse_relative, found.perceived) == (clean.mse, clean.mse_relative, clean.perceived)
     assert all((found.maps[name] == clean.maps[name]).all() for name in clean.maps)
     assert all(measure.pixels == DISC.sum() for measure in found.perceived.values())
+    # FLIP leaves the process (exit code 255) if the reference is below 1e-8: it must never see one.
+    dark = np.full((32, 32, 3), 1e-9)
+    errors = image_errors(2 * dark, dark, 0 * dark, np.ones((32, 32), bool))
+    assert errors.perceived["flip_hdr"].value > 0
 
 
 def test_a_record_for_every_number_that_is_finite():
@@ -141,10 +132,3 @@ def broken(array, value):
 def test_what_cannot_be_measured_is_bad_input(change, sentence):
     given = {"picture": CLOTH, "truth": CLOTH, "standard_error": EXACT, "mask": ALL} | change
     assert sentence in refusal(image_errors, **given)
-
-
-def test_a_nearly_dark_truth_does_not_end_the_process():
-    """FLIP leaves the process (exit code 255) if the reference is below 1e-8: it must never see one."""
-    dark = np.full((32, 32, 3), 1e-9)
-    errors = image_errors(2 * dark, dark, 0 * dark, np.ones((32, 32), bool))
-    assert errors.perceived["flip_hdr"].value > 0

@@ -21,12 +21,8 @@ from tests.refusals import refusal
 pytest.importorskip("mitsuba")
 
 COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
-FEW = {
-    "frames": 3,
-    "options": SceneOptions(environment_directions=4, bounces=1),
-    "truth": COARSE,
-    "frame_truth": COARSE,
-}
+FEW = {"frames": 3, "options": SceneOptions(environment_directions=4, bounces=1)}
+FEW |= {"truth": COARSE, "frame_truth": COARSE}
 SCENES = SceneBenchOptions(names=("dinner_table",), size=(40, 32), image=ImageOptions(block=4, resamples=100), **FEW)
 INTERVALS = ("mse", "mse_relative", "psnr", "ssim", "flip_ldr", "flip_hdr", "delta_e", "flicker", "colour_rrmse")
 
@@ -91,7 +87,7 @@ def test_the_same_work_gives_the_same_bytes(frames, folder):
     assert (folder / "again.npz").read_bytes() == (folder / "dinner_table.npz").read_bytes()
 
 
-def test_a_picture_is_the_base_and_the_light_of_its_queries(frames):
+def test_a_picture_is_the_base_and_the_light_of_its_queries_whose_noise_adds_in_quadrature(frames):
     pictures = frames.pictures()
     assert pictures.shape == (3, 32, 40, 3) and np.isfinite(pictures).all() and (pictures >= 0).all()
     # Where nothing is asked, the picture is its base; where something is, it is not darker.
@@ -101,6 +97,12 @@ def test_a_picture_is_the_base_and_the_light_of_its_queries(frames):
     twice = frames.pictures([2.0 * cloth.mean for cloth in frames.cloths])
     np.testing.assert_allclose(twice - pictures, pictures - frames.base, rtol=1e-5, atol=1e-9)
     assert len(frames.cloths) == 4
+    cloth = frames.cloths[0]
+    pixel = np.bincount(cloth.pixel[cloth.frame == 0]).argmax()
+    rows = (cloth.frame == 0) & (cloth.pixel == pixel)
+    assert rows.sum() > 1 and not any((c.pixel[c.frame == 0] == pixel).any() for c in frames.cloths[1:])
+    own = np.sqrt(np.square(cloth.noise()[rows]).sum(axis=0))
+    np.testing.assert_allclose(frames.noise()[0].reshape(-1, 3)[pixel], own, rtol=1e-6)
 
 
 @pytest.mark.slow
@@ -134,15 +136,6 @@ def test_all_bounces_are_those_of_the_table_for_the_truth_and_for_methods(tmp_pa
     light = bounces.later_bounces(cloth.fabric, cloth.queries, cloth.colours).sum(axis=1)
     np.testing.assert_allclose(cloth.light(zero[0]), cloth.weight * light, rtol=1e-5)
     assert light.min() >= 0.0 and light.max() > 1e-3
-
-
-def test_noise_of_many_lights_adds_in_quadrature(frames):
-    cloth = frames.cloths[0]
-    pixel = np.bincount(cloth.pixel[cloth.frame == 0]).argmax()
-    rows = (cloth.frame == 0) & (cloth.pixel == pixel)
-    assert rows.sum() > 1 and not any((c.pixel[c.frame == 0] == pixel).any() for c in frames.cloths[1:])
-    own = np.sqrt(np.square(cloth.noise()[rows]).sum(axis=0))
-    np.testing.assert_allclose(frames.noise()[0].reshape(-1, 3)[pixel], own, rtol=1e-6)
 
 
 def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(frames, measured):
