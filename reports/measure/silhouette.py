@@ -62,8 +62,8 @@ def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
     axes = [cosine, zero, -sine], [zero, one, zero], [sine, zero, cosine]
     frame = np.stack([np.stack(axis, -1) for axis in axes], 1)
     u, v = np.mod(radius * np.arcsin(sine), repeat[0]), np.mod(v, repeat[1])
-    columns = u, v, 0.5 * pixel / np.sqrt(cosine), frame @ light, frame[:, :, 2]
-    result = Queries.round(*(column.astype(np.float32) for column in columns))
+    places = u, v, 0.5 * pixel / np.sqrt(cosine), frame @ light, frame[:, :, 2]
+    result = Queries.round(*(place.astype(np.float32) for place in places))
     return result._replace(curvature=np.full(len(v), 1.0 / radius, np.float32))
 
 

@@ -49,7 +49,7 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
         part = part.merge(moving[[*keys, "flicker"]], on=keys, how="left").rename(columns=names)
         part["error"] = part["error"].where(part["error"] > 0)
         part["flicker"] = part["flicker"].astype(float).abs()
-        parts.append(part.assign(**{name: front(part, *costs) for name, costs in _FRONTS.items()})[columns])
+        parts.append(part.assign(**{name: front(part, *costs) for name, costs in _FRONTS.items()}).loc[:, columns])
     return pd.concat(parts, ignore_index=True)
 
 
