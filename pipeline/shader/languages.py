@@ -116,11 +116,10 @@ def translate(
 
 def compile_program(compiler: Path, source: Path, program: Program, target: str, path: Path) -> None:
     """Write one program; what is to draw in a browser becomes GLSL ES 3.00. WorkFailed if slangc refuses it."""
-    options = ["-DTEXTURES"] if program.textures else []
+    options = ["-line-directive-mode", "none", *(["-DTEXTURES"] if program.textures else [])]
     for entry in program.entries:
         options += ["-entry", entry, "-stage", program.stage]
     command = [str(compiler), str(source / program.source), *options, "-target", target, "-o", str(path)]
-    command += ["-line-directive-mode", "none"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=300.0, check=False)
     except (OSError, subprocess.SubprocessError) as error:

@@ -129,7 +129,6 @@ def _text(name: str) -> str:
 
 def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lambda share: None) -> dict[str, Any]:
     """Return what the page shows of a fabric, ready for JSON; `truth` and `progress` as for `write_page`."""
-    ends = fabric.weave.repeat[0]
     factors = bends(fabric), widths(fabric)
     of_shapes: list[dict[str, Any]] = []
     grids: list[str] = []
@@ -173,7 +172,7 @@ def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lamb
         "start": list(VIEWS).index(STILL),
         "shapes": {
             "spread": VIEW_SPREAD,
-            "radius": sphere_radius(ends),
+            "radius": sphere_radius(fabric.weave.repeat[0]),
             "half_arc": HALF_ARC,
             "half_height": HALF_HEIGHT,
             "arcs": arcs().tolist(),
@@ -225,7 +224,6 @@ def _nodes(fabric: Fabric, level: int) -> Sides:
 
 
 def _twist(yarn: Yarn) -> float:
-    """Return the twist with which the nodes of a yarn are tabulated."""
     return yarn.twist if abs(yarn.twist) >= 1.0 else TWISTED
 
 
