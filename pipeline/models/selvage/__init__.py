@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from pipeline.models.analytic.adapter import AnalyticOptions
+from pipeline.models.selvage.wish import USUAL_ERROR, text_of
 from pipeline.truth.options import Walls
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ class SelvageOptions(AnalyticOptions):
     """Soft nodes of the level that each query needs for a wished error, or the fallback; nothing is trained."""
 
     parameter: ClassVar[str] = "errors"
-    usual_setting: ClassVar[float] = 0.02
+    usual_setting: ClassVar[float] = USUAL_ERROR
     settings_allowed: ClassVar[str] = "a relative error above 0 and below 1 after the colon is needed, such as :.02"
     turns: ClassVar[bool] = True
     kinds: ClassVar[frozenset[str]] = frozenset({"stretch", "behind", "curvature"})
@@ -49,7 +50,7 @@ class SelvageOptions(AnalyticOptions):
     @classmethod
     def setting_of(cls, setting: float) -> str:
         """Return the text of a wished error."""
-        return f"error {100 * setting:g} %"
+        return text_of(setting)
 
     def methods(self) -> list[Selvage]:
         """Return one method for each wished error."""

@@ -7,17 +7,8 @@ import torch
 from pipeline.models.domain import Domain
 from pipeline.models.network import NetworkMethod
 from pipeline.models.unified_btf import UnifiedBtfOptions
-from pipeline.models.unified_btf.model import (
-    SetEncoder,
-    Texels,
-    UnifiedBtfNetwork,
-    angles_of,
-    averaged,
-    decoder,
-    read_texels,
-    restore,
-    texels_of,
-)
+from pipeline.models.unified_btf import model as btf
+from pipeline.models.unified_btf.model import UnifiedBtfNetwork, averaged, decoder, restore
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import rows_of
 from tests.pipeline.models.stand_ins import SMALL, batch_of, card_of, descend, untrained
@@ -87,32 +78,32 @@ def test_samples_decide_physics_and_kinds_of_queries_whatever_the_rows_held(phys
         method.predict(LINING, draw_queries(QueryOptions(behind=1.0), (2, 2), 5, 0, 4))
 
 
-def made_up(count: int, seed: int = 0) -> Texels:
+def made_up(count: int, seed: int = 0) -> btf.Texels:
     """Return smooth, positive samples of six texels that differ, without asking the truth."""
     drawn = draw_queries(QueryOptions(), (1, 1), seed, 0, count)
     phase = np.arange(24).reshape(6, 4)
     wave = 2.0 * drawn.wi[:, 0] + drawn.wo[:, 1] - drawn.wi[:, 2] * drawn.wo[:, 0]
-    angles = angles_of(torch.from_numpy(drawn.wi), torch.from_numpy(drawn.wo), OPTIONS.angles)
+    angles = btf.angles_of(torch.from_numpy(drawn.wi), torch.from_numpy(drawn.wo), OPTIONS.angles)
     values = 0.1 * (1.1 + np.sin(wave[:, None, None] + phase))
-    return Texels((1, 6), angles, torch.from_numpy(values.astype(np.float16)))
+    return btf.Texels((1, 6), angles, torch.from_numpy(values.astype(np.float16)))
 
 
-def encoder() -> SetEncoder:
+def encoder() -> btf.SetEncoder:
     torch.manual_seed(0)
-    built = SetEncoder(OPTIONS)
+    built = btf.SetEncoder(OPTIONS)
     built.scale.fill_(10.0)
     return built
 
 
-def encoded(model: SetEncoder, samples: Texels, chosen: np.ndarray | slice = slice(None)) -> torch.Tensor:
+def encoded(model: btf.SetEncoder, samples: btf.Texels, chosen: np.ndarray | slice = slice(None)) -> torch.Tensor:
     latents: torch.Tensor = model(samples.angles[chosen], samples.values[chosen].to(torch.float32))
     return latents
 
 
 def test_angles_tell_light_from_viewer():
     wi, wo = torch.tensor([0.6, 0.0, 0.8]), torch.tensor([0.0, -0.8, 0.6])
-    torch.testing.assert_close(angles_of(wi, wo, "disc"), torch.tensor([0.6, 0.0, 0.0, -0.8]))
-    torch.testing.assert_close(angles_of(wi, wo, "stereographic"), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
+    torch.testing.assert_close(btf.angles_of(wi, wo, "disc"), torch.tensor([0.6, 0.0, 0.0, -0.8]))
+    torch.testing.assert_close(btf.angles_of(wi, wo, "stereographic"), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
 
 
 @torch.inference_mode()
@@ -143,7 +134,7 @@ def test_averaged_latents_are_the_latent_of_the_averaged_texel():
     """Exactly so where no ReLU of the latent is on its other side: all of the encoder behind it is linear in values."""
     samples, model = made_up(200), encoder()
     values = samples.values.to(torch.float32).mean(dim=1, keepdim=True)  # not rounded to half precision
-    together = Texels((1, 1), samples.angles, values)
+    together = btf.Texels((1, 1), samples.angles, values)
     for offset in (10.0, -10.0):
         model.join.bias.fill_(offset)
         expected = encoded(model, together)[0]
@@ -155,10 +146,10 @@ def test_rows_become_samples_by_texels():
     """A 6 x 8 repeat, so that no mistake of order can hide; half precision rounds by 2^-11."""
     columns = FEW.angular_samples.answer(SHANTUNG, 0, FEW.angular_samples.count(SHANTUNG))
     queries, answers = rows_of(columns)
-    samples = read_texels(SHANTUNG, FEW, columns)
+    samples = btf.read_texels(SHANTUNG, FEW, columns)
     assert samples.shape == (2 * SHANTUNG.weave.repeat[1], 2 * SHANTUNG.weave.repeat[0])
     sample, row, column = 2, 3, 9
-    angles = angles_of(torch.from_numpy(queries.wi), torch.from_numpy(queries.wo), FEW.angles)
+    angles = btf.angles_of(torch.from_numpy(queries.wi), torch.from_numpy(queries.wo), FEW.angles)
     alike = (angles == samples.angles[sample]).all(dim=1).numpy()
     (found,) = np.flatnonzero((queries.u == column / 2 + 0.25) & (queries.v == row / 2 + 0.25) & alike)
     read = samples.values[sample, row * samples.shape[1] + column]
@@ -166,7 +157,7 @@ def test_rows_become_samples_by_texels():
 
 
 def test_samples_in_use_are_not_computed_again():
-    held = texels_of(LINING, FEW)
-    assert texels_of(LINING.model_copy(update={"name": "other"}), FEW) is held
-    assert texels_of(LINING, FEW.model_copy(update={"latent": 4})) is held
-    assert texels_of(LINING, FEW.model_copy(update={"max_angle": 60.0})) is not held
+    held = btf.texels_of(LINING, FEW)
+    assert btf.texels_of(LINING.model_copy(update={"name": "other"}), FEW) is held
+    assert btf.texels_of(LINING, FEW.model_copy(update={"latent": 4})) is held
+    assert btf.texels_of(LINING, FEW.model_copy(update={"max_angle": 60.0})) is not held
