@@ -22,21 +22,13 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
     from pipeline.models.domain import Domain
     from pipeline.models.fallback import Fallback
 
-    queries_by_fabric = list(queries_by_fabric)
-    fabrics = [fabric for fabric, _ in queries_by_fabric]
-    known = fabrics
-    if model.of_one_material:
-        optics = [fabric.optics() for fabric in recipe.seen + recipe.unseen]
-        known = [fabric for fabric in fabrics if fabric.optics() in optics]
-    options = model.options
-    domain = None
-    if model.learns:
-        learnt_from = recipe.seen + (recipe.unseen if model.of_one_material else recipe.population)
-        domain = Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from)
+    options, alone = model.options, model.of_one_material
+    learnt_from = recipe.seen + (recipe.unseen if alone else recipe.population)
+    domain = Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from) if model.learns else None
     method: Any = SimpleNamespace(name="", setting="", domain=domain, turns=options.turns)
     fallback = Fallback(method, options.kinds, recipe.bench.scenes.footprint)
-    fallback_rows = [
-        fallback.out_of_domain(fabric, queries) if fabric in known else np.ones(len(queries.u), np.bool_)
-        for fabric, queries in queries_by_fabric
-    ]
+    optics, fallback_rows = [fabric.optics() for fabric in learnt_from] if alone else [], []
+    for fabric, queries in queries_by_fabric:
+        known = not alone or fabric.optics() in optics
+        fallback_rows.append(fallback.out_of_domain(fabric, queries) if known else np.ones(len(queries.u), np.bool_))
     return float(np.concatenate(fallback_rows).mean())
