@@ -64,9 +64,7 @@ def test_shells_complete_verbs_and_options(shell, tmp_path):
         assert [row.split("\t")[0] for row in done.stdout.splitlines()] == [word]
 
 
-def test_list_plan_and_status_compute_nothing_and_pictures_of_show_agree_with_the_geometry(
-    twillight, tmp_path
-):
+def test_list_plan_and_status_compute_nothing_and_pictures_of_show_agree_with_the_geometry(twillight, tmp_path):
     code, text, _ = twillight("list")
     known = [load_fabric("tartan"), load_recipe("quick")]
     assert code == 0 and all(words in text for words in (known[0].weave.name, known[0].source, known[1].about))
