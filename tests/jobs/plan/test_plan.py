@@ -21,7 +21,7 @@ def splits(tasks, word=""):
     return {task.shard.split for task in tasks if task.stage == "generate" and word in task.title}
 
 
-def test_every_row_once_in_tasks_of_shard_rows(tasks):
+def test_every_row_once_in_tasks_of_shard_rows_and_the_largest_plan_is_paper_sized(tasks):
     rows = {}
     for task in tasks:
         if task.stage == "generate":
@@ -32,6 +32,8 @@ def test_every_row_once_in_tasks_of_shard_rows(tasks):
     counts = {"train": 2500, "validation": 100, "test": 500}
     named = {(name, split): count for name in ("denim", "own", "twill_4_4") for split, count in counts.items()}
     assert rows == named | {(f"random_00{index}", "train"): 800 for index in range(3)}
+    tasks = plan(load_recipe("full_transmission"))
+    assert sum(task.rows for task in tasks if task.stage == "generate") > 50_000_000
 
 
 def test_plans_are_pure_in_order_of_need_with_ids_of_what_tasks_compute_and_a_file_for_each_task(files, tasks):
@@ -44,7 +46,7 @@ def test_plans_are_pure_in_order_of_need_with_ids_of_what_tasks_compute_and_a_fi
     assert [task.id for task in tasks] == [fingerprint([task.stage, task.identity()]) for task in tasks]
 
 
-def test_a_general_model_never_reads_the_unseen_fabric_nor_any_test_row(tasks):
+def test_a_general_model_reads_no_unseen_fabric_nor_test_row_and_rows_that_nobody_reads_are_not_drawn(tasks, files):
     unseen, test = (set(ids(tasks, f"^generate.* {word} ").values()) for word in ("twill_4_4", "test"))
     for task in tasks:
         if task.stage == "train":
@@ -53,9 +55,6 @@ def test_a_general_model_never_reads_the_unseen_fabric_nor_any_test_row(tasks):
             assert ("twill_4_4" in task.fabrics) == (task.title == "neumip on twill_4_4")
     (woven,) = titled(tasks, "woven").values()
     assert list(woven.fabrics) == ["denim", "own", "random_000", "random_001", "random_002"]
-
-
-def test_rows_that_nobody_learns_from_are_not_drawn(files):
     general = files.exchange('[[models]]\nmodel = "neumip"\n', "").plan()
     assert splits(general, "twill_4_4") == {"test"} and splits(general) == {"train", "validation", "test"}
     recipe = load_recipe(files.write())
@@ -156,11 +155,6 @@ def test_random_unseen_fabrics_are_measured_by_general_models_alone(files, tasks
     assert all({task.id for task in rows} <= set(one.needs) for one in errors)
     names = [fabric.name for fabric, role in planned[-1].fabrics if role == "unseen"]
     assert names == ["twill_4_4", "unseen_0_irregular", "unseen_1_irregular"]
-
-
-def test_the_largest_plan_is_paper_sized():
-    tasks = plan(load_recipe("full_transmission"))
-    assert sum(task.rows for task in tasks if task.stage == "generate") > 50_000_000
 
 
 BTF = '\n[[models]]\nmodel = "unified_btf"\ntexels_per_yarn = 2\nsamples = 60\n'

@@ -51,11 +51,20 @@ THEIRS_ALONE = "timing|^report"
 """What a method from outside changes of the rest."""
 
 
-def test_a_given_method_is_one_more_model(planned, theirs):
+def test_a_given_method_is_one_more_model_with_the_options_and_the_name_of_the_recipe(planned, theirs, files):
     before, after = planned(), planned(theirs)
     errors = {f"bench errors of theirs, {name}" for name in ("denim", "own", "twill_4_4")}
     assert ids(after).keys() - ids(before).keys() == errors | {"bench extremes of theirs"}
     assert_changed(before, after, THEIRS_ALONE)
+    files.text += HERE + 'name = "other"\nrows = 9\nlimit = 5\nversion = "3"\n'
+    first = planned(theirs)
+    (task,) = (task for task in first if task.title == "errors of other, denim")
+    options = task.model.options
+    assert (options.name, options.own, options.limit, options.stated) == ("other", {"rows": 9}, 5.0, "3")
+    files.exchange("limit = 5", "limit = 50")
+    assert_changed(first, planned(theirs), "^$")
+    files.exchange("rows = 9", "rows = 10")
+    assert_changed(first, planned(theirs), f"of other|{THEIRS_ALONE}")
 
 
 @pytest.mark.parametrize("code", [METHOD, NETWORK])
@@ -106,18 +115,6 @@ def test_another_recipe_can_train_a_network(files, theirs, tmp_path, named):
     assert "code of your own is given with --add FILE.py:CLASS" in refusal(load_recipe, files.write())
     files.text = own + f'\n[[models]]\nmodel = "added"\nsource = "{theirs}"\nrecipe = "trains.toml"\n'
     assert "must be a model of the recipe trains" in refusal(load_recipe, files.write(), [theirs])
-
-
-def test_a_recipe_has_its_options_and_its_name(files, planned, theirs):
-    files.text += HERE + 'name = "other"\nrows = 9\nlimit = 5\nversion = "3"\n'
-    first = planned(theirs)
-    (task,) = (task for task in first if task.title == "errors of other, denim")
-    options = task.model.options
-    assert (options.name, options.own, options.limit, options.stated) == ("other", {"rows": 9}, 5.0, "3")
-    files.exchange("limit = 5", "limit = 50")
-    assert_changed(first, planned(theirs), "^$")
-    files.exchange("rows = 9", "rows = 10")
-    assert_changed(first, planned(theirs), f"of other|{THEIRS_ALONE}")
 
 
 @pytest.mark.parametrize("model", ["theirs", "added", "theirs:Theirs"])

@@ -186,7 +186,7 @@ def test_the_end_of_a_bend_is_no_silhouette(curvature, rims):
     assert low.sum() > 60 if rims else not low.any()
 
 
-def test_a_hollow_is_flat_and_left_handed_coordinates_show_the_front_and_no_mirror_image():
+def test_a_hollow_is_flat_left_handed_coordinates_show_the_front_and_frames_move_the_camera():
     dome = {"type": "cylinder", "p0": [-1, 0, 0], "p1": [1, 0, 0], "flip_normals": True, "b": WEARS}
     gbuffer = shot(lambda mi: {"dome": dome, "s": SUN}, eye=(-4, -1.5, 1.5), cloth=Cloth(yarns=(300, 300)))
     # Through the open end the inside is seen, which is the front; from outside, the back.
@@ -201,6 +201,11 @@ def test_a_hollow_is_flat_and_left_handed_coordinates_show_the_front_and_no_mirr
     centre = plane[:, 22:27, 30:35]
     assert (np.diff(centre[0], axis=1) > 0).all() and (np.diff(centre[1], axis=0) < 0).all()
     assert np.linalg.norm(gbuffer.wi, axis=1) == pytest.approx(1.0, abs=1e-6)
+    # A camera 0.4 further right sees a place of the floor that lies 0.4 further along x.
+    still, moved = shot(floor), shot(floor, frame=4.0)
+    shared = np.intersect1d(still.pixel, moved.pixel)
+    u = [gbuffer.u[np.searchsorted(gbuffer.pixel, shared)] for gbuffer in (still, moved)]
+    assert u[1] - u[0] == pytest.approx(0.4 * 100 / 8, abs=1e-3)
 
 
 def test_a_blocker_throws_its_shadow_and_those_of_an_even_sky_are_soft():
@@ -280,14 +285,6 @@ def test_point_lights_fall_off_with_the_square_and_an_even_sky_lights_both_sides
         assert total == pytest.approx(math.pi, rel=0.02)
     assert (gbuffer.wo[:, 2] > 0).all()
     assert not faults(gbuffer.queries((4, 4)))
-
-
-def test_frames_move_the_camera_to_the_right():
-    """A camera 0.4 further right sees a place of the floor that lies 0.4 further along x."""
-    still, moved = shot(floor), shot(floor, frame=4.0)
-    shared = np.intersect1d(still.pixel, moved.pixel)
-    u = [gbuffer.u[np.searchsorted(gbuffer.pixel, shared)] for gbuffer in (still, moved)]
-    assert u[1] - u[0] == pytest.approx(0.4 * 100 / 8, abs=1e-3)
 
 
 @pytest.mark.external

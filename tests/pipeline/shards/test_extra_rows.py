@@ -35,7 +35,7 @@ def test_samples_are_the_truth_at_the_texels_and_opacities_the_truths():
     assert column["curvature"].max() <= 0.5
 
 
-def test_all_texels_are_seen_under_directions_of_their_own_that_fabric_and_seed_choose():
+def test_all_texels_are_seen_under_directions_of_their_own_the_same_in_any_cut():
     lining, basket = (queries_of(SAMPLES.answer(fabric, 0, SAMPLES.count(fabric))) for fabric in (LINING, BASKET))
     rows, columns = SAMPLES.grid(LINING)
     assert SAMPLES.count(LINING) == 4 * rows * columns == 4 * 16
@@ -47,9 +47,6 @@ def test_all_texels_are_seen_under_directions_of_their_own_that_fabric_and_seed_
     cases = (OPACITY, DENIM), (OPACITY, BASKET), (OPACITY.model_copy(update={"seed": 1}), DENIM)
     drawn = [rows.answer(fabric, 0, 16)["sigma"] for rows, fabric in cases]
     assert len(np.unique(np.concatenate(drawn))) == 48
-
-
-def test_rows_are_the_same_in_any_cut_and_for_any_number_of_samples():
     told = []
     whole = SAMPLES.answer(LINING, 0, 64, told.append)
     assert told[-1] == 64

@@ -72,15 +72,12 @@ def test_the_truth_has_no_error_where_it_is_the_truth(measured):
     assert curves["path_error", "yarns of satin_8"].value == blended[0.5] == max(blended.values()) > 0.02
 
 
-def test_edits_of_a_yarn_are_waited_for_and_edits_of_a_colour_are_not():
+def test_edits_of_a_yarn_are_waited_for_and_a_network_is_measured():
     method = Slow()
     yarn, colour = measure_edits(method, load_fabric("denim"), repeats=5)
     assert len(method.asked) == 1 + 6  # the fabric, one edit to warm up, five timed ones: none twice
     assert yarn.low <= yarn.value <= yarn.high and yarn.value >= 3.0 and yarn.unit == "ms" and yarn.count == 5
     assert colour.value < yarn.value and (yarn.note, colour.note) == ("a yarn", "a colour")
-
-
-def test_a_network_is_measured():
     torch.manual_seed(0)
     method = Woven(WovenNetwork(WovenOptions(map_texels=16, encoder_channels=4, hidden=16, latent=8)))
     pair = pairs()[0]

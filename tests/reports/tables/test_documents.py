@@ -46,7 +46,7 @@ def test_rows_hold_the_numbers_of_the_records(records):
     assert "Recipe `quick`" in block and "1,200 held-out queries of 2 seen and 1 unseen fabrics" in block
 
 
-def test_several_unseen_fabrics_have_an_interval(two_unseen):
+def test_several_unseen_fabrics_have_an_interval_and_trainings_a_mean_and_a_range(two_unseen, three_trainings):
     """A second unseen fabric on which woven errs four times as much: 4.5 and 1.125 times lower.
 
     The geometric mean is 2.25, the interval exp(t_{.975, 1} ln(4) / 2) times less and more, t = 12.7062.
@@ -57,9 +57,6 @@ def test_several_unseen_fabrics_have_an_interval(two_unseen):
     assert "| two random points, exact shadows | 7.5e−4 | 1× | 1× | 0.15 | 1× |" in block
     assert f"| {README_METHODS['neumip', '']} | 1.7e−4 | 4.5× | 4.5× |" in block
     assert "in parentheses its 95 % interval over fabrics" in block
-
-
-def test_several_trainings_have_their_mean_and_range(three_trainings):
     block = readme_block(named(three_trainings), MACHINE, "", "file")
     assert f"| {README_METHODS['woven', '']} | 3.3e−4 | 2.2× [1.5 … 4.5×] | 2.2× [1.5 … 4.5×] | 0.00 | 4.3× |" in block
     # Trained once, on a single unseen fabric: no range, so no number.

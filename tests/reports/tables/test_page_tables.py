@@ -34,7 +34,9 @@ def test_a_table_groups_settings_of_a_method_and_a_paragraph_without_its_value_i
     assert paragraphs(["a {b}", "c"], {"b": 1}) == ["a 1", "c"] and paragraphs(["a {b}", "c"], {}) == ["c"]
 
 
-def test_networks_trained_once_are_left_out_of_a_single_unseen_fabric(made_up, three_trainings):
+def test_unseen_fabrics_have_geometric_means_and_a_single_one_no_network_trained_once(
+    made_up, three_trainings, two_unseen
+):
     """Neumip was trained once: its errors on the unseen fabric have no range; woven's have."""
     assert [table.title.partition(",")[0] for table in sections_of(made_up)["aliasing"]]
     sections = sections_of(three_trainings)
@@ -45,9 +47,6 @@ def test_networks_trained_once_are_left_out_of_a_single_unseen_fabric(made_up, t
         assert unseen and not any(row.label.startswith("NeuMIP") for table in unseen for row in table.rows)
     errors = page_frames(three_trainings)["errors"]
     assert len(errors[(errors["method"] == "neumip") & (errors["role"] == "unseen")]) == 1
-
-
-def test_several_unseen_fabrics_have_geometric_means(two_unseen):
     (over,) = [table for table in sections_of(two_unseen)["error"] if table.title.startswith("Means over unseen")]
     assert [row.label for row in over.rows][:1] == ["woven"] and "NeuMIP" not in [row.label for row in over.rows]
     ratio = cells_of(over, "woven")["× lower"]
@@ -69,16 +68,6 @@ def test_times_on_one_thread_and_on_most_stand_in_one_row():
     assert shown["ms a frame"] == "829" and shown["ms a frame, 4 threads"] == "249"
     assert shown["ms to add a fabric"] == "12.5" and shown["memory of a call"] == "30.00 MB"
     assert shown["processor s a million"] == ".400" and "J a million" not in shown
-
-
-def test_records_of_before_intervals_have_none_and_what_an_eye_sees_a_column_where_measured():
-    records = CALIBRATIONS.to_records([Calibration("auto", "solid", 0.9, 0.002, 0.8, 1.0, 1.0, 0.0, 100)])
-    old = [record.model_copy(update={"low": None, "high": None}) for record in records]
-    shown = [str(sections_of(found)["accuracy"][0].rows[0].cells[1]) for found in (old, records)]
-    assert shown == ["0.90", "0.90 (0.80 … 1.00)"]
-    assert "FovVideoVDP, JOD" not in cells_of(attic(RECORDS), "woven")
-    more = attic([*RECORDS, *measured("woven", fovvideovdp=9.12)])
-    assert [cells_of(more, name)["FovVideoVDP, JOD"].text for name in ("woven", "points, k = 2")] == ["9.12", "–"]
 
 
 def measured(method, setting="", **numbers):
@@ -130,10 +119,17 @@ def test_numbers_of_a_scene_have_intervals_and_ranges_and_the_last_row_is_the_tr
     assert noise["flicker"] == noise["ms a frame"] == noise["SSIM"] == "–"
 
 
-def test_an_error_in_the_noise_has_no_ratio_and_is_on_no_front():
+def test_an_error_in_the_noise_has_no_ratio_and_records_of_before_intervals_none():
     records = [*RECORDS, *measured("sums", mse=(-3e-6, -7e-6, 1e-6), frame_time=1.0)]
     frame = scene_table(records)
     assert math.isnan(frame["ratio"].iloc[-1]) and frame["front"].tolist() == [True, True, False]
     sums = cells_of(attic(records), "sums")
     assert (sums["MSE"].text, sums["× lower"].text) == ("in the noise", "–")
     assert sums["MSE"].interval == "(−7.00 … 1.00)e−6"
+    records = CALIBRATIONS.to_records([Calibration("auto", "solid", 0.9, 0.002, 0.8, 1.0, 1.0, 0.0, 100)])
+    old = [record.model_copy(update={"low": None, "high": None}) for record in records]
+    shown = [str(sections_of(found)["accuracy"][0].rows[0].cells[1]) for found in (old, records)]
+    assert shown == ["0.90", "0.90 (0.80 … 1.00)"]
+    assert "FovVideoVDP, JOD" not in cells_of(attic(RECORDS), "woven")
+    more = attic([*RECORDS, *measured("woven", fovvideovdp=9.12)])
+    assert [cells_of(more, name)["FovVideoVDP, JOD"].text for name in ("woven", "points, k = 2")] == ["9.12", "–"]

@@ -55,7 +55,7 @@ def test_every_query_gets_the_answer_chosen_by_itself_and_more_time_has_less_err
     np.testing.assert_array_equal(selvage.choose(DENIM, queries, time=1e-2), best)
 
 
-def test_light_from_behind_and_curved_cloth_are_answered_and_all_cores_pass_a_wish_on(selvage, queries):
+def test_light_from_behind_and_curved_cloth_are_answered_but_another_meaning_of_walls_has_no_fallback(selvage, queries):
     mixed = probes(DENIM, True, True, 40)
     answers = selvage.predict(DENIM, mixed)
     assert (selvage.choose(DENIM, mixed, error=1e-6) < 4).all(), "soft nodes alone"
@@ -66,9 +66,6 @@ def test_light_from_behind_and_curved_cloth_are_answered_and_all_cores_pass_a_wi
     assert not options.learns and options.single()[1].settings == (0.025,)
     found = AllCores(selvage, 2).predict(DENIM, queries, error=0.012)
     np.testing.assert_array_equal(found, selvage.predict(DENIM, queries, error=0.012))
-
-
-def test_another_meaning_of_walls_has_no_fallback(queries):
     other = Selvage(1e-6, walls="left_out")
     assert (other.choose(DENIM, queries) < 4).all()
     chosen = other.choose(DENIM, queries) == 3

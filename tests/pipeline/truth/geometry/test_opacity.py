@@ -108,7 +108,7 @@ def test_closed_forms_and_limits_known_without_sampling():
     assert (mean == 1).all() and (error == 0).all()
 
 
-def test_relief_scales_heights_and_opacity_grows_with_the_cosine_and_falls_with_curvature():
+def test_opacity_grows_with_relief_and_cosine_falls_with_curvature_and_refuses_bad_input():
     """A relief beta makes depths beta times smaller; beta = .01 is all but the smooth cylinder, met at any cosine."""
     flat = woven("denim", ("#",), relief=0.01)
     q = math.sqrt(2 * 0.1 * 0.01 * (0.5 - math.sqrt(0.25 - 0.09)))
@@ -124,6 +124,12 @@ def test_relief_scales_heights_and_opacity_grows_with_the_cosine_and_falls_with_
     x = np.linspace(0, 4, 50)
     edges = grazing_cosine(fabric, x, 0.7, 1.0, np.array([[0.0], [1e-6], [0.01], [0.1], [1.0]]))
     assert (np.diff(edges, axis=0) >= 0).all() and not edges[0].any() and edges[1].max() < 2e-3
+    fabric = load_fabric("denim")
+    with pytest.raises(BadInput, match=r"curvature\[0\] = 2.0: must be from 0 to 1"):
+        opacity(fabric, _queries(_wo([-0.5]), 2.0), TruthOptions(), 0)
+    assert "unit length" in refusal(opacity, fabric, _queries(2 * _wo([-0.5]), 0.5), TruthOptions(), 0)
+    assert "curvature = -0.1: from 0 to 1" in refusal(grazing_cosine, fabric, 0.0, 0.0, 0.0, [0.1, -0.1])
+    assert "azimuth = nan: must be finite" in refusal(grazing_cosine, fabric, 0.0, 0.0, math.nan, 0.1)
 
 
 @pytest.mark.parametrize("name", ["denim", "silk_charmeuse"])
@@ -173,12 +179,3 @@ def test_gaps_let_rays_through(width, curvature, depth):
     assert (found != hit).mean() < 0.006
     mean, error = opacity(fabric, _queries(wo, curvature), TruthOptions(relative_error=1e-2, max_count=1 << 13), 1)
     assert abs(mean[0] - hit.mean()) < 4 * math.hypot(0.5 / math.sqrt(len(x)), error[0])
-
-
-def test_bad_input_is_one_sentence():
-    fabric = load_fabric("denim")
-    with pytest.raises(BadInput, match=r"curvature\[0\] = 2.0: must be from 0 to 1"):
-        opacity(fabric, _queries(_wo([-0.5]), 2.0), TruthOptions(), 0)
-    assert "unit length" in refusal(opacity, fabric, _queries(2 * _wo([-0.5]), 0.5), TruthOptions(), 0)
-    assert "curvature = -0.1: from 0 to 1" in refusal(grazing_cosine, fabric, 0.0, 0.0, 0.0, [0.1, -0.1])
-    assert "azimuth = nan: must be finite" in refusal(grazing_cosine, fabric, 0.0, 0.0, math.nan, 0.1)

@@ -23,7 +23,7 @@ def written(tmp_path):
     return errors, read_exr(tmp_path / "differences.exr")
 
 
-def test_maps_average_to_the_errors_and_tiles_are_red_where_bright_and_clear_where_nothing_counts(written):
+def test_maps_average_to_the_errors_tiles_are_red_where_bright_and_differences_signed_shares(written):
     errors, exr = written
     assert (exr.channels["lit"] == MASK).all()
     for name in ("flip_ldr", "flip_hdr", "delta_e", "ssim"):
@@ -36,9 +36,6 @@ def test_maps_average_to_the_errors_and_tiles_are_red_where_bright_and_clear_whe
         assert ((rgba[..., 3] > 0) == MASK).all()
     rgba = matplotlib.image.imread(io.BytesIO(relative_tile(exr)), format="png")[:: tiles.SCALE, :: tiles.SCALE]
     assert (rgba[5:20, 5:14, 0] > rgba[5:20, 5:14, 2]).all() and (rgba[5:20, 18:27, 0] < rgba[5:20, 18:27, 2]).all()
-
-
-def test_relative_differences_are_signed_shares():
     maps = relative_differences(SIGN * TRUTH, TRUTH, MASK, epsilon=1e-12)
     assert set(maps) == {f"relative.{name}" for name in "RGBY"}
     for plane in maps.values():

@@ -188,13 +188,10 @@ def test_a_frames_time_weighs_every_cloth_by_its_queries(frames, monkeypatch):
     assert time_scene([method(1.0, covered=False)], frames, repeats, 0) == []
 
 
-def test_the_truths_picture_holds_its_noise(frames, tmp_path):
+def test_the_truths_picture_holds_its_noise_and_a_scene_that_does_not_exist_is_one_sentence(frames, tmp_path):
     write_truth(frames, tmp_path / "truth.exr")
     found = read_exr(tmp_path / "truth.exr")
     np.testing.assert_allclose(found.stack("R", "G", "B"), frames.pictures()[0], rtol=1e-6)
     np.testing.assert_allclose(film(found), frames.pictures(), rtol=1e-3, atol=1e-6)
     np.testing.assert_allclose(found.stack("error.R", "error.G", "error.B"), frames.noise()[0], rtol=1e-5, atol=1e-9)
-
-
-def test_a_scene_that_does_not_exist_is_one_sentence(tmp_path):
     assert "scene" in refusal(shoot, "tabel", SCENES, tmp_path / "x.npz")
