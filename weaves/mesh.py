@@ -23,8 +23,6 @@ INSIDE: Final = 1e-12
 LEAST_STEP: Final = 1e-6
 """Pieces whose heights differ by less than this meet without a wall, in yarn spacings."""
 
-Integers = npt.NDArray[np.int64]
-
 
 class Mesh(NamedTuple):
     """Triangles: vertices, (V, 3), in yarn spacings, and corners, (F, 3).
@@ -34,7 +32,7 @@ class Mesh(NamedTuple):
     """
 
     vertices: Floats
-    faces: Integers
+    faces: npt.NDArray[np.int64]
 
 
 class RepeatMesh(NamedTuple):
@@ -168,7 +166,6 @@ def _steps(border: float, grid: Floats, left: Floats, right: Floats) -> Mesh:
 
 
 def _joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Join meshes."""
     start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     vertices = [np.empty((0, 3)), *(mesh.vertices for mesh in meshes)]
     faces = [np.empty((0, 3), np.int64), *(mesh.faces + s for mesh, s in zip(meshes, start[:-1], strict=True))]

@@ -197,17 +197,16 @@ def _draft_file(pattern: PatternData, path: Path, remarks: list[str]) -> DraftFi
     return DraftFile(
         title=one_line(pattern.name if pattern.name not in ("", "?", where) else path.stem, 100),
         program=one_line(f"{pattern.source_program} {pattern.source_version}".replace("?", "").strip(), 60),
-        warp_over=_woven(pattern.threading, make_liftplan(pattern), ends, picks, where) ^ (not pattern.is_rising_shed),
+        warp_over=_woven(pattern, ends, picks, where) ^ (not pattern.is_rising_shed),
         ends=_threads(pattern, "warp", ends, table, remarks),
         picks=_threads(pattern, "weft", picks, table, remarks),
         remarks=tuple(remarks),
     )
 
 
-def _woven(
-    threading: Mapping[int, set[int]], lifts: Mapping[int, set[int]], ends: int, picks: int, where: str
-) -> Bools:
+def _woven(pattern: PatternData, ends: int, picks: int, where: str) -> Bools:
     """Return where an end is on a shaft that its pick names, bool (picks, ends)."""
+    threading, lifts = pattern.threading, make_liftplan(pattern)
     shafts = max([0, *(shaft for sets in (threading, lifts) for numbers in sets.values() for shaft in numbers)])
     if shafts > MOST_THREADS or min([0, *threading, *(shaft for each in threading.values() for shaft in each)]) < 0:
         raise BadInput(where, "[THREADING]", shafts, f"shafts from 1 to {MOST_THREADS} are needed")
