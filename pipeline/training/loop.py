@@ -26,7 +26,7 @@ from pipeline.models.card import write_model
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.domain import Domain
 from pipeline.models.registry import build_network
-from pipeline.shards.extra_rows import set_name
+from pipeline.shards.generate import set_name
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
 from pipeline.training.dataset import TARGET, Batches, Order, load_rows

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from jobs.verbs.publish.card import licence_url
 from jobs.verbs.publish.contents import About, stem
-from pipeline.shards.joined import columns_joined
+from pipeline.shards.pieces import columns_joined
 
 _CR: Final = (
     "column conformsTo dataType extract field fileObject fileProperty fileSet format includes isLiveDataset jsonPath "

@@ -1,14 +1,15 @@
-"""Answers to all questions of a benchmark as a file from anywhere, Parquet or CSV, read as data and checked as a whole.
+"""Files of a benchmark: its questions, which are held-out queries with an id each, and answers to all of them.
 
-A row is the `id` of a question and its answer: the four components, or, if one of these is missing, linear RGB in the
-fabric's own colours. Rows have any order, other columns are ignored.
+Answers come from anywhere, as Parquet or CSV; they are read as data and checked as a whole. A row is the `id` of a
+question and its answer: the four components, or, if one of these is missing, linear RGB in the fabric's own colours.
+Rows have any order, other columns are ignored.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,8 +20,10 @@ from pyarrow import csv
 
 from pipeline.atomic import atomic_path
 from pipeline.compiled.arrays import Float32
+from pipeline.shards.generate import ShardTask
 from pipeline.shards.query_file import blocks, open_queries
-from pipeline.shards.store import ROW_GROUP, parquet_writer
+from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
+from pipeline.shards.store import ROW_GROUP, columns_of, parquet_writer
 from pipeline.truth.conventions import COMPONENTS
 from weaves.errors import BadInput
 from weaves.reading import refuse_irregular
@@ -29,8 +32,39 @@ ID: Final = "id"
 RGB_COLUMNS: Final = ("red", "green", "blue")
 """Columns of answers in colour."""
 
+QUESTION_COLUMNS: Final = pa.schema(
+    [
+        pa.field(ID, pa.int64(), nullable=False, metadata={"meaning": "number of the question, from 0"}),
+        pa.field("fabric", SCHEMA.field("fabric").type, nullable=False, metadata={"meaning": "name of the fabric"}),
+        *(SCHEMA.field(name) for name in QUERY_COLUMNS),
+    ]
+)
+"""Arrow schema of the questions, each column with its meaning."""
+
+QUESTION_FILES: Final = ("questions.parquet", "questions.csv")
+
 _MOST_BYTES: Final = 1024  # of a row of CSV
 _MOST_ROWS: Final = 4  # for each question
+
+
+def write_questions(folder: Path, parts: Iterable[ShardTask]) -> int:
+    """Write the queries of held-out shards, in their order, as Parquet and as CSV, and return their number."""
+    start, bare = 0, csv.WriteOptions(include_header=False, quoting_style="none")
+    with (
+        parquet_writer(folder / QUESTION_FILES[0], QUESTION_COLUMNS, ["fabric"]) as parquet,
+        (folder / QUESTION_FILES[1]).open("wb") as file,
+        csv.CSVWriter(file, QUESTION_COLUMNS, write_options=bare) as text,
+    ):
+        file.write(f"{','.join(QUESTION_COLUMNS.names)}\n".encode())  # with quotes it would not suit a plain reader
+        for part in parts:
+            names = pa.DictionaryArray.from_arrays(np.zeros(part.rows, np.int32), pa.array([part.fabric.name]))
+            columns = columns_of(part.drawn())
+            arrays = [pa.array(np.arange(start, start + part.rows)), names, *(columns[name] for name in QUERY_COLUMNS)]
+            table = pa.Table.from_arrays(arrays, schema=QUESTION_COLUMNS)
+            parquet.write_table(table, ROW_GROUP)
+            text.write_table(table)
+            start += part.rows
+    return start
 
 
 def read_answers(path: Path, count: int) -> Float32:
