@@ -78,10 +78,7 @@ class Draft:
         return self.warp_over.size // len(translations(self.warp_over))
 
     def loom(self) -> Loom:
-        """Return a loom that weaves it: ends that rise together have one shaft, picks that lift the same one treadle.
-
-        Shafts and treadles are numbered as they appear.
-        """
+        """Return a loom that weaves it: equal ends have one shaft, equal picks one treadle, numbered as they appear."""
         threading, shafts = numbered([end.tobytes() for end in self.warp_over.T])
         treadling, treadles = numbered([pick.tobytes() for pick in self.warp_over])
         first = [threading.index(shaft) for shaft in range(len(shafts))]
@@ -186,7 +183,6 @@ class Family(Frozen):
     """Draft of a fabric file; each subclass is a weave family, or several."""
 
     family: str
-    """Name of the family."""
 
     def build(self) -> Draft:
         """Weave the draft."""

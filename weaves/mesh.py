@@ -15,8 +15,9 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from weaves.draft import Floats
 from weaves.fabric import Fabric
-from weaves.surface import WARP, WEFT, Floats, surface_at
+from weaves.surface import WARP, WEFT, surface_at
 
 INSIDE: Final = 1e-12
 """Distance inside a piece at which its border is sampled, so that it is on top there."""

@@ -82,9 +82,7 @@ class Population(Frozen):
     """A set of random fabrics."""
 
     count: StrictInt = Field(default=0, ge=0, le=100_000)
-    """Number of fabrics."""
     seed: StrictInt = Field(default=0, ge=0, lt=2**63)
-    """Seed of the fabrics."""
     families: tuple[FamilyName, ...] = Field(default=get_args(_Usual), min_length=1)
     """Weave families, equally likely; write one twice to double its share."""
     solid: float = Field(default=0.0, ge=0, le=1)
@@ -95,14 +93,11 @@ class Population(Frozen):
     """Drafts, such as ``twill 4/4``, that must not occur, nor shifts, mirror images or rearrangements of them."""
     plain: Ranges = Ranges()
     """Ranges of plain, rib and basket weaves."""
-    twill: Ranges = Ranges(
-        roughness_warp=(0.49, 1.0), roughness_weft=(0.49, 1.0), relief=(1.0, 2.0), twist=(-30.0, -30.0)
-    )
+    twill: Ranges = Ranges(roughness_warp=(0.49, 1), roughness_weft=(0.49, 1), relief=(1, 2), twist=(-30, -30))
     """Ranges of all twills."""
     satin: Ranges = Ranges(roughness_warp=(0.04, 0.49), roughness_weft=(0.49, 1.0), relief=(0.2, 1.0))
     """Ranges of satins and sateens."""
     irregular: Ranges = Ranges()
-    """Ranges of irregular weaves."""
 
     @model_validator(mode="after")
     def _drafts_left(self) -> Population:

@@ -25,7 +25,7 @@ from pipeline.shards.query_file import blocks, open_queries
 from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
 from pipeline.shards.store import ROW_GROUP, columns_of, parquet_writer
 from pipeline.truth.conventions import COMPONENTS
-from weaves.errors import BadInput
+from weaves.errors import BadInput, one_line
 from weaves.reading import refuse_irregular
 
 ID: Final = "id"
@@ -97,7 +97,6 @@ def answers_sha256(answers: Float32) -> str:
 
 
 def _parquet(path: Path, count: int) -> pa.Table:
-    """Read the columns of an answer from a Parquet file."""
     with open_queries(path) as file:
         names, rows = _columns(path, file.schema_arrow.names), file.metadata.num_rows
         for name in names:
@@ -112,7 +111,6 @@ def _parquet(path: Path, count: int) -> pa.Table:
 
 
 def _csv(path: Path, count: int) -> pa.Table:
-    """Read the columns of an answer from a file of CSV with a heading."""
     refuse_irregular(path, "a file of CSV")
     most = _MOST_BYTES * (_MOST_ROWS * count + 1)
     try:
@@ -123,10 +121,8 @@ def _csv(path: Path, count: int) -> pa.Table:
         types = dict.fromkeys(names, pa.float64()) | {ID: pa.int64()}
         return csv.read_csv(path, convert_options=csv.ConvertOptions(column_types=types, include_columns=names))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise BadInput(
-            str(path), "", f"cannot be read ({reason[:120]})", "a heading, then numbers, are needed"
-        ) from error
+        reason = f"cannot be read ({one_line(error, 120)})"
+        raise BadInput(str(path), "", reason, "a heading, then numbers, are needed") from error
 
 
 def _columns(path: Path, names: Sequence[str]) -> list[str]:

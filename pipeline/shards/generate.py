@@ -37,7 +37,6 @@ class _AnyTask(Frozen):
     start: int = Field(ge=0)
     """First row of the stream of the split or set."""
     rows: int = Field(gt=0)
-    """Rows in this shard."""
 
     def identity(self) -> dict[str, Any]:
         """Return what the numbers depend on, without names, sources and colours; versions included."""
@@ -55,9 +54,7 @@ class ShardTask(_AnyTask):
     seed: int = Field(ge=0)
     """The data set's seed."""
     queries: QueryOptions = QueryOptions()
-    """Distribution of the queries."""
     truth: TruthOptions = TruthOptions()
-    """How they are answered."""
 
     def stream(self, purpose: str) -> int:
         """Return the seed of its queries or points."""

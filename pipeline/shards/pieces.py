@@ -114,10 +114,7 @@ class DatasetRows(NamedTuple):
         return cls(folder, dict(manifest.fabrics), dict(manifest.roles), pieces)
 
     def of(self, split: str, fabrics: Sequence[str] | None = None) -> list[RowPiece]:
-        """Return the pieces of a split, train, validation or test, of some fabrics or all that have it, one by one.
-
-        BadInput if a split or fabric does not exist, or has no rows.
-        """
+        """Return the pieces of a split, of some fabrics or all that have it; BadInput if there are no such rows."""
         if split not in get_args(Split):
             raise BadInput(str(self.folder), "split", split, nearest(split, get_args(Split)))
         by_fabric: dict[str, list[RowPiece]] = {}

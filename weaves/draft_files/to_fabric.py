@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -30,12 +29,10 @@ MOST_SOURCE: Final = 2000
 """Most letters of a fabric's `source`."""
 
 
-@dataclass(frozen=True)
-class Imported:
+class Imported(NamedTuple):
     """A fabric from a draft file, with what was read and assumed."""
 
     fabric: Fabric
-    """The fabric."""
     read: tuple[str, ...]
     """Sentences on what the file states."""
     assumed: tuple[str, ...]
