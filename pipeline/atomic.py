@@ -80,8 +80,7 @@ def refuse_unwritable(path: Path) -> None:
 
 
 def _unwritable(path: Path, error: OSError) -> BadInput:
-    reason = error.strerror or "not writable"
-    return BadInput(str(path.parent), "", reason, "a folder that can be written is needed")
+    return BadInput(str(path.parent), "", error.strerror or "not writable", "a folder that can be written is needed")
 
 
 def _sync_folder(folder: Path) -> None:

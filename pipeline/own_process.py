@@ -26,9 +26,7 @@ from weaves.errors import WorkFailed
 
 Result = TypeVar("Result")
 
-ONE_THREAD: Final = dict.fromkeys(
-    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
+ONE_THREAD: Final = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "MKL", "OPENBLAS", "NUMBA")}
 """Environment of a process that computes on one thread."""
 
 _SECONDS_BETWEEN_LOOKS: Final = 0.2
@@ -57,22 +55,10 @@ def in_own_process(
     """Call ``function(*arguments, progress)`` in a new process of one thread, and return its result.
 
     The process ends with this one, with all that it has started, and never receives Ctrl-C. What it prints is lost.
+    The function is one of a module, or a method; it, its arguments and its result can be pickled. `progress` receives
+    the finished share. `look` is called now and then while nothing is received; an exception of it ends the process.
 
-    Parameters
-    ----------
-    function : callable
-        A function of a module, or a method; it, its arguments and its result can be pickled.
-    progress : callable
-        Receives the finished share.
-    look : callable
-        Called now and then while nothing is received; an exception of it ends the process.
-
-    Raises
-    ------
-    ProcessEnded
-        If the process ends without a result.
-    Exception
-        What the function raises, with the traceback of the process as a note.
+    ProcessEnded if the process ends without a result. What the function raises has its traceback as a note.
     """
     (here, there), (watched, held) = Pipe(), os.pipe()  # the latter ends with this process
     # The paths of this process, and no other: a folder of the current one must not hide a package.
@@ -114,11 +100,7 @@ def in_own_process(
 
 @contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back until the end of the block.
-
-    Threads and processes that start within the block never receive Ctrl-C, although a terminal sends it to every
-    process. Only the driver receives it, and stops the others.
-    """
+    """Hold Ctrl-C back within; threads and processes that start there never receive it, as only the driver should."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -170,8 +152,7 @@ def _work(pipe: Connection) -> NoReturn:
 
 
 def _prctl(option: int, value: int) -> None:
-    """Set a property of this process; only Linux has these."""
-    if sys.platform == "linux":
+    if sys.platform == "linux":  # alone has these properties of a process
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 

@@ -11,6 +11,7 @@ import asyncio
 import sys
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from typing import Final, Literal, TypeVar
 
 from weaves.errors import WorkFailed, one_line
@@ -35,14 +36,12 @@ class StorageFailed(WorkFailed):
     """A storage has failed for longer than it is waited for."""
 
 
+@dataclass
 class _State:
-    """State of the storage as this process knows it."""
-
-    def __init__(self) -> None:
-        self.reached = False
-        self.given_up = False
-        self.failed = -_QUIET  # time of the last failure
-        self.listener: Callable[[str], None] | None = None
+    reached: bool = False
+    given_up: bool = False
+    failed: float = -_QUIET  # time of the last failure
+    listener: Callable[[str], None] | None = None
 
 
 _state: Final = _State()

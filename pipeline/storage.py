@@ -28,9 +28,8 @@ _ADDRESS: Final = re.compile(r"([a-z][a-z0-9+.-]+)://(.*)", re.DOTALL)
 _OBJECTS: Final = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oss"}
 """Protocols whose files appear when all of their bytes have arrived."""
 
-_ONE_TRY: Final = {"config_kwargs": {"retries": {"mode": "standard", "total_max_attempts": 1}}}
-_OPTIONS: Final[dict[str, dict[str, Any]]] = {"s3": _ONE_TRY, "s3a": _ONE_TRY}
-"""Options of file systems: requests are repeated by `pipeline.patience` alone."""
+_ONE_TRY: Final[dict[str, Any]] = {"config_kwargs": {"retries": {"mode": "standard", "total_max_attempts": 1}}}
+"""Options of S3: requests are repeated by `pipeline.patience` alone."""
 
 _AT_ONCE: Final = 32  # files that are fetched at the same time
 _AT_MOST_REMOVED: Final = 1000  # files in a request
@@ -59,9 +58,9 @@ def place(name: str, where: str = "--out") -> Path:
     from upath import UPath
 
     try:
-        if protocol in ("s3", "s3a"):
+        if is_s3 := protocol in ("s3", "s3a"):
             _register_patient_s3()
-        found = UPath(name, use_listings_cache=False, **_OPTIONS.get(protocol, {}))
+        found = UPath(name, use_listings_cache=False, **(_ONE_TRY if is_s3 else {}))
         found.fs  # noqa: B018, it is made here
     except (ImportError, ValueError, TypeError, OSError) as error:  # such as zip://, which needs a file
         allowed = "a folder or an address of fsspec is needed, as s3://bucket/prefix"
@@ -112,10 +111,7 @@ class Stored(NamedTuple):
 
 
 def listing(folder: Path) -> dict[str, Stored]:
-    """Return all files below a folder of object storage, by path relative to it; S3 lists 1000 a request.
-
-    FileNotFoundError if the bucket does not exist.
-    """
+    """Return all files below a folder of object storage, by path relative to it; FileNotFoundError without bucket."""
     remote: Any = folder
     root = remote.path.rstrip("/") + "/"
     found = remote.fs.find(root, detail=True)

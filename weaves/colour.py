@@ -24,7 +24,6 @@ Rgb = tuple[float, float, float]
 
 EXPECTED = 'a colour is three numbers from 0 to 1 (linear RGB), "#rrggbb" (sRGB), or a spectrum { wavelengths, values }'
 
-
 LUMINANCE: Final = (0.2126, 0.7152, 0.0722)
 """Luminance of linear sRGB primaries (Rec. 709)."""
 
@@ -49,7 +48,6 @@ class Spectrum(Frozen):
 
 
 def _hex(value: str) -> str:
-    """Check the form of an sRGB colour."""
     if not re.fullmatch(r"#[0-9a-fA-F]{6}", value):
         raise ValueError(EXPECTED)
     return value

@@ -34,8 +34,6 @@ PerCm = Annotated[float, Strict(), Field(ge=0.1, le=1000)]
 TEX_TIMES_NE: Final = 1e3 * 453.59237 / (840 * 0.9144)
 """Product of a yarn's counts in tex and in Ne: grams a pound and metres a hank."""
 
-_THREADS: Final = ("ends", "picks")
-
 
 class Count(Frozen):
     """A yarn by its count, in place of its width."""
@@ -98,9 +96,8 @@ def _width(given: dict[str, Any], yarn: Mapping[str, Any], per_cm: Any, axis: in
         return 1.0  # the fabric says what is wrong with its yarns_per_cm
     width = count.diameter * yarns / 10.0
     if not NARROWEST_YARN <= width <= 1.0:
-        wide = (
-            f"at {yarns:g} {_THREADS[axis]} per cm yarns of {count.diameter:.3g} mm have {width:.3g} of their spacing"
-        )
+        sett = f"{yarns:g} {('ends', 'picks')[axis]} per cm"
+        wide = f"at {sett} yarns of {count.diameter:.3g} mm have {width:.3g} of their spacing"
         least, most = (10.0 * share / count.diameter for share in (NARROWEST_YARN, 1.0))
         allowed = f"{wide}; with this count the sett may be from {least:.3g} to {most:.3g}"
         raise BadInput("", key, given[key], allowed + (", or more with a larger packing" if width > 1.0 else ""))

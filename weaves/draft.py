@@ -78,10 +78,7 @@ class Draft:
         return self.warp_over.size // len(translations(self.warp_over))
 
     def loom(self) -> Loom:
-        """Return a loom that weaves it: ends that rise together have one shaft, picks that lift the same one treadle.
-
-        Shafts and treadles are numbered as they appear.
-        """
+        """Return a loom that weaves it: equal ends have one shaft, equal picks one treadle, numbered as they appear."""
         threading, shafts = numbered([end.tobytes() for end in self.warp_over.T])
         treadling, treadles = numbered([pick.tobytes() for pick in self.warp_over])
         first = [threading.index(shaft) for shaft in range(len(shafts))]
@@ -100,10 +97,8 @@ class Draft:
         """
         from scipy.sparse.csgraph import connected_components
 
-        over = self.warp_over.T
-        arrows = np.block(
-            [[np.zeros((len(over), len(over)), np.bool_), over], [~over.T, np.zeros((over.shape[1],) * 2)]]
-        )
+        (ends, picks), over = self.repeat, self.warp_over.T
+        arrows = np.block([[np.zeros((ends, ends), np.bool_), over], [~over.T, np.zeros((picks, picks))]])
         return bool(connected_components(arrows, connection="strong", return_labels=False) == 1)
 
     @lru_cache(maxsize=4096)  # noqa: B019, drafts are small and equal ones are often compared
@@ -136,21 +131,14 @@ def numbered(rows: Sequence[Hashable]) -> tuple[list[int], list[Hashable]]:
 
 
 class Cells(NamedTuple):
-    """The floats that pass through every cell of a repeat; arrays (picks, ends).
-
-    Attributes
-    ----------
-    top : int8
-        The yarn on top: 0 warp, 1 weft.
-    top_offset, under_offset : float64
-        Cell centre minus centre of the float, along +y for a warp and +x for a weft, in cells.
-    top_length, under_length : float64
-        Cells over which the yarn stays on top (beneath); infinite, with offset 0, if it never changes side.
-    """
+    """The floats that pass through every cell of a repeat; arrays (picks, ends)."""
 
     top: npt.NDArray[np.int8]
+    """The yarn on top: 0 warp, 1 weft."""
     top_offset: Floats
+    """Cell centre minus centre of the float, along +y for a warp and +x for a weft, in cells."""
     top_length: Floats
+    """Cells over which the yarn stays on top (beneath); infinite, with offset 0, if it never changes side."""
     under_offset: Floats
     under_length: Floats
 
@@ -160,13 +148,9 @@ def cells(draft: Draft) -> Cells:
     over = draft.warp_over
     warp_length, warp_offset = _runs(over)
     weft_length, weft_offset = (runs.T for runs in _runs(over.T))
-    return Cells(
-        top=np.where(over, 0, 1).astype(np.int8),
-        top_offset=np.where(over, warp_offset, weft_offset),
-        top_length=np.where(over, warp_length, weft_length),
-        under_offset=np.where(over, weft_offset, warp_offset),
-        under_length=np.where(over, weft_length, warp_length),
-    )
+    top = np.where(over, warp_offset, weft_offset), np.where(over, warp_length, weft_length)
+    under = np.where(over, weft_offset, warp_offset), np.where(over, weft_length, warp_length)
+    return Cells(np.where(over, 0, 1).astype(np.int8), *top, *under)
 
 
 def _runs(side: Bools) -> tuple[Floats, Floats]:
@@ -199,7 +183,6 @@ class Family(Frozen):
     """Draft of a fabric file; each subclass is a weave family, or several."""
 
     family: str
-    """Name of the family."""
 
     def build(self) -> Draft:
         """Weave the draft."""

@@ -84,10 +84,7 @@ def printable(text: str) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return the known name that was probably meant, as the end of a sentence.
-
-    That is ``"did you mean 'x'? known: a, b, x"``, without its first part if no name is near.
-    """
+    """Return the end of a sentence: ``"did you mean 'x'? known: a, b, x"``, or only its last part if none is near."""
     names = sorted(known)
     close = difflib.get_close_matches(word[:_WORD], names, n=1, cutoff=0.5)
     suggestion = f"did you mean {close[0]!r}? " if close else ""

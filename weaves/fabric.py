@@ -31,7 +31,6 @@ Weave = Annotated[Plain | Rib | Basket | Twill | Herringbone | Satin | Matrix | 
 
 
 def _file_name(name: str) -> str:
-    """Check that a name can be part of file names everywhere."""
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
         raise ValueError("a name has 1 to 60 letters (without accents), digits, - and _")
     return name
@@ -54,7 +53,6 @@ class Fabric(Frozen):
     name: Annotated[str, AfterValidator(_file_name)]
     """Letters, digits, - and _: it becomes part of file names."""
     source: str = Field(default="", max_length=2000)
-    """Source of the numbers."""
     optical_thickness: Annotated[float, Strict()] = Field(default=2.0, ge=0.001, le=100)
     """Optical thickness T of the yarn layer."""
     yarns_per_cm: tuple[PerCm, PerCm] | None = None
@@ -126,10 +124,7 @@ class Fabric(Frozen):
         return self.model_copy(update={"warp": warp, "weft": weft, "colours": None})
 
     def optics(self) -> dict[str, Any]:
-        """Return the parameters that the four components depend on: no name, source, colour or physical size.
-
-        Two fabrics with equal optics have the same ground truth, so fingerprints use it.
-        """
+        """Return all that the ground truth depends on, for fingerprints: no name, source, colour or physical size."""
         return {
             "draft": self.weave.rows(),
             "warp": self.warp.optics(),

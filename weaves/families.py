@@ -80,7 +80,6 @@ class Basket(Family):
 
 
 def _blocks(ends: int, picks: int, name: str) -> Draft:
-    """Lay a chequerboard of blocks."""
     pick, end = np.ogrid[: 2 * picks, : 2 * ends]
     return Draft((pick // picks + end // ends) % 2 == 0, name)
 

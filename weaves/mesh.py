@@ -15,15 +15,14 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from weaves.draft import Floats
 from weaves.fabric import Fabric
-from weaves.surface import WARP, WEFT, Floats, surface_at
+from weaves.surface import WARP, WEFT, surface_at
 
 INSIDE: Final = 1e-12
 """Distance inside a piece at which its border is sampled, so that it is on top there."""
 LEAST_STEP: Final = 1e-6
 """Pieces whose heights differ by less than this meet without a wall, in yarn spacings."""
-
-Integers = npt.NDArray[np.int64]
 
 
 class Mesh(NamedTuple):
@@ -34,7 +33,7 @@ class Mesh(NamedTuple):
     """
 
     vertices: Floats
-    faces: Integers
+    faces: npt.NDArray[np.int64]
 
 
 class RepeatMesh(NamedTuple):
@@ -168,7 +167,6 @@ def _steps(border: float, grid: Floats, left: Floats, right: Floats) -> Mesh:
 
 
 def _joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Join meshes."""
     start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     vertices = [np.empty((0, 3)), *(mesh.vertices for mesh in meshes)]
     faces = [np.empty((0, 3), np.int64), *(mesh.faces + s for mesh, s in zip(meshes, start[:-1], strict=True))]

@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from functools import cache
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Field, StrictBool, StrictInt, ValidationError, model_validator
@@ -30,19 +30,8 @@ from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill, valid
 from weaves.validation import Frozen
 from weaves.yarn import Number, Yarn
 
-FamilyName = Literal[
-    "plain",
-    "rib",
-    "basket",
-    "twill",
-    "broken_twill",
-    "herringbone",
-    "satin",
-    "sateen",
-    "compound_twill",
-    "large_satin",
-    "irregular",
-]
+_Usual = Literal["plain", "rib", "basket", "twill", "broken_twill", "herringbone", "satin", "sateen"]
+FamilyName = Literal[_Usual, "compound_twill", "large_satin", "irregular"]
 LONGEST_TWILL = 8
 SATIN_ENDS = (5, 7, 8)
 LARGE_SATIN_ENDS = (9, 10)
@@ -93,12 +82,8 @@ class Population(Frozen):
     """A set of random fabrics."""
 
     count: StrictInt = Field(default=0, ge=0, le=100_000)
-    """Number of fabrics."""
     seed: StrictInt = Field(default=0, ge=0, lt=2**63)
-    """Seed of the fabrics."""
-    families: tuple[FamilyName, ...] = Field(
-        default=("plain", "rib", "basket", "twill", "broken_twill", "herringbone", "satin", "sateen"), min_length=1
-    )
+    families: tuple[FamilyName, ...] = Field(default=get_args(_Usual), min_length=1)
     """Weave families, equally likely; write one twice to double its share."""
     solid: float = Field(default=0.0, ge=0, le=1)
     """Share of the fabrics whose yarns are as wide as their spacing, in place of the drawn width."""
@@ -108,14 +93,11 @@ class Population(Frozen):
     """Drafts, such as ``twill 4/4``, that must not occur, nor shifts, mirror images or rearrangements of them."""
     plain: Ranges = Ranges()
     """Ranges of plain, rib and basket weaves."""
-    twill: Ranges = Ranges(
-        roughness_warp=(0.49, 1.0), roughness_weft=(0.49, 1.0), relief=(1.0, 2.0), twist=(-30.0, -30.0)
-    )
+    twill: Ranges = Ranges(roughness_warp=(0.49, 1), roughness_weft=(0.49, 1), relief=(1, 2), twist=(-30, -30))
     """Ranges of all twills."""
     satin: Ranges = Ranges(roughness_warp=(0.04, 0.49), roughness_weft=(0.49, 1.0), relief=(0.2, 1.0))
     """Ranges of satins and sateens."""
     irregular: Ranges = Ranges()
-    """Ranges of irregular weaves."""
 
     @model_validator(mode="after")
     def _drafts_left(self) -> Population:
@@ -175,7 +157,6 @@ def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]],
 
 
 def _ranges(population: Population, family: FamilyName) -> Ranges:
-    """Choose the ranges of a family."""
     if family in ("plain", "rib", "basket"):
         return population.plain
     if family == "irregular":
@@ -240,14 +221,8 @@ def _is_one_of(weave: Family, banned: set[tuple[tuple[int, int], bytes]]) -> boo
 
 @cache
 def _allowed(families: tuple[FamilyName, ...], exclude: tuple[str, ...]) -> list[tuple[FamilyName, list[Draft]]]:
-    """List the drafts of each family that `exclude` leaves, without families that it empties.
-
-    Irregular drafts are not listed.
-    """
+    """List the drafts of each family that `exclude` leaves, without families that it empties; no irregular ones."""
     drafts = [weave.build() for weaves in _catalogue().values() for weave in weaves]
     banned = {draft.canonical() for draft in drafts if draft.name in exclude}
-    left = [
-        (family, [w.build() for w in _catalogue().get(family, ()) if not (banned and _is_one_of(w, banned))])
-        for family in families
-    ]
-    return [(family, drafts) for family, drafts in left if drafts or family == "irregular"]
+    left = {f: [w.build() for w in _catalogue().get(f, ()) if not (banned and _is_one_of(w, banned))] for f in families}
+    return [(family, left[family]) for family in families if left[family] or family == "irregular"]

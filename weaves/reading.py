@@ -105,8 +105,5 @@ def refuse_irregular(path: Path, needed: str) -> None:
 
 def kind(mode: int) -> str:
     """Return the kind of a file that is not regular, with its article."""
-    if stat.S_ISDIR(mode):
-        return "a folder"
-    if stat.S_ISFIFO(mode):
-        return "a pipe"
-    return "a socket" if stat.S_ISSOCK(mode) else "a device"
+    kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+    return kinds.get(stat.S_IFMT(mode), "a device")

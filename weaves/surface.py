@@ -23,7 +23,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from weaves.draft import cells
+from weaves.draft import Bools, Floats, cells
 from weaves.fabric import Fabric
 from weaves.yarn import Yarn
 
@@ -31,15 +31,13 @@ WARP: Final = 0
 WEFT: Final = 1
 GAP: Final = 2
 
-Floats = npt.NDArray[np.float64]
-
 
 class ClothSurface(NamedTuple):
     """Surface at given points; arrays of one shape."""
 
     yarn: npt.NDArray[np.int8]
     """`WARP`, `WEFT`, or `GAP` where no yarn covers the point, int8."""
-    under: npt.NDArray[np.bool_]
+    under: Bools
     """True where the yarn on top is too narrow and the one beneath shows."""
     height: Floats
     """In yarn spacings, -inf in gaps; the axis of a yarn is at 0 where a float begins and ends."""
@@ -49,11 +47,7 @@ class ClothSurface(NamedTuple):
 
 
 def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> ClothSurface:
-    """Evaluate the surface at points seen from above.
-
-    `x` and `y`, arrays that are broadcast together, are in yarn spacings, finite, and may be anywhere: the repeat goes
-    on without end.
-    """
+    """Evaluate the surface, seen from above, at finite points in yarn spacings, broadcast; the repeat has no end."""
     draft = cells(fabric.weave)
     picks, ends = draft.top.shape
     x, y = np.broadcast_arrays(np.mod(np.asarray(x, np.float64), ends), np.mod(np.asarray(y, np.float64), picks))
@@ -83,10 +77,7 @@ def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> ClothSurfa
 
 
 def surface_maps(fabric: Fabric, texels_per_yarn: int) -> ClothSurface:
-    """Evaluate the surface at the texel centres of one repeat.
-
-    Its arrays are (picks * texels_per_yarn, ends * texels_per_yarn): rows along y, pick 0 in row 0.
-    """
+    """Evaluate the surface at texel centres of one repeat, (picks, ends) times `texels_per_yarn`, pick 0 in row 0."""
     ends, picks = fabric.weave.repeat
     x = (np.arange(ends * texels_per_yarn) + 0.5) / texels_per_yarn
     y = (np.arange(picks * texels_per_yarn) + 0.5) / texels_per_yarn
@@ -103,9 +94,7 @@ def curvature(yarn: Yarn, length: npt.ArrayLike) -> Floats:
     return np.where(yarn.width * sine >= length, 0.0, 2 * sine / length)
 
 
-def _torus(
-    yarn: Yarn, length: Floats, x: Floats, y: Floats, under: npt.NDArray[np.bool_]
-) -> tuple[Floats, Floats, Floats]:
+def _torus(yarn: Yarn, length: Floats, x: Floats, y: Floats, under: Bools) -> tuple[Floats, Floats, Floats]:
     """Return height, normal and tangent in the frame of the float."""
     k = curvature(yarn, length)
     flat = k == 0

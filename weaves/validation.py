@@ -130,9 +130,8 @@ def _fields_at(model: type[BaseModel], location: Sequence[int | str]) -> set[str
     """Return the names of the fields that the models at `location` know."""
     models = [model]
     for step in location:
-        inner = [
-            found for known in models if step in known.model_fields for found in _models(known.model_fields[str(step)])
-        ]
+        fields = [known.model_fields[str(step)] for known in models if step in known.model_fields]
+        inner = [model for field in fields for model in _models(field)]
         # A step that is no field is an index (stay) or the tag of a union (choose).
         models = inner or [known for known in models if _tagged(known, step)] or models
     return {name for known in models for name in (*known.model_fields, *getattr(known, "also_read", ()))}

@@ -40,7 +40,6 @@ Number = Annotated[float, Strict()]
 NARROWEST_YARN: Final = 0.05
 """Least width of a yarn, in yarn spacings."""
 
-_CHANNELS = ("red", "green", "blue")
 _ROUNDING = 1e-9  # of sums of colours
 
 
@@ -91,7 +90,7 @@ class Yarn(Frozen):
 
     def refuse_gain(self, thickness: float) -> None:
         """Refuse colours with which the yarn would send out more light than it receives; BadInput names `diffuse`."""
-        channels = zip(_CHANNELS, self.most_diffuse(thickness), self.specular_rgb, strict=True)
+        channels = zip(("red", "green", "blue"), self.most_diffuse(thickness), self.specular_rgb, strict=True)
         diffuse = zip(self.diffuse_rgb, self.diffuse_transmission_rgb, strict=True)
         for (name, most, specular), (back, through) in zip(channels, diffuse, strict=True):
             if back + through > most + _ROUNDING:

@@ -11,7 +11,7 @@ from jobs.recipe.recipe import ModelRecipe
 from pipeline import versions
 from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.catalogue import ModelOptions
-from pipeline.shards.extra_rows import set_name
+from pipeline.shards.generate import set_name
 from pipeline.training.options import TrainingOptions
 
 _WHERE_IT_RUNS = {"device", "checkpoint_every"}  # of the training's options

@@ -109,7 +109,7 @@ def read_entry(path: Path, questions: str, count: int) -> Entry:
 
     BadInput if it is of other questions, or anything in it, or in the answers, cannot be used.
     """
-    from pipeline.shards.answer_file import answers_sha256, read_answers
+    from pipeline.shards.entry_files import answers_sha256, read_answers
 
     form = validated(EntryForm, read_toml(path), str(path))
     if form.questions != questions:

@@ -30,7 +30,7 @@ from weaves.validation import Frozen
 
 if TYPE_CHECKING:
     from jobs.recipe.entry import Entry
-    from pipeline.shards.extra_rows import ExtraRows
+    from pipeline.shards.generate import ExtraRows
     from pipeline.shards.manifest import Role, Split
 
 

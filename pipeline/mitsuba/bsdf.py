@@ -186,16 +186,9 @@ def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[RayValu
     uv, viewer, outward, duv_dx, duv_dy = (columns.vector(value)[rows] for value in names)
     handed, distance, length, along_u, along_v, bend = (columns.number(value)[rows] for value in numbers)
     seen, traced = np.abs(viewer[:, 2]) > 0.0, np.isfinite(distance) & (length > 0.0)
-    hits = RayHits(
-        uv,
-        viewer,
-        outward,
-        np.where(handed < 0.0, -1.0, 1.0),
-        np.stack([duv_dx, duv_dy], axis=-1),
-        np.where(traced, distance, 0.0) / np.where(traced, length, 1.0),
-        np.stack([along_u, along_v], axis=-1),
-        bend,
-    )
+    handed, spread = np.where(handed < 0.0, -1.0, 1.0), np.where(traced, distance, 0.0) / np.where(traced, length, 1.0)
+    jacobian, strides = np.stack([duv_dx, duv_dy], axis=-1), np.stack([along_u, along_v], axis=-1)
+    hits = (uv, viewer, outward, handed, jacobian, spread, strides, bend)
     return columns, rows[seen], RayHits(*(column[seen] for column in hits))
 
 

@@ -38,7 +38,6 @@ from weaves.validation import Frozen, validated
 INTEGRATOR: Final = "twillight_path"
 """Name of the plugin."""
 
-
 MOST_RAYS: Final = 2**18
 """Most rays that are traced at a time; a ray takes about a kilobyte."""
 
@@ -49,9 +48,6 @@ tracked: Callable[[Sequence[int], str], Iterable[int]] | None = None
 """Returns the parts of a picture while it shows what is done; `twillight_mitsuba` sets it to a bar."""
 
 _STEP = 1e-3  # units of u
-
-FLAGS: Final = ("SymbolicCalls", "SymbolicLoops", "SymbolicConditionals")
-"""Flags of Dr.Jit that are off inside."""
 
 
 class PathOptions(Frozen):
@@ -82,7 +78,7 @@ def evaluated() -> Iterator[None]:
     import drjit as dr
 
     with ExitStack() as stack:
-        for name in FLAGS:
+        for name in ("SymbolicCalls", "SymbolicLoops", "SymbolicConditionals"):
             stack.enter_context(dr.scoped_set_flag(getattr(dr.JitFlag, name), False))
         yield
 

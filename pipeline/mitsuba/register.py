@@ -47,11 +47,10 @@ def dress(loaded: Loaded, method: str = USUAL_METHOD) -> Any:
     """Let the shapes of a loaded scene, which is changed, wear their cloth as a BSDF; return Mitsuba's scene."""
     mi = register()
     worn = {}
+    alike: dict[str, Any] = {"type": BSDF, "method": method, "bounces": loaded.options.bounces}
     for key, (cloth, fabric) in loaded.cloths.items():
-        properties = {"fabric": cloth.fabric or fabric.name, "yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1]}
-        worn[key] = mi.load_dict(
-            {"type": BSDF, "method": method, "bounces": loaded.options.bounces, "turn": cloth.turn, **properties}
-        )
+        placed = {"yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1], "turn": cloth.turn}
+        worn[key] = mi.load_dict({**alike, "fabric": cloth.fabric or fabric.name, **placed})
     for shape in loaded.world.shapes():
         name = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
         if name.startswith(PREFIX):

@@ -61,6 +61,7 @@ _LARGEST_ANGLE = SceneOptions().largest_angle
 _FLAT = 1e-6  # least |cosine| of a light
 
 Part = TypeVar("Part")
+_Answer = Callable[[Queries, int, Lobes | None], Part]
 
 
 class ClothOptions(Frozen):
@@ -116,7 +117,6 @@ class Footprints(NamedTuple):
 
 
 def _cut(deviation: Float64) -> Float32:
-    """Return deviations cut to the sizes that queries may have."""
     return np.clip(deviation, _SMALLEST, LARGEST_FOOTPRINT).astype(np.float32)
 
 
@@ -173,9 +173,7 @@ class Worn:
         looks, lobes = self._looks(hits), self._lobes(hits)
         runs = [slice(start, start + RUN) for start in range(0, len(random), RUN)]
         tasks = [(looks.take(run), random[run], known) for run, known in zip(runs, lobes, strict=True)]
-        parts = _on_all_cores(
-            lambda task: self._bsdf.sample(task[0], task[1], task[2], _seed(task[0].u, task[1])), tasks
-        )
+        parts = _on_all_cores(lambda task: self._bsdf.sample(*task, _seed(task[0].u, task[1])), tasks)
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
         light = np.where(straight[:, None], -hits.viewer, _turned(wi.astype(np.float64), self._turn))
         weight[~straight & ~_lit(hits, light)] = 0.0
@@ -200,10 +198,8 @@ class Worn:
         looks, method = self._looks(hits), self._bsdf.method
         if (curved := np.flatnonzero(looks.curvature)).size:
             wo = _turned(hits.viewer[curved], self._turn.T).astype(np.float32)
-            parts = self._ask(
-                looks.take(curved)._replace(wi=wo, wo=wo),
-                lambda rows, seed, lobes: method.coverage(self.fabric, rows, seed),
-            )
+            along = looks.take(curved)._replace(wi=wo, wo=wo)
+            parts = self._ask(along, lambda rows, seed, lobes: method.coverage(self.fabric, rows, seed))
             result[curved] = np.concatenate(parts)
         return result
 
@@ -223,16 +219,9 @@ class Worn:
         wo = tilted(_turned(hits.viewer, self._turn.T), side, _LARGEST_ANGLE).astype(np.float32)
         footprints = self._footprints(hits, yarns)
         ends, picks = self.fabric.repeat
-        return Queries(
-            reduced(place[:, 0], ends),
-            reduced(place[:, 1], picks),
-            footprints.sigma,
-            wo,
-            wo,
-            footprints.sigma_minor,
-            footprints.angle,
-            np.where(side > 0.0, self._curvature(hits, own), 0.0).astype(np.float32),
-        )
+        u, v = reduced(place[:, 0], ends), reduced(place[:, 1], picks)
+        curvature = np.where(side > 0.0, self._curvature(hits, own), 0.0).astype(np.float32)
+        return Queries(u, v, footprints.sigma, wo, wo, footprints.sigma_minor, footprints.angle, curvature)
 
     def _curvature(self, hits: RayHits, yarns: tuple[float, float]) -> Float64:
         """Return the curvature along the view ray, 1/yarn spacings; what is almost flat is flat."""
@@ -248,10 +237,8 @@ class Worn:
         if traced.all():
             return of_rays
         if self.options.pixel_angle is None:
-            raise BadInput(
-                f"bsdf {self.fabric.name}", "pixel_angle", None, "a ray without a footprint: use the integrator "
-                "twillight_path, or state pixel_angle or sigma",
-            )  # fmt: skip
+            allowed = "a ray without a footprint: use the integrator twillight_path, or state pixel_angle or sigma"
+            raise BadInput(f"bsdf {self.fabric.name}", "pixel_angle", None, allowed)
         width = PIXEL * self.options.pixel_angle * hits.spread * self.options.yarns
         others = Footprints.round(np.nan_to_num(width, nan=LARGEST_FOOTPRINT))
         return Footprints(*(np.where(traced, a, b) for a, b in zip(of_rays, others, strict=True)))
@@ -271,12 +258,7 @@ class Worn:
         self._known = (looks, lobes) if len(looks.u) <= _KEPT else None
         return lobes
 
-    def _ask(
-        self,
-        queries: Queries,
-        answer: Callable[[Queries, int, Lobes | None], Part],
-        lobes: Sequence[Lobes] | None = None,
-    ) -> list[Part]:
+    def _ask(self, queries: Queries, answer: _Answer[Part], lobes: Sequence[Lobes] | None = None) -> list[Part]:
         """Return the answers of each run of queries."""
         runs = [queries.take(slice(start, start + RUN)) for start in range(0, len(queries.u), RUN)]
         known: Sequence[Lobes | None] = lobes or [None] * len(runs)

@@ -8,7 +8,7 @@ from pydantic import Field, SerializationInfo, SerializerFunctionWrapHandler, mo
 
 from pipeline import versions
 from pipeline.fingerprint import IDENTITY
-from pipeline.shards.extra_rows import ExtraRows
+from pipeline.shards.generate import ExtraRows
 from weaves.validation import Frozen
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=64)]

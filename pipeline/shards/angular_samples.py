@@ -30,7 +30,6 @@ class AngularSamples(Frozen):
     """Which angular samples of a fabric's texels are computed, and how."""
 
     kind: Literal["angular_samples"] = "angular_samples"
-    """Kind of the rows."""
     texels_per_yarn: int = Field(ge=1)
     """Texels along one yarn spacing."""
     texel_sigma: float = Field(gt=0)
@@ -42,7 +41,6 @@ class AngularSamples(Frozen):
     max_angle: float = Field(gt=0, le=89.9)
     """Largest angle of either direction to the macro normal, in degrees."""
     truth: TruthOptions
-    """How samples are answered."""
 
     @property
     def queries(self) -> QueryOptions:
@@ -63,10 +61,7 @@ class AngularSamples(Frozen):
     def answer(
         self, fabric: Fabric, start: int, count: int, progress: Callable[[int], None] = lambda done: None
     ) -> dict[str, npt.NDArray[Any]]:
-        """Return rows `start` to `start + count` by column; a row depends on optics, grid and its index alone.
-
-        `progress` receives the number of finished rows.
-        """
+        """Return rows `start` to `start + count` by column; a row depends on optics, grid and its index alone."""
         from pipeline.shards.store import columns_of
 
         fine = self.texels_per_yarn
@@ -74,16 +69,12 @@ class AngularSamples(Frozen):
         grid = self.model_dump(mode="json", include={"texels_per_yarn", "texel_sigma", "directions", "max_angle"})
         seed = stream_seed("angular samples", [fabric.optics(), grid])
 
-        # The queries: directions by sample, footprints by texel.
+        # Directions are by sample, footprints by texel.
         sample, texel = np.divmod(np.arange(start, start + count), rows * columns)
         first = int(sample[0])
         drawn = draw_queries(self.queries, (1, 1), seed, first, int(sample[-1]) - first + 1)
         row, column = np.divmod(texel, columns)
-        queries = Queries.round(
-            ((column + 0.5) / fine).astype(np.float32),
-            ((row + 0.5) / fine).astype(np.float32),
-            np.full(count, self.texel_sigma / fine, np.float32),
-            drawn.wi[sample - first],
-            drawn.wo[sample - first],
-        )
+        u, v = (((place + 0.5) / fine).astype(np.float32) for place in (column, row))
+        sigma = np.full(count, self.texel_sigma / fine, np.float32)
+        queries = Queries.round(u, v, sigma, drawn.wi[sample - first], drawn.wo[sample - first])
         return columns_of(queries, answered(fabric, queries, self.truth, seed, start, progress))

@@ -19,24 +19,13 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 
 from pipeline import versions
 from pipeline.atomic import atomic_path
+from pipeline.compiled.arrays import Mask
 from pipeline.fingerprint import file_sha256
-from pipeline.shards.query_file import (
-    ANSWERS,
-    OPTIONAL,
-    BadRow,
-    FindFaults,
-    bad_rows,
-    blocks,
-    check_columns,
-    checked_queries,
-    open_queries,
-    refuse_bad,
-)
+from pipeline.shards import query_file
 from pipeline.shards.schema import SCHEMA_VERSION
 from pipeline.shards.store import FACTS, ROW_GROUP, columns_of, parquet_writer
 from pipeline.truth.estimator import estimate
@@ -56,7 +45,7 @@ class Answerer(NamedTuple):
     """Takes queries and the place of the first in the file. BadInput if it cannot answer."""
     about: dict[str, Any]
     """Facts of it for the result's metadata."""
-    faults: FindFaults = faults
+    faults: query_file.FindFaults = faults
     """Faults of queries that it cannot answer."""
     prepare: Callable[[Queries], None] = lambda queries: None
     """Takes the queries of a block before threads begin with them."""
@@ -66,18 +55,17 @@ class Answerer(NamedTuple):
 
 def truth_answerer(fabric: Fabric, options: TruthOptions, seed: int) -> Answerer:
     """Return the ground truth; `seed` names its random numbers, 0 <= seed < 2^64."""
-    met: set[tuple[bool, bool]] = set()
+    met: set[tuple[bool, ...]] = set()
 
     def prepare(queries: Queries) -> None:
         """Load kernels and tabulate the sides of the fabric that queries need."""
-        sides = np.stack([queries.wi[:, 2] < 0, queries.wo[:, 2] < 0], axis=1)
-        for row in np.unique(sides, axis=0, return_index=True)[1].tolist():
-            key = bool(sides[row, 0]), bool(sides[row, 1])
-            if key not in met:
-                met.add(key)
+        behind = np.stack([queries.wi[:, 2] < 0, queries.wo[:, 2] < 0], axis=1)
+        for sides in map(tuple, np.unique(behind, axis=0).tolist()):
+            if sides not in met:
+                met.add(sides)
                 # A wide footprint and a narrow one, for they may use different tables; seen from straight above or
                 # beneath, where every table knows it.
-                wi, wo = (np.array([[0.0, 0.0, np.sign(w[row, 2])]] * 2, np.float32) for w in (queries.wi, queries.wo))
+                wi, wo = (np.array([[0.0, 0.0, -1.0 if back else 1.0]] * 2, np.float32) for back in sides)
                 centre, widths = np.zeros(2, np.float32), np.array([1.0, 0.12], np.float32)
                 estimate(fabric, Queries.round(centre, centre, widths, wi, wo), options, seed, 0)
 
@@ -130,42 +118,30 @@ def evaluate_file(
 ) -> Summary:
     """Answer every row of a Parquet file; the result appears whole or not at all.
 
-    Parameters
-    ----------
-    queries : Path
-        A file with `QUERY_COLUMNS` as float32 or float64, less any of `OPTIONAL`; other columns are carried along.
-    out : Path
-        The result: all columns of the file and the answers, named as in a shard.
-    skip_bad : bool
-        Leave the answers of bad rows null and list these in ``out`` with the suffix ``.bad.csv``.
-    chunk : int
-        Rows that a thread answers at a time.
-    progress : callable
-        Receives the finished share.
+    The file of `queries` has `QUERY_COLUMNS` as float32 or float64, less any of `OPTIONAL`; its other columns are
+    carried along. `out` gets all of them and the answers, named as in a shard. `skip_bad` leaves the answers of bad
+    rows null and lists these beside it (`bad_list`). `progress` receives the finished share.
 
-    Raises
-    ------
-    BadInput
-        If a file or folder cannot be used, a column is missing, odd or named as an answer, or a row is bad.
+    BadInput if a file or folder cannot be used, a column is missing, odd or named as an answer, or a row is bad.
     """
     if out.is_dir():
         raise BadInput("evaluate", "--out", str(out), "is a folder; the path of a file is needed")
     if out.exists() and queries.exists() and out.samefile(queries):
         raise BadInput("evaluate", "--out", str(out), "must not be the file of the queries")
-    with open_queries(queries) as file, ExitStack() as stack:
+    with query_file.open_queries(queries) as file, ExitStack() as stack:
         carried, total, repeat = file.schema_arrow, file.metadata.num_rows, fabric.weave.repeat
-        check_columns(queries, carried)
+        query_file.check_columns(queries, carried)
         if not skip_bad:
-            refuse_bad(queries, file, repeat, answerer.faults)
+            query_file.refuse_bad(queries, file, repeat, answerer.faults)
         about = {
             "schema_version": SCHEMA_VERSION,
             "fabric": fabric.model_dump(mode="json"),
             **answerer.about,
             "queries": queries.name,
             "queries_sha256": file_sha256(queries),
-            "left_out": {name: value for name, value in OPTIONAL.items() if name not in carried.names},
+            "left_out": {name: value for name, value in query_file.OPTIONAL.items() if name not in carried.names},
         }
-        fields = [field.with_nullable(skip_bad or not answerer.errors) for field in ANSWERS]
+        fields = [field.with_nullable(skip_bad or not answerer.errors) for field in query_file.ANSWERS]
         facts = {FACTS: json.dumps(about, sort_keys=True).encode()}
         schema = pa.schema([*carried, *fields]).with_metadata((carried.metadata or {}) | facts)
         result = stack.enter_context(atomic_path(out))
@@ -175,13 +151,13 @@ def evaluate_file(
         if skip_bad:
             path = stack.enter_context(atomic_path(bad_list(out)))
             listing = csv.writer(stack.enter_context(path.open("w", encoding="utf-8", newline="")))
-            listing.writerow(BadRow._fields)
+            listing.writerow(query_file.BadRow._fields)
         summary, pool = Summary(), ThreadPoolExecutor(threads)
         stack.callback(pool.shutdown, cancel_futures=True)  # what is stopped early begins nothing more
-        for block in blocks(queries, file):
-            batch, bad = checked_queries(block, repeat, answerer.faults)
+        for block in query_file.blocks(queries, file):
+            batch, bad = query_file.checked_queries(block, repeat, answerer.faults)
             if listing:
-                listing.writerows(bad_rows(block, summary.rows, bad))
+                listing.writerows(query_file.bad_rows(block, summary.rows, bad))
             good = np.ones(len(batch.u), np.bool_)
             good[list(bad)] = False
             answers = _answers(pool, answerer, batch, good, summary, chunk, lambda rows: progress(rows / total))
@@ -199,7 +175,7 @@ def _answers(
     pool: Executor,
     answerer: Answerer,
     batch: Queries,
-    good: npt.NDArray[np.bool_],
+    good: Mask,
     summary: Summary,
     chunk: int,
     progress: Callable[[int], None],
@@ -212,9 +188,8 @@ def _answers(
     # Kernels are loaded and the fabric is tabulated outside the clock.
     answerer.prepare(batch.take(good))
     begun = time.perf_counter()
-    parts = pool.map(
-        lambda run: answerer.answer(batch.take(run), before + run.start), [run for run in runs if good[run.start]]
-    )
+    asked = [run for run in runs if good[run.start]]
+    parts = pool.map(lambda run: answerer.answer(batch.take(run), before + run.start), asked)
     for run in runs:
         if good[run.start]:
             part = next(parts)
@@ -229,10 +204,11 @@ def _answers(
     return whole
 
 
-def _arrays(batch: Queries, answers: Answers, good: npt.NDArray[np.bool_], errors: bool) -> list[pa.Array]:
+def _arrays(batch: Queries, answers: Answers, good: Mask, errors: bool) -> list[pa.Array]:
     """Return the columns of answers; those of bad rows are null, and errors that are not stated."""
     columns = columns_of(batch, answers)
     hidden = None if good.all() else ~good
     unstated = hidden if errors else np.ones(len(good), np.bool_)
-    masks = {field.name: unstated if field.name.endswith(("_error", "_bound")) else hidden for field in ANSWERS}
+    names = [field.name for field in query_file.ANSWERS]
+    masks = {name: unstated if name.endswith(("_error", "_bound")) else hidden for name in names}
     return [pa.array(np.ascontiguousarray(columns[name]), mask=mask) for name, mask in masks.items()]

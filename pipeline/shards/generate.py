@@ -1,32 +1,42 @@
-"""One task of ground truth: which rows of which fabric, answered and written as one shard."""
+"""One task of ground truth: which rows of which fabric, answered and written as one shard.
+
+Extra rows are what a model learns from beside the data set's queries, as its options declare it: a kind and its
+parameters. Models whose options declare equal sets share the shards.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from pipeline import versions
-from pipeline.fingerprint import stream_seed
-from pipeline.shards.extra_rows import ExtraRows, set_name
+from pipeline.fingerprint import fingerprint, stream_seed
+from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.queries import Kind, QueryOptions, answered, draw_queries
+from pipeline.shards.silhouettes import SilhouetteRows
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 from weaves.validation import Frozen
 
+ExtraRows = Annotated[AngularSamples | SilhouetteRows, Field(discriminator="kind")]
+"""Any set of extra rows, distinguished by its kind."""
+
+
+def set_name(rows: ExtraRows) -> str:
+    """Return the name of a set in a manifest, where it replaces the split: kind and fingerprint."""
+    return f"{rows.kind}-{fingerprint(rows.model_dump(mode='json'), 8)}"
+
 
 class _AnyTask(Frozen):
-    """Rows of a fabric."""
-
     fabric: Fabric
     """The fabric; its colours and source do not enter the numbers."""
     start: int = Field(ge=0)
     """First row of the stream of the split or set."""
     rows: int = Field(gt=0)
-    """Rows in this shard."""
 
     def identity(self) -> dict[str, Any]:
         """Return what the numbers depend on, without names, sources and colours; versions included."""
@@ -44,9 +54,7 @@ class ShardTask(_AnyTask):
     seed: int = Field(ge=0)
     """The data set's seed."""
     queries: QueryOptions = QueryOptions()
-    """Distribution of the queries."""
     truth: TruthOptions = TruthOptions()
-    """How they are answered."""
 
     def stream(self, purpose: str) -> int:
         """Return the seed of its queries or points."""

@@ -53,7 +53,6 @@ class ShardEntry(Frozen):
     start: int
     """First row of the split's stream."""
     rows: int
-    """Number of rows."""
     sha256: str
     """Hash of the file's bytes."""
 
@@ -88,9 +87,9 @@ class Manifest(Frozen):
     def encoded(self) -> bytes:
         """Return the bytes of its file, JSON with sorted keys; the same contents give the same bytes."""
         rest = json.dumps(self.model_dump(mode="json", exclude={"shards"}), indent=1, sort_keys=True)
-        # One shard at a time: for the whole with an indent, json keeps a kilobyte and a half for each.
+        # One shard at a time, which has no nested values: with an indent, json would keep 1.5 kilobytes for each.
         ordered = sorted(self.shards, key=lambda shard: (shard.fabric, shard.split, shard.start))
-        shards = ",\n".join(map(_encoded, ordered))
+        shards = ",\n".join(f"  {{\n   {_LINES.encode(shard.model_dump())[1:-1]}\n  }}" for shard in ordered)
         text = rest.removesuffix("\n}") + ',\n "shards": [' + (f"\n{shards}\n ]" if shards else "]") + "\n}\n"
         return text.encode()
 
@@ -125,24 +124,17 @@ class Manifest(Frozen):
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _encoded(shard: ShardEntry) -> str:
-    """Return an entry, which has no nested values, as in JSON with an indent."""
-    return f"  {{\n   {_LINES.encode(shard.model_dump())[1:-1]}\n  }}"
-
-
 class PublishedFile(Frozen):
     """One file of a published data set."""
 
     file: Annotated[str, Field(pattern=r"^([A-Za-z0-9_-]{1,80}/){0,3}[A-Za-z0-9_.-]{1,80}$")]
     """Path within the folder."""
     bytes: int
-    """Size."""
     sha256: str
     """Hash of its bytes."""
     role: Role | None = None
     """Role of its fabrics; None for files without rows."""
     split: Split | None = None
-    """Split of its rows."""
     rows: dict[str, int] = Field(default_factory=dict)
     """Number of rows of each of its fabrics."""
 

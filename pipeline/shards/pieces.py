@@ -1,22 +1,61 @@
-"""Rows of a data set, generated here or published, in pieces: those of one fabric and split in one file."""
+"""Rows of a whole data set: shards joined into files that others read, and all rows, generated or published, in pieces.
+
+A joined file has the columns of the shards, but plain names of fabrics, which every reader knows, in place of an Arrow
+dictionary. Its metadata say what it was made of: the same shards give the same bytes.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, get_args
 
 import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.parquet as pq
 
-from pipeline.shards.joined import read_fabric
-from pipeline.shards.manifest import Manifest, Published, Role
-from pipeline.shards.store import read_columns
+from pipeline.atomic import atomic_path
+from pipeline.shards import store
+from pipeline.shards.manifest import Manifest, Published, Role, Split
+from pipeline.shards.schema import SCHEMA, SCHEMA_VERSION
+from pipeline.storage import local_copy
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
+from weaves.reading import refuse_irregular
 
-SPLITS: Final = ("train", "validation", "test")
+_JOINED: Final = SCHEMA.set(0, SCHEMA.field(0).with_type(pa.string()))
 
-_OF_PUBLISHED: Final = "croissant.json"
+
+def columns_joined() -> list[tuple[str, str, str]]:
+    """Return the name, the Arrow type and the meaning of every column."""
+    return [(field.name, str(field.type), field.metadata[b"meaning"].decode()) for field in _JOINED]
+
+
+def join_shards(path: Path, shards: Sequence[Path], about: dict[str, Any]) -> None:
+    """Write the rows of shards of kind `components`, at least one, to one file in their order, whole or not at all.
+
+    A file that is there, with the same JSON-able facts `about` it and no damaged page, is kept. BadInput if a shard is
+    missing or damaged.
+    """
+    facts = json.dumps(about, sort_keys=True).encode()
+    if _is_whole(path, facts):
+        return
+    schema = _JOINED.with_metadata({store.FACTS: facts})
+    with atomic_path(path) as temporary, store.parquet_writer(temporary, schema, ["fabric"]) as writer:
+        for table in store.regrouped(map(store.read_table, shards), store.ROW_GROUP):
+            writer.write_table(table.cast(schema))
+
+
+def _is_whole(path: Path, facts: bytes) -> bool:
+    """Return whether a file has these facts and its pages have their checksums."""
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            if (file.schema_arrow.metadata or {}).get(store.FACTS) != facts:
+                return False
+            return bool(sum(len(batch) for batch in file.iter_batches(store.ROW_GROUP)) == file.metadata.num_rows)
+    except (pa.ArrowException, OSError):
+        return False
 
 
 class RowPiece(NamedTuple):
@@ -30,13 +69,21 @@ class RowPiece(NamedTuple):
     """True if the file may have rows of other fabrics too."""
 
     def read(self) -> dict[str, npt.NDArray[Any]]:
-        """Return the rows by column, the fabric left out; BadInput if the file is missing or damaged."""
+        """Return the rows by column, without the fabric, checksums verified; BadInput for another or damaged file."""
         if not self.joined:
-            return read_columns(self.path, "components")
-        found = read_fabric(self.path, self.fabric)
-        if (rows := len(found["u"])) != self.rows:
-            raise BadInput(str(self.path), "", f"has {rows:,} rows of {self.fabric}", f"{self.rows:,} are needed")
-        return found
+            return store.read_columns(self.path, "components")
+        refuse_irregular(self.path, "a file of rows")
+        missing = "does not exist", "get the whole data set"
+        with store.readable(self.path, missing, "get the data set again"), local_copy(self.path) as file:
+            table = pq.read_table(file, filters=[("fabric", "==", self.fabric)], page_checksum_verification=True)
+        if table.schema.names != _JOINED.names:
+            odd = ", ".join(sorted(set(table.schema.names) ^ set(_JOINED.names)))
+            allowed = f"must be schema version {SCHEMA_VERSION}"
+            raise BadInput(str(self.path), "schema", f"columns {odd} differ", allowed)
+        if table.num_rows != self.rows:
+            wrong = f"has {table.num_rows:,} rows of {self.fabric}"
+            raise BadInput(str(self.path), "", wrong, f"{self.rows:,} are needed")
+        return store.numbers_of(table)
 
 
 class DatasetRows(NamedTuple):
@@ -52,7 +99,7 @@ class DatasetRows(NamedTuple):
     @classmethod
     def load(cls, folder: Path) -> DatasetRows:
         """Read the manifest of a data set; BadInput if it is missing or damaged."""
-        if (folder / _OF_PUBLISHED).exists():
+        if (folder / "croissant.json").exists():  # published
             published = Published.load(folder)
             pieces = [
                 RowPiece(folder / entry.file, fabric, entry.split or "", rows, joined=True)
@@ -67,12 +114,9 @@ class DatasetRows(NamedTuple):
         return cls(folder, dict(manifest.fabrics), dict(manifest.roles), pieces)
 
     def of(self, split: str, fabrics: Sequence[str] | None = None) -> list[RowPiece]:
-        """Return the pieces of a split, train, validation or test, of some fabrics or all that have it, one by one.
-
-        BadInput if a split or fabric does not exist, or has no rows.
-        """
-        if split not in SPLITS:
-            raise BadInput(str(self.folder), "split", split, nearest(split, SPLITS))
+        """Return the pieces of a split, of some fabrics or all that have it; BadInput if there are no such rows."""
+        if split not in get_args(Split):
+            raise BadInput(str(self.folder), "split", split, nearest(split, get_args(Split)))
         by_fabric: dict[str, list[RowPiece]] = {}
         for piece in self.pieces:
             if piece.split == split:

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Answers, Queries
 from weaves.fabric import Fabric
@@ -36,7 +36,6 @@ class QueryOptions(Frozen):
     """`projected_disc`: density proportional to the cosine; `hemisphere`: uniform in solid angle."""
     max_angle: float = Field(default=89.0, gt=0, le=89.9)
     """Largest angle of either direction to the macro normal, in degrees."""
-
     behind: float = Field(default=0.0, ge=0, le=1)
     """Share of the queries with the light on the other side of the cloth: their answers are its transmission."""
     stretch: float = Field(default=1.0, ge=1, le=1024)
@@ -69,17 +68,14 @@ def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, star
     """
     draws = uniform_draws(seed, start, count)
     low, high = (math.log(bound) for bound in options.sigma)
-    queries = Queries.round(
-        u=(draws[:, 0] * repeat[0]).astype(np.float32),
-        v=(draws[:, 1] * repeat[1]).astype(np.float32),
-        sigma=np.exp(low + (high - low) * draws[:, 2]).astype(np.float32),
-        wi=_directions(options, draws[:, 3], draws[:, 4]),
-        wo=_directions(options, draws[:, 5], draws[:, 6]),
-    )
+    u, v = ((draws[:, axis] * repeat[axis]).astype(np.float32) for axis in (0, 1))
+    sigma = np.exp(low + (high - low) * draws[:, 2]).astype(np.float32)
+    wi, wo = (_directions(options, draws[:, first], draws[:, first + 1]) for first in (3, 5))
+    queries = Queries.round(u, v, sigma, wi, wo)
     return queries if options.plain else _shaped(options, queries, seed, start)
 
 
-def uniform_draws(seed: int, start: int, count: int) -> npt.NDArray[np.float64]:
+def uniform_draws(seed: int, start: int, count: int) -> Float64:
     """Return the numbers in [0, 1) of rows `start` to `start + count` of a stream, (count, 8)."""
     generator = np.random.Generator(np.random.Philox(key=seed).advance(start * _DRAWS // 4))
     return generator.random((count, _DRAWS))
@@ -117,9 +113,7 @@ def _shaped(options: QueryOptions, queries: Queries, seed: int, start: int) -> Q
     )
 
 
-def _directions(
-    options: QueryOptions, radius: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]
-) -> npt.NDArray[np.float32]:
+def _directions(options: QueryOptions, radius: Float64, turn: Float64) -> Float32:
     """Return unit vectors of the upper hemisphere, (N, 3)."""
     limit = math.radians(options.max_angle)
     if options.directions == "projected_disc":

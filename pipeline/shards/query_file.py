@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -25,6 +25,7 @@ OPTIONAL: Final = {"sigma_minor": "sigma", "angle": 0.0, "curvature": 0.0}
 ANSWERS: Final = [field for field in SCHEMA if field.name not in ("fabric", *QUERY_COLUMNS)]
 """The columns of an answer."""
 
+_REMEDIES = ("no such file", "the path of a Parquet file is needed"), "one that can be read is needed"
 _BUFFER = 1 << 20  # bytes of a column read at a time, so that one huge row group is not held whole
 
 
@@ -37,17 +38,12 @@ class BadRow(NamedTuple):
     reason: str
 
 
-def _readable(path: Path) -> AbstractContextManager[None]:
-    missing = "no such file", "the path of a Parquet file is needed"
-    return readable(path, missing, "one that can be read is needed")
-
-
 @contextmanager
 def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
     """Open a Parquet file whose pages are verified as they are read; BadInput if it is missing, cut short, or none."""
     refuse_irregular(path, "a Parquet file")
     with ExitStack() as stack:
-        with _readable(path):
+        with readable(path, *_REMEDIES):
             here = stack.enter_context(local_copy(path))
             file = pq.ParquetFile(here, page_checksum_verification=True, buffer_size=_BUFFER)
         about = file.metadata
@@ -62,7 +58,7 @@ def blocks(path: Path, file: pq.ParquetFile, columns: list[str] | None = None) -
     def batches() -> Iterator[pa.Table]:
         rows = file.iter_batches(ROW_GROUP, columns=columns)
         while True:
-            with _readable(path):
+            with readable(path, *_REMEDIES):
                 batch = next(rows, None)
             if batch is None:
                 return
@@ -129,10 +125,7 @@ def checked_queries(block: pa.Table, repeat: tuple[int, int], find: FindFaults =
 
 
 def bad_rows(block: pa.Table, start: int, found: Faults) -> Iterator[BadRow]:
-    """Yield the faults of a block in the order of its rows, by the file's own columns and values.
-
-    `start` is the file's index of its first row.
-    """
+    """Yield the faults of a block, from row `start` of the file on, by the file's own columns and values."""
     axes = {name: [f"{name}_{axis}" for axis in "xyz"] if name in ("wi", "wo") else [name] for name in Queries._fields}
     named = {name: {c: block[c].to_pylist() for c in axes[name]} for name in {name for name, _, _ in found.values()}}
     for row, (name, _, allowed) in sorted(found.items()):

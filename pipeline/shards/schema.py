@@ -30,14 +30,9 @@ _QUERY: Final = {
     "angle": "angle from x to the footprint's first axis, radians",
     "curvature": "curvature of the cloth in the viewer's plane, 1/yarn spacings; 0 for flat cloth",
 }
-_ANSWER: Final = {
-    "specular_warp": "S_warp, unit colour, incident cosine included, 1/sr",
-    "specular_weft": "S_weft, unit colour, incident cosine included, 1/sr",
-    "diffuse_warp": "C_warp, unit colour, incident cosine included, 1/sr",
-    "diffuse_weft": "C_weft, unit colour, incident cosine included, 1/sr",
-}
 _STANDARD_ERROR: Final = "standard error of {}: on average over rows, the root mean square of its error"
 _BOUND: Final = "bound of the error of {}: 997 of 1,000 errors are smaller"
+_SYMBOLS: Final = ("S_warp", "S_weft", "C_warp", "C_weft")
 _THROUGH: Final = "share of light from straight behind that reaches the viewer unscattered, in [0, 1]"
 
 STANDARD_ERRORS: Final = tuple(f"{name}_standard_error" for name in COMPONENTS)
@@ -46,23 +41,22 @@ QUERY_COLUMNS: Final = tuple(_QUERY)
 """The columns of a query, as `twillight evaluate` reads them."""
 
 
-def _field(name: str, kind: pa.DataType, meaning: str) -> pa.Field:
+def _field(name: str, meaning: str, kind: pa.DataType = pa.float32()) -> pa.Field:  # noqa: B008, types are fixed
     return pa.field(name, kind, nullable=False, metadata={"meaning": meaning})
 
 
-SCHEMA: Final = pa.schema(
-    [
-        _field("fabric", pa.dictionary(pa.int32(), pa.string()), "name of the fabric in the manifest"),
-        *(_field(name, pa.float32(), meaning) for name, meaning in _QUERY.items()),
-        *(_field(name, pa.float32(), _ANSWER[name]) for name in COMPONENTS),
-        *(_field(name, pa.float32(), _STANDARD_ERROR.format(name[:-15])) for name in STANDARD_ERRORS),
-        *(_field(name, pa.float32(), _BOUND.format(name[:-6])) for name in BOUNDS),
-        _field(TRANSPARENCY, pa.float32(), _THROUGH),
-        _field(f"{TRANSPARENCY}_standard_error", pa.float32(), _STANDARD_ERROR.format(TRANSPARENCY)),
-        _field(f"{TRANSPARENCY}_bound", pa.float32(), _BOUND.format(TRANSPARENCY)),
-        _field("count", pa.int32(), "points evaluated for this row"),
-    ]
-)
+_FABRIC: Final = _field("fabric", "name of the fabric in the manifest", pa.dictionary(pa.int32(), pa.string()))
+_ANSWER: Final = {
+    **{name: f"{_SYMBOLS[i]}, unit colour, incident cosine included, 1/sr" for i, name in enumerate(COMPONENTS)},
+    **{error: _STANDARD_ERROR.format(name) for error, name in zip(STANDARD_ERRORS, COMPONENTS, strict=True)},
+    **{bound: _BOUND.format(name) for bound, name in zip(BOUNDS, COMPONENTS, strict=True)},
+    TRANSPARENCY: _THROUGH,
+    f"{TRANSPARENCY}_standard_error": _STANDARD_ERROR.format(TRANSPARENCY),
+    f"{TRANSPARENCY}_bound": _BOUND.format(TRANSPARENCY),
+}
+_COUNT: Final = _field("count", "points evaluated for this row", pa.int32())
+
+SCHEMA: Final = pa.schema([_FABRIC, *(_field(*column) for column in (_QUERY | _ANSWER).items()), _COUNT])
 """Arrow schema of a query with its components, each column with its meaning."""
 
 _VIEW: Final = {
@@ -72,25 +66,23 @@ _VIEW: Final = {
     **{f"wo_{axis}": "unit vector to the viewer" for axis in "xyz"},
     "curvature": "curvature of the cloth in the viewer's plane, 1/yarn spacings, > 0",
 }
-_OPACITY: Final = {
-    "opacity": "share of the camera rays that hit a yarn before they leave the cloth's boundary, in [0, 1]",
-    "opacity_standard_error": "standard error of opacity",
-}
-_GRAZING: Final = {
-    "grazing_mean": "mean over the footprint of the cosine at which a ray just touches, over the root of the curvature",
-    "grazing_variance": "variance over the footprint of the same",
-}
 
 
-def _silhouette(answer: dict[str, str]) -> pa.Schema:
-    columns = {**_VIEW, **answer}
-    return pa.schema([SCHEMA.field("fabric"), *(_field(name, pa.float32(), columns[name]) for name in columns)])
+def _silhouette(**answer: str) -> pa.Schema:
+    return pa.schema([_FABRIC, *(_field(*column) for column in (_VIEW | answer).items())])
 
 
 SCHEMAS: Final[dict[Kind, pa.Schema]] = {
     "components": SCHEMA,
     "angular_samples": SCHEMA,
-    "opacity": _silhouette(_OPACITY),
-    "grazing_cosine": _silhouette(_GRAZING),
+    "opacity": _silhouette(
+        opacity="share of the camera rays that hit a yarn before they leave the cloth's boundary, in [0, 1]",
+        opacity_standard_error="standard error of opacity",
+    ),
+    "grazing_cosine": _silhouette(
+        grazing_mean="mean over the footprint of the cosine at which a ray just touches, "
+        "over the root of the curvature",
+        grazing_variance="variance over the footprint of the same",
+    ),
 }
 """Arrow schema of every kind of rows."""

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
+from pipeline.compiled.arrays import Float32, Float64
 from pipeline.fingerprint import stream_seed
 from pipeline.shards.queries import uniform_draws
 from pipeline.truth.options import TruthOptions
@@ -31,7 +31,7 @@ _TRIED = 1024  # first rows, whose steepest grazing cosine bounds the views of a
 _BEYOND = 1.2  # how far beyond it the views reach, in tangents
 _CHUNK = 2048  # rows between two signs of progress; no row depends on it
 
-Double = npt.NDArray[np.float64]
+_Rows = dict[str, Float32]  # columns by name
 
 
 class SilhouetteRows(Frozen):
@@ -54,7 +54,6 @@ class SilhouetteRows(Frozen):
     anywhere: float = Field(ge=0, le=1)
     """Share of the views at any angle, their cosines uniform in (0, 1]."""
     footprint: Literal["gaussian", "box"]
-    """Kernel of the footprint."""
     seed: int = Field(ge=0)
     """Seed of the queries and of their rays."""
 
@@ -64,14 +63,11 @@ class SilhouetteRows(Frozen):
 
     def answer(
         self, fabric: Fabric, start: int, count: int, progress: Callable[[int], None] = lambda done: None
-    ) -> dict[str, npt.NDArray[np.float32]]:
-        """Return rows `start` to `start + count` by column; a row depends on fabric, options and its index alone.
-
-        `progress` receives the number of finished rows.
-        """
+    ) -> _Rows:
+        """Return rows `start` to `start + count` by column; a row depends on fabric, options and its index alone."""
         seed = stream_seed("silhouettes", [fabric.optics(), self.seed])
         steepest = self._steepest(fabric, seed)
-        parts: list[dict[str, npt.NDArray[np.float32]]] = []
+        parts: list[_Rows] = []
         for done in range(0, count, _CHUNK):
             part = self._drawn(fabric, seed, start + done, min(_CHUNK, count - done), steepest)
             parts.append(part | self._answered(fabric, seed, start + done, part))
@@ -85,15 +81,11 @@ class SilhouetteRows(Frozen):
         draws = uniform_draws(seed, 0, _TRIED)
         ends, picks = fabric.weave.repeat
         curvature = self.largest_curvature * np.square(1.0 - draws[:, 3])
-        square = np.square(
-            grazing_cosine(fabric, draws[:, 0] * ends, draws[:, 1] * picks, 2.0 * np.pi * draws[:, 5], curvature)
-        )
+        touch = grazing_cosine(fabric, draws[:, 0] * ends, draws[:, 1] * picks, 2.0 * np.pi * draws[:, 5], curvature)
+        square = np.square(touch)
         return float(np.sqrt(square / (1.0 - square) / curvature).max())
 
-    def _drawn(
-        self, fabric: Fabric, seed: int, start: int, count: int, steepest: float
-    ) -> dict[str, npt.NDArray[np.float32]]:
-        """Return the columns of queries."""
+    def _drawn(self, fabric: Fabric, seed: int, start: int, count: int, steepest: float) -> _Rows:
         draws = uniform_draws(seed, start, count)
         ends, picks = fabric.weave.repeat
         low, high = (math.log(bound) for bound in self.sigma)
@@ -113,10 +105,7 @@ class SilhouetteRows(Frozen):
         }
         return {name: column.astype(np.float32) for name, column in columns.items()}
 
-    def _answered(
-        self, fabric: Fabric, seed: int, start: int, query: dict[str, npt.NDArray[np.float32]]
-    ) -> dict[str, npt.NDArray[np.float32]]:
-        """Return the columns of answers."""
+    def _answered(self, fabric: Fabric, seed: int, start: int, query: _Rows) -> _Rows:
         from pipeline.truth.geometry.opacity import grazing_cosine, opacity
 
         if self.kind == "opacity":
@@ -131,12 +120,10 @@ class SilhouetteRows(Frozen):
         azimuth = np.arctan2(query["wo_y"], query["wo_x"]).astype(np.float64)[:, None]
         x, y = self._spread(seed, start, len(u))
         touch = grazing_cosine(fabric, u + sigma * x, v + sigma * y, azimuth, curvature) / np.sqrt(curvature)
-        return {
-            "grazing_mean": touch.mean(axis=1).astype(np.float32),
-            "grazing_variance": touch.var(axis=1).astype(np.float32),
-        }
+        mean, variance = touch.mean(axis=1).astype(np.float32), touch.var(axis=1).astype(np.float32)
+        return {"grazing_mean": mean, "grazing_variance": variance}
 
-    def _spread(self, seed: int, start: int, count: int) -> tuple[Double, Double]:
+    def _spread(self, seed: int, start: int, count: int) -> tuple[Float64, Float64]:
         """Return points of a footprint of standard deviation 1, x and y, each (count, points of a row)."""
         each = max(self.points // RAYS_A_COSINE, 2)
         generator = np.random.Generator(np.random.Philox(key=seed + _SPREADS).advance(start * each // 2))

@@ -31,6 +31,11 @@ FACTS: Final = b"twillight"
 ROW_GROUP: Final = 16_384
 """Rows written at a time."""
 
+_REMEDIES: Final = (
+    ("does not exist", "generate it again with `twillight generate`"),
+    "delete it and run `twillight generate`",
+)
+
 _STACKED: Final = {
     "wi": ("wi_x", "wi_y", "wi_z"),
     "wo": ("wo_x", "wo_y", "wo_z"),
@@ -45,10 +50,7 @@ Columns = Mapping[str, npt.NDArray[Any]]
 
 
 def write_columns(path: Path, kind: Kind, fabric: str, columns: Columns, about: dict[str, Any]) -> None:
-    """Write one shard, whole: all columns of its kind but `fabric`, whose name every row has.
-
-    `about` has JSON-able facts of the file: the task that made it, options, versions.
-    """
+    """Write one shard, whole: all columns of its kind, the name of its fabric, and JSON-able facts `about` it."""
     schema = SCHEMAS[kind]
     rows = len(next(iter(columns.values())))
     names = pa.DictionaryArray.from_arrays(np.zeros(rows, np.int32), pa.array([fabric]))
@@ -106,8 +108,7 @@ def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ())
     """
     schema = pa.schema([SCHEMAS[kind].field(name) for name in names]) if names else SCHEMAS[kind]
     refuse_irregular(path, "a shard")
-    again = "generate it again with `twillight generate`", "delete it and run `twillight generate`"
-    with readable(path, ("does not exist", again[0]), again[1]), local_copy(path) as file:
+    with readable(path, *_REMEDIES), local_copy(path) as file:
         # Shards are small: threads within one cost more than they save.
         table = pq.read_table(file, columns=list(names) or None, page_checksum_verification=True, use_threads=False)
     if not table.schema.equals(schema, check_metadata=False):
@@ -119,8 +120,7 @@ def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ())
 
 def read_groups(path: Path, names: Sequence[str], first: int, groups: int) -> pa.Table:
     """Read columns of some row groups of a shard, as many as there are from the `first` on; errors as `read_table`."""
-    again = "generate it again with `twillight generate`", "delete it and run `twillight generate`"
-    with readable(path, ("does not exist", again[0]), again[1]):
+    with readable(path, *_REMEDIES):
         file = pq.ParquetFile(path, page_checksum_verification=True)
         last = min(first + groups, file.num_row_groups)
         return file.read_row_groups(range(first, last), columns=list(names), use_threads=False)
@@ -128,9 +128,7 @@ def read_groups(path: Path, names: Sequence[str], first: int, groups: int) -> pa
 
 def read_about(path: Path) -> dict[str, Any]:
     """Return the facts that a shard's metadata hold."""
-    metadata = pq.read_schema(path).metadata or {}
-    facts: dict[str, Any] = json.loads(metadata.get(FACTS, b"{}"))
-    return facts
+    return dict(json.loads((pq.read_schema(path).metadata or {}).get(FACTS, b"{}")))
 
 
 def numbers_of(table: pa.Table) -> dict[str, npt.NDArray[Any]]:

@@ -14,6 +14,7 @@ import safetensors.torch
 import torch
 from safetensors import SafetensorError
 from torch import Tensor, nn
+from torch.optim import Optimizer
 
 from pipeline.atomic import atomic_path
 from weaves.errors import WorkFailed
@@ -33,9 +34,7 @@ class State:
     the weights: a checkpoint of another training, at `path`, is not gone on from.
     """
 
-    def __init__(
-        self, network: nn.Module, optimiser: torch.optim.Optimizer, average: float, identity: str, path: Path
-    ) -> None:
+    def __init__(self, network: nn.Module, optimiser: Optimizer, average: float, identity: str, path: Path) -> None:
         self.network, self.optimiser, self.identity, self.path = network, optimiser, identity, path
         self.curve: list[dict[str, float]] = []
         self._keep = average

@@ -21,13 +21,12 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor
 from torch.utils.data import IterableDataset, get_worker_info
 
 from pipeline.atomic import atomic_path
-from pipeline.compiled.arrays import Index
+from pipeline.compiled.arrays import Float32, Index
 from pipeline.models.network import Batch
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import RowPiece
@@ -59,7 +58,7 @@ _ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
 class TrainingRows:
     """A table of rows (rows, COLUMNS), fabric after fabric, `counts` of each, at least 1; it may be memory-mapped."""
 
-    def __init__(self, table: npt.NDArray[np.float32], counts: Sequence[int]) -> None:
+    def __init__(self, table: Float32, counts: Sequence[int]) -> None:
         self.table, self.counts = table, list(counts)
         self.windows = [[count] for count in counts]
         self._starts = np.concatenate([[0], np.cumsum(self.counts)])
@@ -69,11 +68,11 @@ class TrainingRows:
         places: Index = rows + self._starts[fabrics][:, None]
         return places
 
-    def take(self, fabrics: Index, rows: Index) -> npt.NDArray[np.float32]:
+    def take(self, fabrics: Index, rows: Index) -> Float32:
         """Return rows (F, n) of fabrics (F,), counted within each fabric, (F, n, COLUMNS)."""
         return self.table[self.index(fabrics, rows)]
 
-    def spread(self, most: int) -> npt.NDArray[np.float32]:
+    def spread(self, most: int) -> Float32:
         """Return about so many rows of all fabrics, evenly spaced."""
         return self.table[:: max(len(self.table) // most, 1)]
 
@@ -88,7 +87,7 @@ class WindowedRows:
         self.counts = [sum(window) for window in self.windows]
         self._window = lru_cache(maxsize=MOST_IN_TABLE // rows)(self._read)
 
-    def take(self, fabrics: Index, rows: Index) -> npt.NDArray[np.float32]:
+    def take(self, fabrics: Index, rows: Index) -> Float32:
         """Return rows (F, n) of fabrics (F,), counted within each fabric, (F, n, COLUMNS); of each from one window."""
         taken = []
         for fabric, own in zip(fabrics.tolist(), rows, strict=True):
@@ -97,12 +96,12 @@ class WindowedRows:
             taken.append(self._window(fabric, window)[own - (ends[window] - self.windows[fabric][window])])
         return np.stack(taken)
 
-    def spread(self, most: int) -> npt.NDArray[np.float32]:
+    def spread(self, most: int) -> Float32:
         """Return at most so many rows: the first ones of some fabrics, evenly spaced among all."""
         some = self._pieces[:: -(-len(self._pieces) // _STARTS)]
         return np.concatenate([own[0][0].read(1)[: most // len(some)] for own in some])
 
-    def _read(self, fabric: int, window: int) -> npt.NDArray[np.float32]:
+    def _read(self, fabric: int, window: int) -> Float32:
         return np.concatenate([piece.read() for piece in self._pieces[fabric][window]])
 
 
@@ -115,7 +114,7 @@ class _Piece(NamedTuple):
     rows: int
     """Of all groups."""
 
-    def read(self, groups: int = 0) -> npt.NDArray[np.float32]:
+    def read(self, groups: int = 0) -> Float32:
         """Return the rows of the first groups, 0: of all."""
         return _stacked(read_groups(self.path, _NAMES, self.first, groups or -(-self.rows // ROW_GROUP)))
 
@@ -139,7 +138,7 @@ def _windows(folder: Path, shards: Sequence[ShardEntry], least: int) -> list[lis
     return windows
 
 
-def _stacked(table: Any) -> npt.NDArray[np.float32]:
+def _stacked(table: Any) -> Float32:
     return np.stack([column.to_numpy() for column in table.columns], axis=-1)
 
 
@@ -262,14 +261,8 @@ class RowStream(IterableDataset[dict[str, Tensor]]):
     within one, is a pure function of the seed and of how often the stream was read before; worker processes count this
     anew when they start, so a DataLoader that has some needs ``persistent_workers=True``. `Batches` mix fabrics better.
 
-    Parameters
-    ----------
-    pieces : sequence of RowPiece
-        The rows, fabric after fabric; this order numbers the fabrics.
-    rows : int
-        Most rows of a batch, >= 1; no batch has rows of two pieces.
-    seed : int or None
-        Seed of the order; None keeps that of the pieces.
+    The pieces come fabric after fabric; this order numbers the fabrics. A batch has at most `rows` rows, >= 1, of one
+    piece. With the seed None the order is that of the pieces.
     """
 
     def __init__(self, pieces: Sequence[RowPiece], rows: int = 4096, seed: int | None = 0) -> None:

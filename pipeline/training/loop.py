@@ -26,7 +26,7 @@ from pipeline.models.card import write_model
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.domain import Domain
 from pipeline.models.registry import build_network
-from pipeline.shards.extra_rows import set_name
+from pipeline.shards.generate import set_name
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
 from pipeline.training.dataset import TARGET, Batches, Order, load_rows
@@ -49,29 +49,14 @@ def train(
     folder: Path,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> None:
-    """Train a model and write ``model.safetensors`` and ``card.json``.
+    """Train a model that learns, and write ``model.safetensors`` and ``card.json`` to `folder`.
 
-    Parameters
-    ----------
-    options : model options
-        The model; it must be one that learns.
-    training : TrainingOptions
-        How it is trained.
-    manifest_folder : Path
-        The data set.
-    fabrics : sequence of str
-        Names of the fabrics whose training rows it learns from; one for a model of one material.
-    folder : Path
-        Where the files go. A checkpoint of the same training in it is gone on from; of another one, ignored.
-    progress : callable
-        Called with the finished share, in [0, 1].
+    `fabrics` are the names of those of the data set whose training rows it learns from; one for a model of one
+    material. A checkpoint of the same training in the folder is gone on from; one of another is ignored. `progress`
+    receives the finished share.
 
-    Raises
-    ------
-    BadInput
-        If rows are missing, the folder cannot be written, or a requested GPU is missing.
-    WorkFailed
-        If the loss diverges, or the code of a network from outside fails; the last good checkpoint stays.
+    BadInput if rows are missing, the folder cannot be written, or a requested GPU is missing. WorkFailed if the loss
+    diverges, or the code of a network from outside fails; the last good checkpoint stays.
     """
     device = _chosen_device(training.device)
     manifest = Manifest.load(manifest_folder)
@@ -113,7 +98,10 @@ def train(
             with network.call("loss"):
                 with torch.autocast(device.type, torch.bfloat16, enabled=mixed(training, device)):
                     loss = learnt(batch, random)
-                norm = _descend(network, optimiser, loss, training.gradient_clip)
+                optimiser.zero_grad()
+                loss.backward()  # type: ignore[no-untyped-call]
+                norm = nn.utils.clip_grad_norm_(network.parameters(), training.gradient_clip)
+                optimiser.step()
 
             # Note the loss; look at it only now and then, because looking waits for the device.
             state.add(step, loss.detach(), norm)
@@ -135,9 +123,13 @@ def train(
 
         weights = state.best_weights()
         card |= {"curve": state.curve, "steps_taken": int(state.curve[-1]["step"]), "kept": _kept(state)}
-        card["last_bits"] = _last_bits(device)
+        # Beside the options; the number of cores is not part of it.
+        processor = torch.backends.cpu.get_cpu_capability()
+        card["last_bits"] = {"torch": torch.__version__, "processor": processor, "device": device.type}
         card["validation"] = held_out.figures(weights)
-    _write(folder, weights, card, identity)
+    # One key of metadata: safetensors writes several in no fixed order.
+    metadata = {"twillight": json.dumps({"model": card["model"], "name": card["name"], "identity": identity})}
+    write_model(folder, safetensors.torch.save(weights, metadata=metadata), card)
     (folder / CHECKPOINT).unlink(missing_ok=True)
     (folder / f"{identity}-{ROWS}").unlink(missing_ok=True)
     progress(1.0)
@@ -157,22 +149,6 @@ def _kept(state: State) -> dict[str, Any]:
         return {"weights": "running average of the last step", "watched": "nothing: there are no held-out queries"}
     watched = "held_out_loss: the loss of the training on held-out queries of the fabrics it learns from"
     return {"weights": "running average of the step with the lowest held_out_loss", "watched": watched, **state.best}
-
-
-def _descend(network: nn.Module, optimiser: torch.optim.Optimizer, loss: torch.Tensor, clip: float) -> torch.Tensor:
-    """Take one step of the optimiser; return the norm of the gradient before it was clipped."""
-    optimiser.zero_grad()
-    loss.backward()  # type: ignore[no-untyped-call]
-    norm = nn.utils.clip_grad_norm_(network.parameters(), clip)
-    optimiser.step()
-    return norm
-
-
-def _write(folder: Path, weights: dict[str, torch.Tensor], card: dict[str, Any], identity: str) -> None:
-    """Write weights and card."""
-    # One key of metadata: safetensors writes several in no fixed order.
-    metadata = {"twillight": json.dumps({"model": card["model"], "name": card["name"], "identity": identity})}
-    write_model(folder, safetensors.torch.save(weights, metadata=metadata), card)
 
 
 def rate_factor(step: int, training: TrainingOptions) -> float:
@@ -208,12 +184,6 @@ def _reproducible(threads: int, device: torch.device) -> Iterator[None]:
     finally:
         torch.set_num_threads(before[0])
         torch.use_deterministic_algorithms(before[1])
-
-
-def _last_bits(device: torch.device) -> dict[str, str]:
-    """Return what the last bits of the weights depend on beside the options: the number of cores is not part of it."""
-    processor = torch.backends.cpu.get_cpu_capability()
-    return {"torch": torch.__version__, "processor": processor, "device": device.type}
 
 
 def _card(options: Any, training: TrainingOptions, manifest: Manifest, fabrics: Sequence[Fabric]) -> dict[str, Any]:

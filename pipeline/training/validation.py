@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor
 
+from pipeline.compiled.arrays import Float32
 from pipeline.models.network import Batch
 from pipeline.models.registry import restore_methods
 from pipeline.shards.manifest import Manifest
@@ -50,7 +50,7 @@ class HeldOut:
         order = [entry["name"] for entry in self._card["fabrics"]]
         fabric = torch.tensor([order.index(name) for name in self._rows], device=device)
 
-        def stacked(columns: Iterable[npt.NDArray[np.float32]]) -> Tensor:
+        def stacked(columns: Iterable[Float32]) -> Tensor:
             return torch.from_numpy(np.stack([column[:each] for column in columns])).to(device)
 
         rows = self._rows.values()
@@ -80,9 +80,7 @@ class HeldOut:
             found[name] = _component_figures(prediction, answers) | {"footprints": bins}
         return found
 
-    def _answered(
-        self, weights: dict[str, Tensor], share: int
-    ) -> Iterator[tuple[str, npt.NDArray[np.float32], Queries, Answers]]:
+    def _answered(self, weights: dict[str, Tensor], share: int) -> Iterator[tuple[str, Float32, Queries, Answers]]:
         (method,) = restore_methods(self._options, [(self._card, weights)])
         for name, (queries, answers) in self._rows.items():
             few = queries.take(slice(share))
@@ -95,12 +93,8 @@ def footprint_labels() -> list[str]:
     return [f"below {FOOTPRINTS[0]:g}", *inner, f"above {FOOTPRINTS[-1]:g}"]
 
 
-def _component_figures(prediction: npt.NDArray[np.float32], answers: Answers) -> dict[str, dict[str, float]]:
-    """Compare components (N, 4) with the truth.
-
-    For each component: ``mse``, ``noise`` (the truth's mean squared standard error), ``mean`` of the truth, and
-    ``relative_rmse``, sqrt(mse) / mean.
-    """
+def _component_figures(prediction: Float32, answers: Answers) -> dict[str, dict[str, float]]:
+    """Compare components (N, 4) with the truth; ``noise`` is its mean squared standard error."""
     truth = answers.mean.astype(np.float64)
     mse = np.square(prediction - truth).mean(axis=0)
     noise = np.square(answers.standard_error.astype(np.float64)).mean(axis=0)

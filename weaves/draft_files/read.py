@@ -11,9 +11,8 @@ import math
 import warnings
 import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 from dtx_to_wif import PatternData, dtx_reader, make_liftplan, read_dtx, read_wpo
@@ -33,8 +32,7 @@ CENTIMETRES: Final = {"decipoints": 2.54 / 720, "inches": 2.54, "centimeters": 1
 _EPI, _PPI = 9, 10  # bytes of a WeavePoint file: ends and picks per inch
 
 
-@dataclass(frozen=True)
-class DraftThreads:
+class DraftThreads(NamedTuple):
     """The ends, or the picks, of a draft file."""
 
     colours: tuple[str, ...]
@@ -45,8 +43,7 @@ class DraftThreads:
     """Threads per centimetre; None if the file states no spacing or no known unit."""
 
 
-@dataclass(frozen=True, eq=False)
-class DraftFile:
+class DraftFile(NamedTuple):
     """A draft as its file has it."""
 
     title: str
@@ -68,17 +65,13 @@ def cut_out(draft: DraftFile, ends: tuple[int, int] | None, picks: tuple[int, in
     parts = []
     for threads, limits in ((draft.ends, ends), (draft.picks, picks)):
         first, last = limits or (1, len(threads.colours))
-        parts.append((slice(first - 1, last), replace(threads, colours=threads.colours[first - 1 : last])))
+        parts.append((slice(first - 1, last), threads._replace(colours=threads.colours[first - 1 : last])))
     (over_ends, own_ends), (over_picks, own_picks) = parts
-    return replace(draft, warp_over=draft.warp_over[over_picks, over_ends], ends=own_ends, picks=own_picks)
+    return draft._replace(warp_over=draft.warp_over[over_picks, over_ends], ends=own_ends, picks=own_picks)
 
 
 def read_draft(path: Path) -> DraftFile:
-    """Read a draft file.
-
-    Its suffix says the format. BadInput if that is unknown, or the file cannot be read, is larger than
-    `MOST_WIF_BYTES`, or describes no draft.
-    """
+    """Read a draft file, whose suffix says the format; BadInput if that is unknown, or it is too large or no draft."""
     where = str(path)
     if (reader := READERS.get(path.suffix.lower())) is None:
         raise BadInput(where, "", "no known draft file", f"its name must end in {', '.join(READERS)}")
@@ -182,7 +175,6 @@ def _called(call: Callable[[], Result], where: str, kind: str) -> Result:
 
 
 def _draft_file(pattern: PatternData, path: Path, remarks: list[str]) -> DraftFile:
-    """Return a draft whose numbers are in range."""
     where = str(path)
     lifts = pattern.liftplan or pattern.treadling
     ends, picks = max([pattern.warp.threads, *pattern.threading]), max([pattern.weft.threads, *lifts])
@@ -197,17 +189,16 @@ def _draft_file(pattern: PatternData, path: Path, remarks: list[str]) -> DraftFi
     return DraftFile(
         title=one_line(pattern.name if pattern.name not in ("", "?", where) else path.stem, 100),
         program=one_line(f"{pattern.source_program} {pattern.source_version}".replace("?", "").strip(), 60),
-        warp_over=_woven(pattern.threading, make_liftplan(pattern), ends, picks, where) ^ (not pattern.is_rising_shed),
+        warp_over=_woven(pattern, ends, picks, where) ^ (not pattern.is_rising_shed),
         ends=_threads(pattern, "warp", ends, table, remarks),
         picks=_threads(pattern, "weft", picks, table, remarks),
         remarks=tuple(remarks),
     )
 
 
-def _woven(
-    threading: Mapping[int, set[int]], lifts: Mapping[int, set[int]], ends: int, picks: int, where: str
-) -> Bools:
+def _woven(pattern: PatternData, ends: int, picks: int, where: str) -> Bools:
     """Return where an end is on a shaft that its pick names, bool (picks, ends)."""
+    threading, lifts = pattern.threading, make_liftplan(pattern)
     shafts = max([0, *(shaft for sets in (threading, lifts) for numbers in sets.values() for shaft in numbers)])
     if shafts > MOST_THREADS or min([0, *threading, *(shaft for each in threading.values() for shaft in each)]) < 0:
         raise BadInput(where, "[THREADING]", shafts, f"shafts from 1 to {MOST_THREADS} are needed")

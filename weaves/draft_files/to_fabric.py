@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -29,21 +29,17 @@ MOST_SOURCE: Final = 2000
 """Most letters of a fabric's `source`."""
 
 
-@dataclass(frozen=True)
-class Imported:
+class Imported(NamedTuple):
     """A fabric from a draft file, with what was read and assumed."""
 
     fabric: Fabric
-    """The fabric."""
     read: tuple[str, ...]
     """Sentences on what the file states."""
     assumed: tuple[str, ...]
     """Sentences on what it does not state, or what could not be used."""
 
 
-def fabric_of(
-    draft: DraftFile, like: Fabric, name: str, where: str, given: Mapping[str, Mapping[str, float]]
-) -> Imported:
+def fabric_of(draft: DraftFile, like: Fabric, name: str, where: str, given: dict[str, dict[str, float]]) -> Imported:
     """Return the fabric of a draft file.
 
     The yarns of the fabric `like` give what the file, which messages call `where`, does not state. The numbers `given`
@@ -62,11 +58,11 @@ def fabric_of(
     yarns = {}
     for axis, threads in (("warp", draft.ends), ("weft", draft.picks)):
         own = _width(axis, threads, like, given[axis], read, assumed)
-        yarns[axis] = getattr(like, axis).model_dump(exclude={"width", "diffuse"}) | own | dict(given[axis])
+        yarns[axis] = getattr(like, axis).model_dump(exclude={"width", "diffuse"}) | own | given[axis]
     colours = _colours(draft, like, yarns, where, read, assumed)
     size = None
     if draft.ends.per_cm and draft.picks.per_cm:
-        size = (_rounded(draft.ends.per_cm), _rounded(draft.picks.per_cm))
+        size = [float(f"{per_cm:.4g}") for per_cm in (draft.ends.per_cm, draft.picks.per_cm)]  # files have 3 decimals
         read.append(f"Size: {size[0]:g} ends and {size[1]:g} picks per cm.")
     else:
         assumed.append("The file does not state the size of the cloth: the fabric has no yarns_per_cm.")
@@ -74,14 +70,14 @@ def fabric_of(
     assumed.append(_optics(like, given))
     about = f"Draft {draft.title!r}" + (f", written by {draft.program}" if draft.program else "")
     source = f"{about}, from {Path(where).name}. " + " ".join((*read, *assumed))
-    table: dict[str, Any] = {
+    table: dict[str, Any] = yarns | {
         "name": name,
         "source": one_line(source, MOST_SOURCE),
         "optical_thickness": like.optical_thickness,
+        "yarns_per_cm": size,
         "draft": {"family": "matrix", "rows": woven.rows()},
+        "colours": colours,
     }
-    table |= {"yarns_per_cm": size} if size else {}
-    table |= yarns | ({"colours": colours} if colours else {})
     return Imported(validated(Fabric, table, where), tuple(read), tuple(assumed))
 
 
@@ -137,8 +133,8 @@ def _width(
 
 def _colours(
     draft: DraftFile, like: Fabric, yarns: dict[str, Any], where: str, read: list[str], assumed: list[str]
-) -> dict[str, Any]:
-    """Give each yarn its most frequent colour, and return the colour order; empty if each axis has one colour."""
+) -> dict[str, Any] | None:
+    """Give each yarn its most frequent colour, and return the colour order; None if each axis has one colour."""
     axes = (("warp", "ends", draft.ends.colours, like.warp), ("weft", "picks", draft.picks.colours, like.weft))
     used = numbered([colour for _, _, colours, _ in axes for colour in colours])[1]
     if len(used) > MOST_COLOURS:
@@ -164,18 +160,12 @@ def _colours(
             read.append(f"Colours: all {threads} are {colours[0]}.")
             continue
         order = colours[: smallest_period(np.array(colours))]
-        runs: list[list[Any]] = []
-        for colour in order:
-            palette[names[colour]] = {"diffuse": _scaled(colour, factor)}
-            if runs and runs[-1][0] == names[colour]:
-                runs[-1][1] += 1
-            else:
-                runs.append([names[colour], 1])
-        orders[threads] = runs
+        palette |= {names[colour]: {"diffuse": _scaled(colour, factor)} for colour in order}
+        orders[threads] = [[names[colour], len(list(run))] for colour, run in groupby(order)]
         read.append(f"Colours: the {threads} have {len(set(order))}, whose order repeats after {len(order)} {threads}.")
     if dimmed:
         assumed.append("Bright colours send back nearly all light: the light through the yarns is reduced.")
-    return {"palette": palette} | orders if orders else {}
+    return {"palette": palette} | orders if orders else None
 
 
 def _scaled(colour: str, factor: float) -> str | list[float]:
@@ -184,7 +174,6 @@ def _scaled(colour: str, factor: float) -> str | list[float]:
 
 
 def _optics(like: Fabric, given: Mapping[str, Mapping[str, float]]) -> str:
-    """Return the sentence on what no draft file states."""
     parts = []
     for key, unit in (("bend", "°"), ("twist", "°"), ("roughness", "")):
         values = [given[axis].get(key, getattr(yarn, key)) for axis, yarn in (("warp", like.warp), ("weft", like.weft))]
@@ -196,8 +185,3 @@ def _optics(like: Fabric, given: Mapping[str, Mapping[str, float]]) -> str:
         f"A draft does not state the optics of yarns. Those of {like.name} are taken, for warp and weft: "
         f"{', '.join(parts)}; also {others}.{own}"
     )
-
-
-def _rounded(value: float) -> float:
-    """Round to four digits: files have three decimals."""
-    return float(f"{value:.4g}")

@@ -55,7 +55,7 @@ def _filled_parts(text: Any) -> Any:
     return [part for part in parts if part]
 
 
-Numbers = Annotated[tuple[Count, ...], BeforeValidator(_filled_parts)]
+Numbers = Annotated[set[Count], BeforeValidator(_filled_parts)]
 Sets = Annotated[dict[Thread, Numbers], BeforeValidator(_filled)]
 Colours = Annotated[dict[Thread, Count], BeforeValidator(_filled)]
 Lengths = Annotated[dict[Thread, Length], BeforeValidator(_filled)]
@@ -118,7 +118,6 @@ class _Wif(BaseModel):
 
 
 def _section_name(field: str) -> str:
-    """Return the name of a section as a WIF text has it."""
     return f"[{field.upper().replace('_', ' ')}]"
 
 
@@ -147,7 +146,20 @@ def wif_pattern(text: str, where: str) -> PatternData:
             numbers = ", ".join(map(str, untied))
             warnings.warn(f"[TIEUP] ties nothing to treadle {numbers} of [TREADLING]: it lifts nothing.", stacklevel=1)
         wif.weaving.treadles = max([wif.weaving.treadles, *used])
-    return _pattern(wif, yarns, where)
+    # What is left of the sections has the names of dtx-to-wif.
+    names = [name for name in _Wif.model_fields if name.startswith(("warp_", "weft_"))]
+    read = yarns | {name: getattr(wif, name) for name in ("threading", "tieup", "treadling", "liftplan", *names)}
+    return PatternData(
+        name=wif.text.title or where,
+        color_table=wif.color_table,
+        color_range=wif.color_palette.range,
+        is_rising_shed=wif.weaving.rising_shed is not False,
+        source_program=wif.wif.source_program or "?",
+        source_version=wif.wif.source_version or "?",
+        num_shafts=wif.weaving.shafts or 0,
+        num_treadles=wif.weaving.treadles,
+        **read,
+    )
 
 
 def _sections(text: str, where: str) -> dict[str, Mapping[str, str | None]]:
@@ -200,13 +212,13 @@ def _count_from_one(wif: _Wif) -> None:
     lifts = "liftplan" if wif.liftplan else "tieup"
     if lifts == "tieup" and 0 in wif.tieup:
         wif.tieup = {treadle + 1: shafts for treadle, shafts in wif.tieup.items()}
-        wif.treadling = {pick: tuple(t + 1 for t in treadles) for pick, treadles in wif.treadling.items()}
+        wif.treadling = {pick: {treadle + 1 for treadle in treadles} for pick, treadles in wif.treadling.items()}
         warnings.warn("[TIEUP] counts treadles from 0; they are counted from 1 here.", stacklevel=1)
     used = [{shaft for shafts in sets.values() for shaft in shafts} for sets in (wif.threading, getattr(wif, lifts))]
     # With 0 for "none", the last of the stated shafts is used as well.
     if 0 in used[0] & used[1] and wif.weaving.shafts == max(used[0] | used[1]) + 1:
         for name in ("threading", lifts):
-            setattr(wif, name, {key: tuple(s + 1 for s in shafts) for key, shafts in getattr(wif, name).items()})
+            setattr(wif, name, {key: {shaft + 1 for shaft in shafts} for key, shafts in getattr(wif, name).items()})
         warnings.warn("[THREADING] counts shafts from 0; they are counted from 1 here.", stacklevel=1)
 
 
@@ -242,9 +254,8 @@ def _yarns_of(wif: _Wif, axis: str, where: str) -> WarpWeftData:
     threads = max([yarns.threads or 0, *sets])
     section, default = _section_name(axis), yarns.color[0] if yarns.color else -1
     if yarns.threads and max(sets) > yarns.threads:
-        warnings.warn(
-            f"{section} states {yarns.threads} threads, the draft has {max(sets)}: all are read.", stacklevel=1
-        )
+        stated = f"{yarns.threads} threads, the draft has {max(sets)}"
+        warnings.warn(f"{section} states {stated}: all are read.", stacklevel=1)
     if default not in wif.color_table:
         # Most programs state no default where each thread has a colour of its own.
         without = sorted(set(range(1, threads + 1)) - set(colours))
@@ -265,26 +276,3 @@ def _yarns_of(wif: _Wif, axis: str, where: str) -> WarpWeftData:
                 warnings.warn(f"{section} states no {key.title()}: {single} is not used.", stacklevel=1)
                 lengths.clear()
     return WarpWeftData(threads, default, None, yarns.spacing, yarns.thickness, yarns.units)
-
-
-def _pattern(wif: _Wif, yarns: dict[str, Any], where: str) -> PatternData:
-    """Return the sections as the data of dtx-to-wif."""
-    sets: dict[str, Any] = {
-        name: {thread: set(numbers) for thread, numbers in getattr(wif, name).items()}
-        for name in ("threading", "tieup", "treadling", "liftplan")
-    }
-    names = [f"{axis}_{kind}" for axis in yarns for kind in ("colors", "spacing", "thickness")]
-    lengths: dict[str, Any] = {name: getattr(wif, name) for name in names}
-    return PatternData(
-        name=wif.text.title or where,
-        color_table=wif.color_table,
-        color_range=wif.color_palette.range,
-        is_rising_shed=wif.weaving.rising_shed is not False,
-        source_program=wif.wif.source_program or "?",
-        source_version=wif.wif.source_version or "?",
-        num_shafts=wif.weaving.shafts or 0,
-        num_treadles=wif.weaving.treadles or 0,
-        **yarns,
-        **sets,
-        **lengths,
-    )

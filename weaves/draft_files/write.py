@@ -5,10 +5,9 @@ from __future__ import annotations
 import io
 from importlib.metadata import version
 from math import lcm
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 from dtx_to_wif import PatternData, WarpWeftData, write_wif
 
 from weaves.colour import encoded
@@ -33,46 +32,35 @@ def wif_text(fabric: Fabric) -> str:
         treadle: {shaft for shaft, lifted in enumerate(shafts, 1) if lifted}
         for treadle, shafts in enumerate(loom.tie_up, 1)
     }
-    orders = [[_eight_bits(colour) for colour in threads.diffuse] for threads in fabric.thread_colours()]
+    levels = (np.rint(255 * encoded(threads.diffuse)).astype(int).tolist() for threads in fabric.thread_colours())
+    orders = [list(map(tuple, colours)) for colours in levels]
     _, table = numbered([colour for order in orders for colour in order])
-    axes = []
-    for key, repeat, order in (("ends", loom.threading, orders[0]), ("picks", loom.treadling, orders[1])):
+    parts: dict[str, Any] = {}
+    names = (("warp", "threading", "ends"), ("weft", "treadling", "picks"))
+    for axis, ((name, section, key), order) in enumerate(zip(names, orders, strict=True)):
+        repeat = getattr(loom, section)
         if (threads := lcm(len(repeat), len(order))) > MOST_THREADS:
             needed = f"structure and colours repeat together after {threads:,} {key}"
             raise BadInput(fabric.name, "", needed, f"at most {MOST_THREADS:,} can be written to a draft file")
-        numbers = {index + 1: {repeat[index % len(repeat)]} for index in range(threads)}
         colours = {index + 1: table.index(order[index % len(order)]) + 1 for index in range(threads)}
-        axes.append((numbers, colours))
+        yarns = WarpWeftData(threads=threads, color=colours[1])
+        if fabric.yarns_per_cm is not None:
+            yarns.units, yarns.spacing = "Decipoints", DECIPOINTS / fabric.yarns_per_cm[axis]
+            yarns.thickness = yarns.spacing * getattr(fabric, name).width
+        numbers = {index + 1: {repeat[index % len(repeat)]} for index in range(threads)}
+        parts |= {name: yarns, section: numbers, f"{name}_colors": colours}
     pattern = PatternData(
         name=fabric.name,
-        threading=axes[0][0],
         tieup=tieup,
-        treadling=axes[1][0],
         liftplan={},
         color_table=dict(enumerate(table, 1)),  # type: ignore[arg-type]
-        warp=_yarns(fabric, 0, len(axes[0][0]), axes[0][1][1]),
-        weft=_yarns(fabric, 1, len(axes[1][0]), axes[1][1][1]),
-        warp_colors=axes[0][1],
-        weft_colors=axes[1][1],
         color_range=(0, 255),
         source_program="twillight",
         source_version=version("twillight"),
         num_shafts=len(loom.tie_up[0]),
         num_treadles=len(tieup),
+        **parts,
     )
     file = io.StringIO()
     write_wif(file, pattern)
     return file.getvalue()
-
-
-def _yarns(fabric: Fabric, axis: int, threads: int, colour: int) -> WarpWeftData:
-    """Return the numbers of the warp (0) or weft (1)."""
-    yarns = WarpWeftData(threads=threads, color=colour)
-    if fabric.yarns_per_cm is not None:
-        yarns.units, yarns.spacing = "Decipoints", DECIPOINTS / fabric.yarns_per_cm[axis]
-        yarns.thickness = yarns.spacing * (fabric.warp, fabric.weft)[axis].width
-    return yarns
-
-
-def _eight_bits(linear: npt.NDArray[np.float64]) -> tuple[int, ...]:
-    return tuple(int(level) for level in np.rint(255 * encoded(linear)))

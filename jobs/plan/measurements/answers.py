@@ -67,7 +67,7 @@ class OfAnswers(Measurement):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure the answers, and copy the entry; BadInput if they are no longer those that were planned."""
-        from pipeline.shards.answer_file import answers_sha256, read_answers, write_answers
+        from pipeline.shards.entry_files import answers_sha256, read_answers, write_answers
         from reports.measure.answers import measure_answers
         from reports.record import Record
 

@@ -24,9 +24,8 @@ from pipeline import versions
 from pipeline.folders import own_files
 from pipeline.models.domain import PHYSICS
 from pipeline.scenes.shade import colours
-from pipeline.shards.answer_file import RGB_COLUMNS
+from pipeline.shards.entry_files import QUESTION_COLUMNS, QUESTION_FILES, RGB_COLUMNS, write_questions
 from pipeline.shards.generate import ShardTask
-from pipeline.shards.question_file import QUESTION_COLUMNS, QUESTION_FILES, write_questions
 from pipeline.truth import conventions
 from reports.images.draft import drawdown
 from reports.tables.table import markdown_table

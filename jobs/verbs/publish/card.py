@@ -17,7 +17,7 @@ import yaml
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 from jobs.verbs.publish.contents import POPULATIONS, About, stem
-from pipeline.shards.joined import columns_joined
+from pipeline.shards.pieces import columns_joined
 from weaves.errors import BadInput, nearest
 
 LOADER: Final = Path(__file__).with_name("load.py.txt")

@@ -22,9 +22,9 @@ from jobs.verbs.publish.recipe import recipe_files
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import file_sha256, fingerprint
 from pipeline.shards.check import check_shard
-from pipeline.shards.joined import join_shards
 from pipeline.shards.manifest import FILE as MANIFEST
 from pipeline.shards.manifest import Manifest, Published, PublishedFile
+from pipeline.shards.pieces import join_shards
 from pipeline.shards.store import read_about
 from weaves.errors import BadInput, WorkFailed
 

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field, model_validator
 
 from pipeline.models.options import TextureOptions
-from pipeline.shards.extra_rows import ExtraRows
+from pipeline.shards.generate import ExtraRows
 from pipeline.shards.silhouettes import SilhouetteRows
 
 

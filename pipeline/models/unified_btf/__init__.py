@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from pipeline.models.options import ComponentLossOptions
 from pipeline.shards.angular_samples import AngularSamples
-from pipeline.shards.extra_rows import ExtraRows
+from pipeline.shards.generate import ExtraRows
 from pipeline.truth.options import TruthOptions
 
 

@@ -186,8 +186,8 @@ def test_no_more_than_a_block_is_held_and_no_more_than_a_chunk_is_asked(case, mo
     answer, check = Mock(wraps=estimate), Mock(wraps=query_file.checked_queries)
     monkeypatch.setattr(query_file, "ROW_GROUP", 64)
     monkeypatch.setattr(evaluate_module, "estimate", answer)
-    monkeypatch.setattr(evaluate_module, "checked_queries", check)
-    case.run(chunk=16)
+    monkeypatch.setattr(query_file, "checked_queries", check)
+    case.run(chunk=16, skip_bad=True)
     blocks, asked = [call.args[0] for call in check.mock_calls], [len(call.args[1].u) for call in answer.mock_calls]
     assert [block.num_rows for block in blocks] == [64, 64, 64, 64, 44]
     assert max(block.nbytes for block in blocks) <= 9 * (64 * 8 + 64 // 8)  # nine columns, and a bit a null

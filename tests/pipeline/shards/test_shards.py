@@ -7,8 +7,7 @@ from pydantic import TypeAdapter
 
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.check import check_shard
-from pipeline.shards.extra_rows import set_name
-from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask, generate_shard
+from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask, generate_shard, set_name
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.store import read_about, read_columns, rows_of, write_columns
 from pipeline.truth.options import TruthOptions

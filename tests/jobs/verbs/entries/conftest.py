@@ -6,7 +6,7 @@ import tomli_w
 
 from jobs.recipe.entry import FORM, blank_form
 from jobs.recipe.load import load_recipe
-from pipeline.shards.answer_file import write_answers
+from pipeline.shards.entry_files import write_answers
 from tests.jobs import made_up
 
 FILLED = {

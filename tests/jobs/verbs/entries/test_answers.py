@@ -10,7 +10,7 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.scenes.shade import coloured, colours_of
-from pipeline.shards.answer_file import write_answers
+from pipeline.shards.entry_files import write_answers
 from reports.measure.by_size import measure_errors_by_size
 from reports.measure.held_out import held_out, measure_errors
 from reports.record import Record, read_records

@@ -7,7 +7,7 @@ import pytest
 from jobs.plan.dataset import Shard
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
-from pipeline.shards.answer_file import read_answers
+from pipeline.shards.entry_files import read_answers
 from pipeline.shards.queries import answered
 from reports.measure.answers import measure_answers
 from reports.measure.held_out import HeldOutFabric

@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pyarrow import csv
 
-from pipeline.shards.answer_file import ID, RGB_COLUMNS, answers_sha256, read_answers, write_answers
+from pipeline.shards.entry_files import ID, RGB_COLUMNS, answers_sha256, read_answers, write_answers
 from pipeline.truth.conventions import COMPONENTS
 from tests.refusals import accepted, refusal
 

@@ -1,14 +1,15 @@
-"""Answers to all questions of a benchmark as a file from anywhere, Parquet or CSV, read as data and checked as a whole.
+"""Files of a benchmark: its questions, which are held-out queries with an id each, and answers to all of them.
 
-A row is the `id` of a question and its answer: the four components, or, if one of these is missing, linear RGB in the
-fabric's own colours. Rows have any order, other columns are ignored.
+Answers come from anywhere, as Parquet or CSV; they are read as data and checked as a whole. A row is the `id` of a
+question and its answer: the four components, or, if one of these is missing, linear RGB in the fabric's own colours.
+Rows have any order, other columns are ignored.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,18 +20,51 @@ from pyarrow import csv
 
 from pipeline.atomic import atomic_path
 from pipeline.compiled.arrays import Float32
+from pipeline.shards.generate import ShardTask
 from pipeline.shards.query_file import blocks, open_queries
-from pipeline.shards.store import ROW_GROUP, parquet_writer
+from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
+from pipeline.shards.store import ROW_GROUP, columns_of, parquet_writer
 from pipeline.truth.conventions import COMPONENTS
-from weaves.errors import BadInput
+from weaves.errors import BadInput, one_line
 from weaves.reading import refuse_irregular
 
 ID: Final = "id"
 RGB_COLUMNS: Final = ("red", "green", "blue")
 """Columns of answers in colour."""
 
+QUESTION_COLUMNS: Final = pa.schema(
+    [
+        pa.field(ID, pa.int64(), nullable=False, metadata={"meaning": "number of the question, from 0"}),
+        pa.field("fabric", SCHEMA.field("fabric").type, nullable=False, metadata={"meaning": "name of the fabric"}),
+        *(SCHEMA.field(name) for name in QUERY_COLUMNS),
+    ]
+)
+"""Arrow schema of the questions, each column with its meaning."""
+
+QUESTION_FILES: Final = ("questions.parquet", "questions.csv")
+
 _MOST_BYTES: Final = 1024  # of a row of CSV
 _MOST_ROWS: Final = 4  # for each question
+
+
+def write_questions(folder: Path, parts: Iterable[ShardTask]) -> int:
+    """Write the queries of held-out shards, in their order, as Parquet and as CSV, and return their number."""
+    start, bare = 0, csv.WriteOptions(include_header=False, quoting_style="none")
+    with (
+        parquet_writer(folder / QUESTION_FILES[0], QUESTION_COLUMNS, ["fabric"]) as parquet,
+        (folder / QUESTION_FILES[1]).open("wb") as file,
+        csv.CSVWriter(file, QUESTION_COLUMNS, write_options=bare) as text,
+    ):
+        file.write(f"{','.join(QUESTION_COLUMNS.names)}\n".encode())  # with quotes it would not suit a plain reader
+        for part in parts:
+            names = pa.DictionaryArray.from_arrays(np.zeros(part.rows, np.int32), pa.array([part.fabric.name]))
+            columns = columns_of(part.drawn())
+            arrays = [pa.array(np.arange(start, start + part.rows)), names, *(columns[name] for name in QUERY_COLUMNS)]
+            table = pa.Table.from_arrays(arrays, schema=QUESTION_COLUMNS)
+            parquet.write_table(table, ROW_GROUP)
+            text.write_table(table)
+            start += part.rows
+    return start
 
 
 def read_answers(path: Path, count: int) -> Float32:
@@ -63,7 +97,6 @@ def answers_sha256(answers: Float32) -> str:
 
 
 def _parquet(path: Path, count: int) -> pa.Table:
-    """Read the columns of an answer from a Parquet file."""
     with open_queries(path) as file:
         names, rows = _columns(path, file.schema_arrow.names), file.metadata.num_rows
         for name in names:
@@ -78,7 +111,6 @@ def _parquet(path: Path, count: int) -> pa.Table:
 
 
 def _csv(path: Path, count: int) -> pa.Table:
-    """Read the columns of an answer from a file of CSV with a heading."""
     refuse_irregular(path, "a file of CSV")
     most = _MOST_BYTES * (_MOST_ROWS * count + 1)
     try:
@@ -89,10 +121,8 @@ def _csv(path: Path, count: int) -> pa.Table:
         types = dict.fromkeys(names, pa.float64()) | {ID: pa.int64()}
         return csv.read_csv(path, convert_options=csv.ConvertOptions(column_types=types, include_columns=names))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise BadInput(
-            str(path), "", f"cannot be read ({reason[:120]})", "a heading, then numbers, are needed"
-        ) from error
+        reason = f"cannot be read ({one_line(error, 120)})"
+        raise BadInput(str(path), "", reason, "a heading, then numbers, are needed") from error
 
 
 def _columns(path: Path, names: Sequence[str]) -> list[str]:

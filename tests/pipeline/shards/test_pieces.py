@@ -3,7 +3,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipeline.shards.joined import columns_joined, join_shards
+from pipeline.shards.pieces import columns_joined, join_shards
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.query_file import ROW_GROUP
 from pipeline.shards.schema import SCHEMA
