@@ -27,7 +27,8 @@ from pipeline.truth.geometry.horizon import horizon, horizons
 HEIGHTS: Final = 6
 """Points of a wall from the rim to the foot."""
 
-Grid = tuple[int, int, int, tuple[float, ...], tuple[float, ...]]
+Edges = tuple[float, ...]
+Grid = tuple[int, int, int, Edges, Edges]
 """End, pick, family, and the edges of a piece's nodes along x and y."""
 
 _INSET, _OUTSET = 1e-9, 1e-7  # distances from the border
