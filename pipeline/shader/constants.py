@@ -14,7 +14,6 @@ from pipeline.analytic.importance import lobes
 from pipeline.analytic.importance import mixture as importance_mixture
 from pipeline.analytic.soft_nodes import (
     answer,
-    cuts,
     groups,
     line_nodes,
     nodes,
@@ -75,8 +74,7 @@ _SAME: Final[tuple[tuple[ModuleType, tuple[str, ...]], ...]] = (
     (shade, ("LEAST_SEEN", "FADED", "TINY")),
     (answer, ("LONGEST", "SMALLEST")),
     (view_lines, ("MOST_GAUSS",)),
-    (view_rays, ("FOOTPRINT_ENDS", "NEVER")),
-    (cuts, ("NEAREST",)),
+    (view_rays, ("FOOTPRINT_ENDS", "NEVER", "NEAREST")),
     (wide, ("RESOLVED",)),
     (scratch, ("MOST_ON_LINES",)),
     (query, ("LOWEST_VIEWER",)),
