@@ -116,9 +116,8 @@ def _texels(field: HeightField, table: _HorizonMap, azimuths: Float64, shown: La
             total = 0.0
             for j in range(points):
                 for k in range(points):
-                    total += _at(
-                        field, table, azimuths, (column * points + k + 0.5) * dx, (row * points + j + 0.5) * dy
-                    )
+                    x, y = (column * points + k + 0.5) * dx, (row * points + j + 0.5) * dy
+                    total += _at(field, table, azimuths, x, y)
             lit[row, column] = total / (points * points)
     return lit
 

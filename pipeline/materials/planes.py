@@ -29,7 +29,7 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.materials.lobes import Reflectance, white_f0
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-from weaves.surface import GAP, WARP, ClothSurface, surface_at
+from weaves.surface import GAP, WARP, ClothSurface, surface_at, surface_maps
 
 SMALLEST_MAP: Final = 64
 """Shortest longer side, in texels."""
@@ -141,8 +141,7 @@ def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
     """Sum a fabric's surface over the texels of the finest level."""
     per_texel = samples(shown)
     width, height = shown.width * per_texel, shown.height * per_texel
-    lowest = lowest_height(fabric)
-    colours = material_colours(fabric, share)
+    lowest, colours = lowest_height(fabric), material_colours(fabric, share)
     x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (shown.ends / width)
     y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (shown.picks / height)
     rows = max(1, _BAND // width // per_texel) * per_texel
@@ -186,10 +185,7 @@ def samples(shown: Layout) -> int:
 
 def lowest_height(fabric: Fabric) -> float:
     """Return the lowest height of the yarns."""
-    ends, picks = fabric.weave.repeat
-    count = max(8, min(64, 1024 // max(ends, picks)))
-    x, y = ((np.arange(extent * count) + 0.5) / count for extent in (ends, picks))
-    height = surface_at(fabric, x[None, :], y[:, None]).height
+    height = surface_maps(fabric, max(8, min(64, 1024 // max(fabric.weave.repeat)))).height
     return float(height[np.isfinite(height)].min())
 
 
@@ -199,24 +195,11 @@ def _sums(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, dyed: Y
     tangent = surface.tangent
     smooth = np.array([1.0 - f.roughness**2 for f in (fabric.warp, fabric.weft)] + [0.0])[yarn]
     fibres = np.stack([smooth * tangent[..., a] * tangent[..., b] for a, b in PAIRS], axis=-1)
-    colours = (_colours(surface, x, y, ends, picks) for ends, picks in zip(*dyed, strict=True))
-    return Planes(
-        *(
-            np.asarray(plane, np.float32)
-            for plane in (
-                covered[..., 0],
-                np.where(np.isfinite(surface.height), surface.height, lowest),
-                covered * surface.normal,
-                fibres,
-                *colours,
-            )
-        )
-    )
-
-
-def _colours(surface: ClothSurface, x: Float64, y: Float64, ends: Float64, picks: Float64) -> Float64:
-    """Return the colour of points whose ends and picks have these colours, 0 in gaps."""
-    of_end, of_pick = ends[x.astype(np.intp) % len(ends)], picks[y.astype(np.intp) % len(picks)]
-    yarn = surface.yarn[..., None]
-    on_yarn = np.where(yarn == WARP, of_end[None, :, :], of_pick[:, None, :])
-    return np.asarray(np.where(yarn == GAP, 0.0, on_yarn))
+    height = np.where(np.isfinite(surface.height), surface.height, lowest)
+    colours = []
+    for ends, picks in zip(*dyed, strict=True):
+        of_end, of_pick = ends[x.astype(np.intp) % len(ends)], picks[y.astype(np.intp) % len(picks)]
+        on_yarn = np.where(yarn[..., None] == WARP, of_end[None, :, :], of_pick[:, None, :])
+        colours.append(np.where(covered, on_yarn, 0.0))
+    sums = (covered[..., 0], height, covered * surface.normal, fibres, *colours)
+    return Planes(*(np.asarray(plane, np.float32) for plane in sums))
