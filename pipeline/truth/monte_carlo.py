@@ -142,10 +142,7 @@ def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
 
 @kernel
 def _visible_share(sums: Float64, whole: float) -> tuple[float, float]:
-    """Return the visible share of a patch, and its standard error.
-
-    `sums` is (RANDOMISATIONS, POINT_SUMS), `whole` the sum of areas of one randomisation of a patch wholly visible.
-    """
+    """Return the visible share of a patch and its error; `whole` is a randomisation's area if all is visible."""
     mean = sums[:, AREA_SUM].sum() / RANDOMISATIONS
     square = 0.0
     for r in range(RANDOMISATIONS):

@@ -69,8 +69,8 @@ class Start(NamedTuple):
 class Transport(NamedTuple):
     """Sums of walks of W ways: 1 if yarns reflect light alone, 2 if they transmit it as well.
 
-    Families f are 0 for the warp, 1 for the weft. Places are 2 face + f, P = 2 W of them; colours, a and b, are
-    2 way + f; c and d are P way + place, Q = W P of them. With two ways, lights behind follow those in front.
+    Families f are 0 for the warp, 1 for the weft; way 0 reflects, 1 transmits. Places are 2 face + f, P = 2 W of them;
+    colours, a and b, are 2 way + f; c and d are P way + place, Q = W P of them. Lights behind follow those in front.
     """
 
     seen: Float64
@@ -166,10 +166,7 @@ def transport(
 
 
 def _gap_points(field: HeightField, count: int) -> tuple[Float64, Float64, Float64]:
-    """Return places spread evenly over the gaps of the first cell of each kind, and the area that each stands for.
-
-    They are `_IN_GAP` a gap, or about `count` in all if that is less.
-    """
+    """Return places spread evenly over the gaps of the first cell of each kind, and the area that each stands for."""
     pieces, factor = _pieces(field, count)
     gaps = np.array([(*cell, *piece.box[0], *piece.box[1]) for cell, piece in pieces if piece.family == GAP])
     if not len(gaps):
@@ -182,10 +179,7 @@ def _gap_points(field: HeightField, count: int) -> tuple[Float64, Float64, Float
 
 
 def _pieces(field: HeightField, count: int) -> tuple[list[tuple[Cell, CellPiece]], float]:
-    """Return the pieces of the first cell of each kind, or of one for every `_OF_CELL` points, chosen at random.
-
-    Also the number of all kinds of cells over that of the chosen ones.
-    """
+    """Return pieces of the first cell of each kind, or of random ones, and the number of kinds over that of these."""
     cells, most = leaders(field), max(count // _OF_CELL, 1)
     factor = max(len(cells) / most, 1.0)
     if factor > 1.0:
@@ -291,10 +285,7 @@ def _facing(field: HeightField, place: _Place, x: float, y: float, z: float) -> 
 
 @kernel
 def _count(job: _Job, place: _Place, way: int) -> None:
-    """Write the share of the sun's light that a point sends on, 1/sr, for each direction of the sun.
-
-    They are on the point's own side of the cloth or, for what it transmits, on the other one.
-    """
+    """Write the share of the light of each direction that a point sends on, 1/sr; what it transmits is from behind."""
     field, other = (job.front, job.back) if place.face == 0 else (job.back, job.front)
     blend = field.yarn[place.family, BLEND]
     there = _across(other, place)
@@ -319,10 +310,7 @@ def _across(other: HeightField, place: _Place) -> _Place:
 
 @kernel
 def _next(job: _Job, place: _Place, way: int, choice: float, a: float, b: float) -> tuple[bool, _Place]:
-    """Return whether a walk goes on to another yarn, and where it meets it; three numbers in [0, 1) choose where to.
-
-    Of the ways in which a point sends on light, 0 reflects and 1 transmits.
-    """
+    """Return whether a walk goes on to another yarn, and where it meets it; three numbers in [0, 1) choose where to."""
     field, other = (job.front, job.back) if place.face == 0 else (job.back, job.front)
     if choice < field.yarn[place.family, BLEND]:
         dx, dy, dz = _cosine_about(place.nx, place.ny, place.nz, a, b)

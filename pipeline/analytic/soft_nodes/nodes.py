@@ -321,10 +321,11 @@ def _locate(front: HeightField) -> _Located:
 
 def _piece_columns(located: _Located) -> dict[str, Any]:
     """Return the columns of `SoftNodeTable` about pieces."""
+    bounds = [(*p.box[0], *p.box[1], p.offset, p.sign * p.curve, p.steepest) for _, p, _ in located.pieces]
     return {
         "piece_starts": np.array(located.starts, np.int64),
         "pieces": np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
-        "bounds": np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
+        "bounds": np.array(bounds, np.float32),
     }
 
 
@@ -350,11 +351,6 @@ def _ramps(mean: Float64, variance: Float64) -> tuple[Float64, Float64]:
     start = 2.0 * np.cos((np.arccos(np.clip(1.5 * lit / slope - 1.0, -1.0, 0.0)) - 2.0 * np.pi) / 3.0)
     of_line = np.where(1.5 * lit < slope, start, 2.0 / 3.0 - lit / slope) + 0.5 / slope
     return np.where(line & ~inside, of_line, np.where(mean > 0.5, 1.0 - middle, middle)), sharpness
-
-
-def _bounds(piece: CellPiece) -> tuple[float, ...]:
-    x, y = piece.box
-    return (*x, *y, piece.offset, piece.sign * piece.curve, piece.steepest)
 
 
 def _grid_places(samples: list[Sample], size: int) -> tuple[Float64, Float64, Mask]:

@@ -154,10 +154,7 @@ def _add_walls(
 def _wall_horizons(
     front: HeightField, x: Float64, y: Float64, dx: float, dy: float, rim: Float64, azimuths: Float64
 ) -> tuple[Float64, Float64]:
-    """Return the height of the wall at each place of a border, and horizons at its points, as sines.
-
-    Shapes (places,) and (azimuths, places, heights).
-    """
+    """Return heights of the wall at places of a border, (P,), and sines of horizons, (azimuths, P, heights)."""
     picks, ends = front.top.shape
     height, sines = np.zeros(len(x)), np.ones((len(azimuths), len(x), _WALL_HEIGHTS))
     for k in range(len(x)):

@@ -132,10 +132,7 @@ def directions(
 def _flakes(
     d: YarnDirections, h: np.float32, along: np.float32, across: np.float32, square: np.float32, scale: np.float32
 ) -> np.float32:
-    """Return a quarter of the flakes' density, mean of four places; `h` is the half vector's cosine with the tangent.
-
-    `along`, `across`: by how much that cosine changes to the four places.
-    """
+    """Return a quarter of the flakes' density, mean of four places, `along` and `across` from h.t in this cosine."""
     e, f = along + across, along - across
     q0, q1 = spread(h - e, d.size, square), spread(h - f, d.size, square)
     q2, q3 = spread(h + f, d.size, square), spread(h + e, d.size, square)

@@ -62,10 +62,7 @@ def _lines_across(
     ray: ViewRay, x: float, y: float, sigma: float, radii: tuple[float, float], reach: float, spacing: float,
     lines: Float64,
 ) -> int:  # fmt: skip
-    """Write places of lines across the azimuth and the widths that they stand for, (2, most); return their number.
-
-    Lines that run along yarns have places by Gauss's rule between the borders of yarns.
-    """
+    """Write places of lines across the azimuth and the widths that they stand for, (2, most); return their number."""
     along_x = abs(ray.dy) < abs(ray.dx)
     distance = spacing * min(_BETWEEN, _COARSEST * sigma)
     if reach * min(abs(ray.dx), abs(ray.dy)) >= _SMEARED:
@@ -74,7 +71,7 @@ def _lines_across(
         for j in range(2 * count + 1):
             lines[0, j], lines[1, j] = (j - count) * apart, apart
         return 2 * count + 1
-    # At w across the azimuth the line has x = x - w dy, or y = y + w dx.
+    # Along yarns, by Gauss's rule between borders. At w across the azimuth the line has x - w dy, or y + w dx.
     centre, factor, radius = (y, ray.dx, radii[WEFT]) if along_x else (x, -ray.dy, radii[WARP])
     place, stop, n = centre - FOOTPRINT_ENDS * sigma, centre + FOOTPRINT_ENDS * sigma, 0
     while place < stop - NEAREST and n < lines.shape[1] - MOST_GAUSS:
@@ -136,10 +133,7 @@ def _fill_eight(row: Float32, k: int, value: np.float32) -> None:
 def _write_draft(
     scratch: Scratch, kind: int, k: int, start: float, stop: float, count: int, piece: Piece, of_line: ViewLine
 ) -> None:
-    """Write the nodes of an interval from `k` on: even along the line, or in the angle across the yarn.
-
-    An interval of no length is a rim, whose density is its whole weight.
-    """
+    """Write the nodes of an interval from `k` on; one of no length is a rim, whose density is its whole weight."""
     draft, line, curve, bounds = scratch.drafts[kind], scratch.line, piece.curve, piece.bounds
     turned = abs(curve.by_across) * (stop - start) > _STEEP * curve.radius
     first, last = np.float32(start), np.float32(stop)
@@ -176,10 +170,8 @@ def _write_meetings(
     scratch: Scratch, kind: int, k: int, ray: ViewRay, of_line: ViewLine, piece: Piece, start: float, stop: float,
     rising: bool,
 ) -> int:  # fmt: skip
-    """Write the nodes of an interval from `k` on, even in the place where they are seen; return where they end.
-
-    Where rays turn they see an endless length of a small piece: places along the line would be far apart there.
-    """
+    """Write the nodes of an interval from `k` on, even in the place where they are seen; return where they end."""
+    # Where rays turn they see an endless length of a small piece: places along the line would be far apart there.
     ends = view_rays.seen_rising(piece.curve, ray, start)[0], view_rays.seen_rising(piece.curve, ray, stop)[0]
     if not rising:
         ends = view_rays.seen_at(piece.curve, ray, start)[0], view_rays.seen_at(piece.curve, ray, stop)[0]
@@ -317,11 +309,8 @@ def _place_line(
 
 @inlined_fast_kernel
 def _place(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay) -> tuple[np.float32, np.float32]:
-    """Place the nodes of a footprint of rays; return the area seen through gaps, and 1 / deviation along lines.
-
-    Writes `Scratch.drafts` and `Scratch.firsts`, whole blocks of each kind of yarn, and in `Scratch.stops` how many.
-    Weights are shares of the footprint in the fabric plane, which A(wo) turns into shares of its rays.
-    """
+    """Place the nodes of a footprint of rays; return the area seen through gaps, and 1 / deviation along lines."""
+    # Weights are shares of the footprint in the fabric plane, which A(wo) turns into shares of its rays.
     scratch.stops[:] = 0
     xx, yy, xy = look.dx * look.dx, look.dy * look.dy, look.rho * look.dx * look.dy
     ex, ey, lines, gaps = ray.dx, ray.dy, scratch.view_lines, 0.0

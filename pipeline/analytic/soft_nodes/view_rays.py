@@ -135,10 +135,8 @@ def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
 
 @inlined_fast_kernel
 def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
-    """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the yarn's border.
-
-    The height is that of `torus_height` and `height_beneath`, sqrt((R +- rho)^2 - b^2) - R cos u_max times the relief.
-    """
+    """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the border."""
+    # As `torus_height` and `height_beneath`: sqrt((R +- rho)^2 - b^2) - R cos u_max, times the relief.
     sine = min(1.0, max(-1.0, (curve.across + s * curve.by_across) * curve.per_radius))
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     rho, b = curve.radius * cosine, curve.along + s * curve.by_along
@@ -249,10 +247,7 @@ def place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: fl
 def _crest(
     curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, q_high: float
 ) -> tuple[float, float]:  # fmt: skip
-    """Return where between a place that faces away and one that faces the viewer the displaced place is least, and it.
-
-    Illinois' method; the error of the least place is of second order.
-    """
+    """Return where the displaced place is least (Illinois' method, an error of second order), and this place."""
     kept, q = 0, q_high
     for _ in range(_CREST_STEPS):
         s = low + (high - low) * at_low / (at_low - at_high)
@@ -274,10 +269,8 @@ def _crest(
 def _at_place(
     curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_crest: float, q_high: float, target: float, near: float
 ) -> float:  # fmt: skip
-    """Return an s between the crest and `high` that is displaced to `target`, or to a place as `near` as that.
-
-    Displaced places rise between them. Steps are those of parabolas through both ends, level at the first one.
-    """
+    """Return an s between the crest and `high` that is displaced to `target`, or to a place as `near` as that."""
+    # Displaced places rise between them. Steps are those of parabolas through both ends, level at the first one.
     s = high
     for _ in range(_ROOT_STEPS):
         s = crest + (high - crest) * math.sqrt((target - q_crest) / (q_high - q_crest))

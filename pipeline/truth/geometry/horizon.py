@@ -92,10 +92,7 @@ def _slope_of_top(
 def _slope_of_strip(
     field: HeightField, x: float, y: float, z: float, towards: Ray, a: float, b: float, cell: Cell, best: float
 ) -> float:
-    """Return the greatest slope to the yarn beneath between distances a and b, or `best` if that is greater.
-
-    It is tested at `_STRIP_POINTS` points.
-    """
+    """Return the greatest slope to points of the yarn beneath between distances a and b, or `best` if it is greater."""
     family = 1 - int(field.top[cell.pick, cell.end])
     a, b = march.span_over(field, family, x, y, towards, a, b, cell)
     if b < a:

@@ -108,10 +108,7 @@ def sum_walls(
 def _write_seen(
     first: Float32, second: Float32, viewer: Direction, rim: Float32, height: Float32, seen: Float32, middle: Float32
 ) -> None:
-    """Write how much of the height of each wall a viewer sees, and the height of the middle of that.
-
-    `first` and `second` are horizons (HEIGHTS, W) at the azimuths around the viewer.
-    """
+    """Write how much of each wall's height a viewer sees, and the height of its middle, from horizons (HEIGHTS, W)."""
     for k in range(len(seen)):
         of_first, of_second = _0, _0
         for h in range(HEIGHTS - 1):
@@ -162,10 +159,7 @@ def _weigh_walls(
     areas: Float32,
     lit: Float32,
 ) -> tuple[np.float32, np.float32]:
-    """Write the walls' shares of the area, and those of lit ones over the rim's cosine; return area and diffuse sums.
-
-    A rim that turns away from the viewer shows nothing.
-    """
+    """Write the walls' shares of the area, those of lit ones over the rim's cosine; return area and diffuse sums."""
     area, diffuse = _0, _0
     for k in range(len(seen)):
         cos_o = viewer.x * normal.x[k] + viewer.y * normal.y[k] + viewer.z * normal.z[k]

@@ -153,10 +153,7 @@ def _rims(front: HeightField, back: HeightField, at: Float64, beside: Float64) -
 def _wall_horizons(
     field: HeightField, at: Float64, out: Float64, points: Float64, wanted: Index, azimuths: int
 ) -> Float32:
-    """Return the slope of the horizon at points (HEIGHTS, N) over places (2, N), (azimuths, HEIGHTS, N).
-
-    It is 1e4 where a wall faces away, or is not `wanted`.
-    """
+    """Return horizons at points (HEIGHTS, N) over places (2, N); 1e4 if a wall faces away, or is not `wanted`."""
     count = len(wanted)
     slopes = np.full((azimuths, HEIGHTS, count), _UNSEEN, np.float32)
     for k in range(count):

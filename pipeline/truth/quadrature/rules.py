@@ -170,10 +170,7 @@ def _cut(axis: Axis, lean: Lean, low: float, high: float, pieces: Float64) -> in
 
 @kernel
 def _mass(axis: Axis, lean: Lean, low: float, high: float) -> float:
-    """Return the integral of `density` over a resolved interval, by Simpson's rule: 4 % at worst, heights apart.
-
-    Over heights the density is taken to be that of a wider kernel.
-    """
+    """Return the integral of `density`, over heights that of a wider kernel, by Simpson's rule: 4 % off at worst."""
     wider = Axis(axis.shape, axis.centre + 0.5 * (lean.least + lean.most), axis.sigma, axis.repeat)
     if lean.most > lean.least:
         wider = Axis(axis.shape, wider.centre, axis.sigma + 0.25 * (lean.most - lean.least), axis.repeat)
@@ -235,10 +232,7 @@ _WEIGHTS: Final = np.concatenate([weights for _, weights in _RULES])
 
 @kernel
 def _shares(patch: QueryPatch, part: Float64, a: float, b: float, shares: Float64) -> int:
-    """Write the shares of a point of a part in the sums; return which of viewer, light and back it sees, as bits.
-
-    Shares are those of a unit of the coordinates across and along.
-    """
+    """Write the shares of a point of a part in the sums; return which of viewer, light and back it sees, as bits."""
     cloth, directions = patch.cloth, patch.directions
     picks, ends = cloth.front.top.shape
     across = a if part[KIND] == GAP else part[MIDDLE] + part[HALF] * math.sin(a)
