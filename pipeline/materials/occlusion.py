@@ -32,8 +32,7 @@ from weaves.fabric import Fabric
 _AZIMUTHS: Final = 16
 _GRIDS: Final = {64: 16, 1024: 8}  # nodes along a piece, by the most different cells
 _COARSEST: Final = 4
-_SLOTS: Final = 4
-"""Pieces of a cell: the yarn on top, the one beneath on its low and on its high side, the gap."""
+_SLOTS: Final = 4  # pieces of a cell: the yarn on top, the one beneath on its low and on its high side, the gap
 
 
 class _HorizonMap(NamedTuple):

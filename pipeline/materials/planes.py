@@ -40,20 +40,15 @@ LARGEST_MAP: Final = 4096
 LEAST_TEXELS_PER_YARN: Final = 4
 """Fewest texels along a yarn spacing."""
 
-_SQUARE: Final = 0.01
-"""Difference of the sides of a texel that counts as none."""
-
-_COPIES: Final = 16
-"""Most repeats along the shorter side."""
-
 SAMPLES_PER_YARN: Final = 16
 """Fewest points along a yarn spacing: maps with fewer texels take several points a texel."""
 
 PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Axes of the six stored entries of a symmetric matrix."""
 
-_BAND: Final = 1 << 18
-"""Points evaluated at once."""
+_SQUARE: Final = 0.01  # difference of the sides of a texel that counts as none
+_COPIES: Final = 16  # most repeats along the shorter side
+_BAND: Final = 1 << 18  # points evaluated at once
 
 YarnColours = list[tuple[Float64, Float64, Float64]]
 """Base colours, F0 and transmitted colours of the ends and of the picks, linear RGB, each (threads, 3)."""
@@ -114,12 +109,7 @@ def layout(fabric: Fabric, size: int) -> Layout:
 
 def best_layout(fabric: Fabric, size: int) -> Layout:
     """Return the same, whether or not its texels are too large for the yarns."""
-    return min(_candidates(fabric.repeat, size), key=_order)
-
-
-def _candidates(repeat: tuple[int, int], size: int) -> list[Layout]:
-    """Return layouts whose longer side has `size` texels."""
-    layouts = []
+    repeat, layouts = fabric.repeat, []
     for halvings in range(4):
         for width, height in ((size, size >> halvings), (size >> halvings, size)):
             for copies in range(1, _COPIES + 1):
@@ -128,7 +118,7 @@ def _candidates(repeat: tuple[int, int], size: int) -> list[Layout]:
                 columns = max(1, round(copies * repeat[1] * width / (height * repeat[0])))
                 layouts.append(Layout(copies * repeat[0], rows * repeat[1], width, height))
                 layouts.append(Layout(columns * repeat[0], copies * repeat[1], width, height))
-    return layouts
+    return min(layouts, key=_order)
 
 
 def _order(candidate: Layout) -> tuple[float, float, int]:

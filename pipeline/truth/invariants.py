@@ -196,10 +196,9 @@ def range_of_values(fabric: Fabric) -> list[CheckResult]:
 def energy(fabric: Fabric) -> list[CheckResult]:
     """Test that the cloth gains no light: under unit radiance from everywhere it returns at most 1.
 
-    Each of k_d, k_dt and k_s is 1 in turn.
-
-    int f_P(wi, wo) d(wi) over the side of the viewer or the other one, at several angles of wo; k_s with all that goes
-    straight through. Directions are low-discrepancy points of the hemisphere, randomly shifted in each randomisation.
+    Each of k_d, k_dt and k_s is 1 in turn: int f_P(wi, wo) d(wi) over the side of the viewer or the other one, at
+    several angles of wo; k_s with all that goes straight through. Directions are low-discrepancy points of the
+    hemisphere, randomly shifted in each randomisation.
     """
     rng = np.random.default_rng(_SEED + 3)
     found = []

@@ -39,18 +39,13 @@ from pipeline.truth.geometry.march import ray, wrap
 from pipeline.truth.geometry.pieces import Cell, CellPiece, cell_pieces, leaders
 from pipeline.truth.geometry.visibility import visible
 
-_FEWEST: Final = 16
-"""Points of the smallest piece; fewer where a cloth has so many pieces that all walks are shared out."""
-_OFF: Final = 1e-9
-"""Distance from a wall at which walks go on, in yarn spacings: beyond its rounding, on the open side."""
-_IN_GAP: Final = 64
-"""Points of a gap."""
-_OF_CELL: Final = 4
-"""Walks from a cell, at least."""
-_LONGEST: Final = 4
-"""Yarns at which a walk counts the sun's light, from its third on."""
+_FEWEST: Final = 16  # points of the smallest piece; fewer of a cloth with so many that all walks are shared out
+_OFF: Final = 1e-9  # distance from a wall at which walks go on: beyond its rounding, on the open side
+_IN_GAP: Final = 64  # points of a gap
+_OF_CELL: Final = 4  # walks from a cell, at least
+_LONGEST: Final = 4  # yarns at which a walk counts the sun's light, from its third on
+# Root of x^5 = x + 1: its inverse powers are the steps of the additive sequence in four dimensions [Roberts2018R2].
 _FOUR: Final = 1.16730397826141868
-"""Root of x^5 = x + 1: its inverse powers are the steps of the additive sequence in four dimensions [Roberts2018R2]."""
 
 
 class Start(NamedTuple):
@@ -344,7 +339,10 @@ def _next(job: _Job, place: _Place, way: int, choice: float, a: float, b: float)
         return family != GAP, _Place(face, hit.x, hit.y, z, side, family, nx, ny, nz)
     picks, ends = field.top.shape
     z = z + hit.distance / math.sqrt(dx * dx + dy * dy) * dz
-    nx, ny = _wall_normal(field, hit.x - hit.end, hit.y - hit.pick, dx, dy)
+    # Walls stand on borders of the cell and on sides of yarns.
+    along_x = _off_border(hit.x - hit.end, field.yarn[WARP, RADIUS])
+    along_y = _off_border(hit.y - hit.pick, field.yarn[WEFT, RADIUS])
+    nx, ny = (-math.copysign(1.0, dx), 0.0) if along_x < along_y else (0.0, -math.copysign(1.0, dy))
     # The wall is the end of the yarn behind it; walks go on before it.
     family, _, _, _, _, _, _, _, _ = surface_at(field, hit.x - _OFF * nx, hit.y - _OFF * ny, hit.end, hit.pick)
     x, y = wrap(hit.x + _OFF * nx, ends), wrap(hit.y + _OFF * ny, picks)
@@ -359,15 +357,6 @@ def _cosine_about(nx: float, ny: float, nz: float, a: float, b: float) -> tuple[
     # The rotation that turns z into the normal by the shortest way.
     share = (u * nx + v * ny) / (1.0 + nz)
     return u + w * nx - share * nx, v + w * ny - share * ny, w * nz - (u * nx + v * ny)
-
-
-@kernel
-def _wall_normal(field: HeightField, x: float, y: float, dx: float, dy: float) -> tuple[float, float]:
-    """Return the normal of the wall at a point of a cell: walls stand on borders of the cell and on sides of yarns."""
-    along_x, along_y = _off_border(x, field.yarn[WARP, RADIUS]), _off_border(y, field.yarn[WEFT, RADIUS])
-    if along_x < along_y:
-        return -math.copysign(1.0, dx), 0.0
-    return 0.0, -math.copysign(1.0, dy)
 
 
 @inlined_kernel

@@ -32,12 +32,10 @@ from pipeline.truth.node_table.refine import UNSEEN, Refinement, RefineRoom, ref
 from pipeline.truth.node_table.seen_walls import WallRoom, sum_walls, wall_room
 from pipeline.truth.node_table.weights import WeightRoom, any_weight, fill_weights, weight_room
 
-_ROWS: Final = (2, 4, 8)
-"""Rows of a refined node, tried in this order."""
-
 UNDECIDED: Final = 0.3
 """Error by nodes whose horizons disagree, relative to the components of the patch and to the share of the nodes."""
 
+_ROWS: Final = (2, 4, 8)  # rows of a refined node, tried in this order
 _0 = np.float32(0.0)
 
 

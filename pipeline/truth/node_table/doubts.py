@@ -21,9 +21,7 @@ from pipeline.truth.node_table.build import FIRST_NODE, NODES_X, NODES_Y, PIECE_
 from pipeline.truth.node_table.kernels import SMOOTH, NodeShares
 from pipeline.truth.node_table.weights import any_weight
 
-_LEFT: Final = 0.35
-"""Share of the requested squared error that nodes which are not refined may keep."""
-
+_LEFT: Final = 0.35  # share of the requested squared error that nodes which are not refined may keep
 _KNOWN, _JUMPED = np.float32(0.05), np.float32(0.1)  # squared error of a border's place, in nodes: by margins; unknown
 _JUMP = np.float32(3.0)  # times the change of the margin beside it
 _SURE = np.float32(1e30)  # doubt of a node whose horizons disagree: always refined

@@ -17,9 +17,7 @@ from pipeline.truth.node_table.displaced import DensityRoom, read_density
 from pipeline.truth.node_table.kernels import Direction, HorizonSlopes, NodeDirections, Normals, Tangents
 from pipeline.truth.node_table.walls import HEIGHTS, WallNodes
 
-_DOUBT: Final = 0.04
-"""Error of what walls show, relative to it."""
-
+_DOUBT: Final = 0.04  # error of what walls show, relative to it
 _GRAZING = np.float32(1e-5)
 _STEP = np.float32(1e-4)
 _0, _HALF, _1 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
