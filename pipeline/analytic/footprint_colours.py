@@ -190,15 +190,9 @@ def _weighed_colours(
 
 @kernel
 def _add_cells(
-    table: SoftNodeTable,
-    threads: tuple[Threads, Threads],
-    patch: Patch,
-    towards: Sight,
-    areas: Float32,
-    seen: Float32,
-    masses: tuple[Float64, Float64],
-    sums: tuple[Float64, Float64],
-) -> None:
+    table: SoftNodeTable, threads: tuple[Threads, Threads], patch: Patch, towards: Sight, areas: Float32, seen: Float32,
+    masses: tuple[Float64, Float64], sums: tuple[Float64, Float64],
+) -> None:  # fmt: skip
     """Write what a footprint sees of each thread, and the same times its colour, cell by cell."""
     for family in range(2):
         masses[family][:], sums[family][:] = 0.0, 0.0

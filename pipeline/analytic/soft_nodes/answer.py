@@ -76,15 +76,9 @@ def shortened(
 # Not in `sum_queries`: what allocates counts references to every slice, a third of the time of a query.
 @kernel
 def _sum_rows(
-    table: SoftNodeTable,
-    scratch: Scratch,
-    patches: Footprints,
-    wi: Float32,
-    wo: Float32,
-    curvature: Float32,
-    result: Float32,
-    gaps: Float32,
-) -> None:
+    table: SoftNodeTable, scratch: Scratch, patches: Footprints, wi: Float32, wo: Float32, curvature: Float32,
+    result: Float32, gaps: Float32,
+) -> None:  # fmt: skip
     """Write sums and areas of all queries."""
     u, v, deviation_x, deviation_y, correlation = patches
     ends, picks = table.repeat[0], table.repeat[1]

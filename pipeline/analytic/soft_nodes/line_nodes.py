@@ -145,19 +145,10 @@ def _lit(
 
 @fast_kernel
 def shade_lines(
-    draft: Float32,
-    firsts: npt.NDArray[np.uint32],
-    rays: LineRays,
-    light: GridHorizons,
-    bent: Falls,
-    sharpness: np.float32,
-    d: YarnDirections,
-    yarn: Float32,
-    family: int,
-    thickness: np.float32,
-    behind: Behind,
+    draft: Float32, firsts: npt.NDArray[np.uint32], rays: LineRays, light: GridHorizons, bent: Falls,
+    sharpness: np.float32, d: YarnDirections, yarn: Float32, family: int, thickness: np.float32, behind: Behind,
     hidden_ends: bool = False,
-) -> Six:
+) -> Six:  # fmt: skip
     """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids.
 
     With the light behind, `light` has the horizons of the back. With `hidden_ends` the back then shows, at the rim

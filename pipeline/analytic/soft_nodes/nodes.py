@@ -132,13 +132,9 @@ class SoftNodeTable(NamedTuple):
 
 
 def tabulate(
-    fabric: Fabric,
-    by_thread: bool = False,
-    behind: bool = False,
-    level: int = USUAL,
-    curved: bool = False,
+    fabric: Fabric, by_thread: bool = False, behind: bool = False, level: int = USUAL, curved: bool = False,
     rims: bool = True,
-) -> SoftNodeTable:
+) -> SoftNodeTable:  # fmt: skip
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
     With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind,

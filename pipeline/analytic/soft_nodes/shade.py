@@ -143,17 +143,9 @@ def _flakes(
 
 @inlined_fast_kernel
 def shade_node(
-    d: YarnDirections,
-    at: NodeFrame,
-    along: np.float32,
-    across: np.float32,
-    seen: np.float32,
-    lit: np.float32,
-    weight: np.float32,
-    layer: YarnLayer,
-    behind: Behind = None,
-    least: np.float32 = _0,
-) -> Six:
+    d: YarnDirections, at: NodeFrame, along: np.float32, across: np.float32, seen: np.float32, lit: np.float32,
+    weight: np.float32, layer: YarnLayer, behind: Behind = None, least: np.float32 = _0,
+) -> Six:  # fmt: skip
     """Return a node's shares of the sums; `along`, `across` as for `_flakes`.
 
     A node that faces away from the viewer has the cosine `least` to it. Of `seen`, what exceeds 1 are walls, which are

@@ -47,15 +47,9 @@ def wall_room(table: ExactNodes) -> WallRoom:
 
 @kernel
 def sum_walls(
-    cloth: ClothSide,
-    table: ExactNodes,
-    towards: NodeDirections,
-    points: int,
-    density: DensityRoom,
-    room: WallRoom,
-    sums: Float64,
-    squares: Float64,
-) -> tuple[float, float]:
+    cloth: ClothSide, table: ExactNodes, towards: NodeDirections, points: int, density: DensityRoom, room: WallRoom,
+    sums: Float64, squares: Float64,
+) -> tuple[float, float]:  # fmt: skip
     """Add the shares of all walls to the sums, and their squared errors; return those of the denominator.
 
     `density` holds the footprint on a grid of so many `points` on a yarn spacing; with 0 points it is even.
@@ -145,18 +139,9 @@ def _write_seen_deep(
 
 @fast_kernel
 def _weigh_walls(
-    normal: Normals,
-    out_x: Float32,
-    out_y: Float32,
-    light: Direction,
-    light_horizon: HorizonSlopes,
-    viewer: Direction,
-    blend: np.float32,
-    seen: Float32,
-    weight: Float32,
-    areas: Float32,
-    lit: Float32,
-) -> tuple[np.float32, np.float32]:
+    normal: Normals, out_x: Float32, out_y: Float32, light: Direction, light_horizon: HorizonSlopes, viewer: Direction,
+    blend: np.float32, seen: Float32, weight: Float32, areas: Float32, lit: Float32,
+) -> tuple[np.float32, np.float32]:  # fmt: skip
     """Write the walls' shares of the area, those of lit ones over the rim's cosine; return area and diffuse sums."""
     area, diffuse = _0, _0
     for k in range(len(seen)):
