@@ -80,7 +80,7 @@ def sum_rows(
     own, sums = kernels.no_shares(nodes), np.zeros((3, 5))
     shares = own, own._replace(weight=table.evenly)
     rooms = weight_room(table, line), density_room(table, line), wall_room(table)
-    work = _Work(cloth, table, requested, line, *shares, *rooms, *sums, refine_room(nodes))
+    work = _Work(cloth, table, requested, line, *shares, *rooms, sums[0], sums[1], sums[2], refine_room(nodes))
     answers = Raw.empty(len(columns.u))
     _answer_rows(work, columns, index, np.uint64(seed), answers)
     return answers
