@@ -101,7 +101,7 @@ class _Place(NamedTuple):
 
 
 class _Job(NamedTuple):
-    """What all walks have in common: both faces of the cloth, ways, directions of light, scratch for these, sums."""
+    """Input and sums of all walks: both faces of the cloth, ways, directions of light, and scratch for these."""
 
     front: HeightField
     back: HeightField

@@ -164,8 +164,8 @@ def tabulate(
     evenly, mean, variance = np.zeros(stop), np.zeros((AZIMUTHS, stop)), np.ones((AZIMUTHS, stop))
     behind_mean, behind_variance = (part[:, : stop if behind else 0].copy() for part in (mean, variance))
     falls = np.zeros((len(grid_falls), AZIMUTHS, stop))
-    placed = list(zip(groups, first_nodes, strict=True))
-    for group, start in placed:
+    numbered = list(zip(groups, first_nodes, strict=True))
+    for group, start in numbered:
         indices, (across, along) = _node_indices(group, start), group.rules
         nodes[:, indices] = piece_rows(front.yarn, group.piece, across, along)
         evenly[indices] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
@@ -180,7 +180,7 @@ def tabulate(
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    rays = _ray_columns(model, located, grid, placed, evenly, starts[-2] * BLOCK_NODES, rims, behind)
+    rays = _ray_columns(model, located, grid, numbered, evenly, starts[-2] * BLOCK_NODES, rims, behind)
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
@@ -192,7 +192,7 @@ def tabulate(
         evenly=_in_blocks(evenly),
         mean=_in_blocks(mean),
         sharpness=_in_blocks(_sharpness(variance)),
-        groups=np.array([(k, group.lines, group.piece.family) for group, k in placed], np.uint32),
+        groups=np.array([(k, group.lines, group.piece.family) for group, k in numbered], np.uint32),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
         cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
         **_piece_columns(located),
@@ -228,16 +228,16 @@ def _horizon_grids(
 
 
 def _ray_columns(
-    model: ClothSide, located: _Located, grid: npt.NDArray[np.uint8], placed: list[tuple[PieceGroup, int]],
+    model: ClothSide, located: _Located, grid: npt.NDArray[np.uint8], numbered: list[tuple[PieceGroup, int]],
     evenly: Float64, gaps: int, rims: bool, behind: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """Return the columns of `SoftNodeTable` by which view rays meet heights; groups come with their first node."""
     stop = len(evenly)
-    front, spots = model.front, _spots(model.front, placed, stop)
+    front, spots = model.front, _spots(model.front, numbered, stop)
     shown = spots[:, 3][spots[:, 2] > 0.0]
     areas, ends = np.zeros((2, AZIMUTHS, SEEN_ANGLES, stop))
-    of_groups = seen_areas(front, located.samples, grid, [group for group, _ in placed], rims)
-    for (group, first), own in zip(placed, of_groups, strict=True):
+    of_groups = seen_areas(front, located.samples, grid, [group for group, _ in numbered], rims)
+    for (group, first), own in zip(numbered, of_groups, strict=True):
         indices = _node_indices(group, first)
         areas[..., indices], ends[..., indices] = own
     dark = LEVELS * (1.0 if front.yarn[:, RADIUS].min() >= 0.5 else _DARK_BESIDE_GAPS)
@@ -263,10 +263,10 @@ def _node_indices(group: PieceGroup, first: int) -> Index:
     return (first + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(group.rules[0].places)].ravel()
 
 
-def _spots(front: HeightField, placed: list[tuple[PieceGroup, int]], stop: int) -> Float32:
+def _spots(front: HeightField, numbered: list[tuple[PieceGroup, int]], stop: int) -> Float32:
     """Return place in the cell, share of the cell and height of all nodes, (lines, 4, COLUMNS)."""
     spots = np.zeros((stop // COLUMNS, 4, COLUMNS), np.float32)
-    for group, first in placed:
+    for group, first in numbered:
         (across, along), (end, pick), piece = group.rules, group.cells[0], group.piece
         own = spots[first // COLUMNS :][: group.lines]
         own, extents = own[:, :, : len(across.places)], (across.places, along.places[:, None])

@@ -51,7 +51,7 @@ class Requested(NamedTuple):
 
 
 class _Work(NamedTuple):
-    """What all queries have in common, and room for one: shares of an own and of an even footprint, weights, sums."""
+    """Input of all queries, and room for one: shares of an own and of an even footprint, weights, sums."""
 
     cloth: ClothSide
     table: ExactNodes
