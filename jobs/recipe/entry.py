@@ -87,7 +87,7 @@ class EntryForm(Frozen):
 
 
 class Entry(NamedTuple):
-    """A form, and the answers beside it by their hash (`pipeline.shards.answer_file`) and their absolute path."""
+    """A form, and the answers beside it by their hash (`pipeline.shards.entry_files`) and their absolute path."""
 
     form: EntryForm
     sha256: str

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -45,20 +45,10 @@ _POINTS: Final = 256
 _BISECTIONS: Final = 10
 
 
-class CoverageTable(NamedTuple):
-    """One fabric's front."""
-
-    field: HeightField
-    """Its heights."""
-    shares: Float32
-    """Coverage of a repeat at roots of the depth from 0 to 1, (curvatures, azimuths, depths + 1)."""
-
-
 @lru_cache(maxsize=64)
-def tabulate_coverage(fabric: Fabric) -> CoverageTable:
-    """Return the table of a fabric; it takes a quarter of a second."""
-    field = cloth_side(fabric, TruthOptions()).front
-    return CoverageTable(field, _shares(field))
+def _table(fabric: Fabric) -> Float32:
+    """Tabulate a fabric's front; it takes a quarter of a second."""
+    return _shares(cloth_side(fabric, TruthOptions()).front)
 
 
 def quick_coverage(fabric: Fabric, looks: Queries) -> Float32:
@@ -66,8 +56,8 @@ def quick_coverage(fabric: Fabric, looks: Queries) -> Float32:
     result = np.ones(len(looks.u), np.float32)
     curved = np.flatnonzero(looks.curvature > 0.0)
     if curved.size:
-        table = tabulate_coverage(fabric)
-        result[curved] = _coverage_rows(table.field, table.shares, columns_of(looks.take(curved)))
+        field = cloth_side(fabric, TruthOptions()).front
+        result[curved] = _coverage_rows(field, _table(fabric), columns_of(looks.take(curved)))
     return result
 
 
@@ -81,14 +71,9 @@ def ray_points() -> Float32:
     return result
 
 
-@kernel
-def _leaves(field: HeightField, x: float, y: float, towards: Ray) -> bool:
-    """Return whether a ray that enters the boundary above a point of the repeat leaves it again."""
-    return visible(field, x, y, field.highest, UNDER, towards)
-
-
 @allocating_kernel
 def _shares(field: HeightField) -> Float32:
+    """Return the coverage of a repeat at roots of the depth from 0 to 1, (curvatures, azimuths, depths + 1)."""
     picks, ends = field.top.shape
     shares = np.zeros((_CURVATURES, _AZIMUTHS, _DEPTHS + 1))
     for row in range(_CURVATURES):
@@ -96,13 +81,18 @@ def _shares(field: HeightField) -> Float32:
         steepest = math.sqrt(2.0 * bend * (field.highest - field.lowest))
         for column in range(_AZIMUTHS):
             azimuth = math.pi * column / _AZIMUTHS
+            dx, dy = math.cos(azimuth), math.sin(azimuth)
             for k in range(_POINTS):
                 first, second = owen_pair(_KEY, k)
                 x, y = first * ends, second * picks
                 low, high = 0.0, 1.0
                 for _ in range(_BISECTIONS):
                     middle = 0.5 * (low + high)
-                    if _leaves(field, x, y, _sinking(math.cos(azimuth), math.sin(azimuth), middle * steepest, bend)):
+                    # A ray that enters the boundary above the point, and leaves it again.
+                    slope = middle * steepest
+                    flat = 1.0 / math.sqrt(1.0 + slope * slope)
+                    towards = ray(dx * flat, dy * flat, -slope * flat, bend)
+                    if visible(field, x, y, field.highest, UNDER, towards):
                         low = middle
                     else:
                         high = middle
@@ -112,13 +102,6 @@ def _shares(field: HeightField) -> Float32:
                     shares[row, column, depth] += min(max(depth + 0.5 - place, 0.0), 1.0) / _POINTS
             shares[row, column, 0], shares[row, column, _DEPTHS] = 0.0, 1.0
     return shares.astype(np.float32)
-
-
-@kernel
-def _sinking(dx: float, dy: float, slope: float, bend: float) -> Ray:
-    """Return the ray that sinks by a slope in a direction of the tangent plane."""
-    flat = 1.0 / math.sqrt(1.0 + slope * slope)
-    return ray(dx * flat, dy * flat, -slope * flat, bend)
 
 
 @allocating_kernel
@@ -131,9 +114,9 @@ def _coverage_rows(field: HeightField, shares: Float32, columns: WideQueries) ->
         if wo[2] <= 0.0:
             continue  # leaves the boundary where it enters
         towards = ray(-wo[0], -wo[1], -wo[2], bend)
-        depth = (
-            towards.rise * towards.rise / (2.0 * bend * (field.highest - field.lowest)) if towards.bend > 0.0 else 1.0
-        )
+        depth = 1.0
+        if towards.bend > 0.0:
+            depth = towards.rise * towards.rise / (2.0 * bend * (field.highest - field.lowest))
         if depth >= 1.0:
             result[row] = 1.0
         elif min(columns.sigma[row], columns.sigma_minor[row]) >= even:
@@ -144,7 +127,7 @@ def _coverage_rows(field: HeightField, shares: Float32, columns: WideQueries) ->
                 first, second = owen_pair(_KEY, k)
                 x, y, weight = place_in(float(ends), float(picks), columns, row, GAUSSIAN, first, second)
                 total += weight
-                if not _leaves(field, x, y, towards):
+                if not visible(field, x, y, field.highest, UNDER, towards):
                     result[row] += weight
             result[row] = result[row] / total if total > 0.0 else 0.0
     return result

@@ -15,8 +15,7 @@ from pipeline.truth.query import Queries
 def sample_points(cloth: ClothSide, queries: Queries, count: int, seed: int, r2: bool = False) -> Float32:
     """Return the components from `count` points a query, (N, 4); the viewer is in front, rays no lower than 89 degrees.
 
-    The points are independent, or with `r2` the first of that sequence, shifted at random once a query
-    [Roberts2018R2].
+    The points are independent, or with `r2` the first of that sequence, shifted once a query [Roberts2018R2].
     """
     return np.ascontiguousarray(_points(cloth, queries, count, seed, r2)[:, :4])
 

@@ -190,15 +190,9 @@ def _weighed_colours(
 
 @kernel
 def _add_cells(
-    table: SoftNodeTable,
-    threads: tuple[Threads, Threads],
-    patch: Patch,
-    towards: Sight,
-    areas: Float32,
-    seen: Float32,
-    masses: tuple[Float64, Float64],
-    sums: tuple[Float64, Float64],
-) -> None:
+    table: SoftNodeTable, threads: tuple[Threads, Threads], patch: Patch, towards: Sight, areas: Float32, seen: Float32,
+    masses: tuple[Float64, Float64], sums: tuple[Float64, Float64],
+) -> None:  # fmt: skip
     """Write what a footprint sees of each thread, and the same times its colour, cell by cell."""
     for family in range(2):
         masses[family][:], sums[family][:] = 0.0, 0.0
@@ -239,10 +233,7 @@ def _fold_seen(
     table: SoftNodeTable, family: Threads, axis: int, centre: np.float32, sigma: np.float32, areas: Float32,
     seen: Float32, masses: Float64, sums: Float64,
 ) -> None:  # fmt: skip
-    """Write the same along one axis of a footprint that covers the weave's repeat evenly.
-
-    Each thread counts as the Gaussian of the places where its nodes are seen.
-    """
+    """Write the same for an even footprint along an axis: a thread is the Gaussian of the places of its nodes."""
     threads, first = len(masses), 0 if axis == 0 else table.kinds[0]
     masses[:], sums[:] = 0.0, 0.0
     shares = table.evenly.reshape(len(seen), COLUMNS)
@@ -320,10 +311,7 @@ def _fold(family: Threads, centre: float, sigma: float, masses: Float64, sums: F
 
 @kernel
 def _add(seen: Float64, across: Float64, masses: Float64, sums: Float64, share: float, found: Float64) -> float:
-    """Add the colours of a family's threads, by what is seen of them; return the added weight.
-
-    `seen` is (threads, crossing threads), `across` the mass on each crossing thread.
-    """
+    """Add a family's colours by what is `seen` of threads, with mass `across` on crossing ones; return the weight."""
     weight = 0.0
     for thread in range(len(masses)):
         if masses[thread] > 0.0:

@@ -36,7 +36,7 @@ WIDENINGS: Final = {"none": NONE, "toksvig": TOKSVIG, "lean": LEAN}
 CHANNELS: Final = 13
 """Numbers a family and texel: coverage; times it normal, tangent, and tangent's products xx, yy, zz, xy, xz, yz."""
 
-_0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+_0, _1, _2, _HALF = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(0.5)
 _TINY = np.float32(1e-12)
 _FAINT = np.float32(1e-6)  # coverage below which a family is not there
 _INVERSE_PI, _FOURTH_PI = np.float32(1.0 / math.pi), np.float32(0.25 / math.pi)
@@ -86,20 +86,18 @@ def tabulate(fabric: Fabric, texels_per_yarn: int, parallax: bool = True) -> Pre
 
 def answer(tables: PrefilteredMaps, queries: Queries, widening: int) -> Float32:
     """Return the components (N, 4); queries are round, flat and lit from the front."""
-    u, v, sigma, wi, wo = (np.ascontiguousarray(column, np.float32) for column in queries[:5])
-    return _answer(tables, u, v, sigma, wi, wo, widening)
+    return _answer(tables, Queries(*(np.ascontiguousarray(column, np.float32) for column in queries)), widening)
 
 
 @allocating_kernel
-def _answer(
-    tables: PrefilteredMaps, u: Float32, v: Float32, deviation: Float32, wi: Float32, wo: Float32, widening: int
-) -> Float32:
+def _answer(tables: PrefilteredMaps, queries: Queries, widening: int) -> Float32:
+    u, v, wi, wo = queries.u, queries.v, queries.wi, queries.wo
     result = np.zeros((len(u), 4), np.float32)
     read = np.zeros(2 * CHANNELS, np.float32)
     yarn, thickness = tables.yarn, tables.thickness
     for row in range(len(u)):
         read[:] = _0
-        wide = np.float64(deviation[row])
+        wide = np.float64(queries.sigma[row])
         x, y = displaced(tables.heights, np.float64(u[row]), np.float64(v[row]), wide, wo[row])
         add_mean(tables.maps, x, y, wide, 1.0, read)
         ix, iy, iz = wi[row, 0], wi[row, 1], wi[row, 2]
@@ -122,12 +120,8 @@ def _answer(
             if widening == TOKSVIG:
                 square = min(square + _HALF * max(_1 - length, _0), _1)
             elif widening == LEAN:
-                variance = (
-                    hx * hx * read[k + 7]
-                    + hy * hy * read[k + 8]
-                    + hz * hz * read[k + 9]
-                    + np.float32(2.0) * (hx * hy * read[k + 10] + hx * hz * read[k + 11] + hy * hz * read[k + 12])
-                )
+                crossed = hx * hy * read[k + 10] + hx * hz * read[k + 11] + hy * hz * read[k + 12]
+                variance = hx * hx * read[k + 7] + hy * hy * read[k + 8] + hz * hz * read[k + 9] + _2 * crossed
                 square = min(square + size * max(variance * inverse - along * along, _0), _1)
             t = _1 / np.sqrt(max(length, _TINY))
             cos_o, cos_i = (ox * nx + oy * ny + oz * nz) * n, (ix * nx + iy * ny + iz * nz) * n

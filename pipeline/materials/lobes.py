@@ -84,7 +84,9 @@ def reflectance(fabric: Fabric) -> Reflectance:
     above = _components(fabric, wi, normal)
     through = _components(fabric, wi * (1.0, 1.0, -1.0), normal)
     grazing = np.mean([_components(fabric, wi, viewer) for viewer in grazing_views(_AZIMUTHS)], axis=0)
-    return Reflectance(_coverage(fabric), above[2:], above[:2], through[2:], grazing[2:], grazing[:2])
+    yarn = surface_maps(fabric, max(8, min(64, 1024 // max(fabric.weave.repeat)))).yarn
+    coverage = np.array([float((yarn == family).mean()) for family in range(2)])
+    return Reflectance(coverage, above[2:], above[:2], through[2:], grazing[2:], grazing[:2])
 
 
 def _components(fabric: Fabric, wi: Float64, viewer: Float64) -> Float64:
@@ -95,12 +97,6 @@ def _components(fabric: Fabric, wi: Float64, viewer: Float64) -> Float64:
     queries = Queries.round(none, none, np.full(len(wi), sigma), wi, np.tile(viewer, (len(wi), 1)))
     mean = estimate(fabric, queries, _OPTIONS, seed=0).mean.astype(np.float64)
     return np.asarray((mean * (math.pi / np.abs(wi[:, 2:]))).mean(axis=0))
-
-
-def _coverage(fabric: Fabric) -> Float64:
-    """Return the share of the area in which each family is seen from above."""
-    yarn = surface_maps(fabric, max(8, min(64, 1024 // max(fabric.weave.repeat)))).yarn
-    return np.array([float((yarn == family).mean()) for family in range(2)])
 
 
 def ggx_density(half: Float64, along: float, across: float) -> Float64:

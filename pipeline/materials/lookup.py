@@ -99,43 +99,33 @@ def tabulate(
 
 def answer(tables: MaterialMaps, queries: Queries) -> Float32:
     """Return the components of N queries about flat cloth seen from the front, (N, 4)."""
-    shape = (queries.u, queries.v, queries.sigma, queries.sigma_minor, queries.angle, queries.wi, queries.wo)
-    return _answer(tables, *(np.ascontiguousarray(column, np.float32) for column in shape))
+    return _answer(tables, Queries(*(np.ascontiguousarray(column, np.float32) for column in queries)))
 
 
 @allocating_kernel
-def _answer(
-    tables: MaterialMaps,
-    u: Float32,
-    v: Float32,
-    major: Float32,
-    minor: Float32,
-    angle: Float32,
-    wi: Float32,
-    wo: Float32,
-) -> Float32:
-    result = np.zeros((len(u), 4), np.float32)
+def _answer(tables: MaterialMaps, queries: Queries) -> Float32:
+    result = np.zeros((len(queries.u), 4), np.float32)
     read = np.zeros(TEXEL_CHANNELS, np.float32)
-    for row in range(len(u)):
+    for row in range(len(result)):
         read[:] = _0
-        _read(tables, u[row], v[row], major[row], minor[row], angle[row], wo[row], read)
+        _read(tables, queries, row, read)
         if read[0] > _0:
-            _evaluate(tables, read, wi[row], wo[row], result[row])
+            _evaluate(tables, read, queries.wi[row], queries.wo[row], result[row])
     return result
 
 
 @kernel
-def _read(
-    tables: MaterialMaps, u: float, v: float, major: float, minor: float, angle: float, wo: Float32, read: Float32
-) -> None:
+def _read(tables: MaterialMaps, queries: Queries, row: int, read: Float32) -> None:
     """Add the mean of the maps over a footprint to `read`."""
+    major, minor, angle = queries.sigma[row], queries.sigma_minor[row], queries.angle[row]
     narrow = max(minor, major / TAPS)
     count = min(max(math.ceil(major / narrow - 0.01), 1), TAPS)
     spread = math.sqrt(max(major * major - narrow * narrow, 0.0)) if count > 1 else 0.0
     for tap in range(count):
         along = spread * tables.taps[count, tap]
-        x, y = np.float64(u) + along * math.cos(angle), np.float64(v) + along * math.sin(angle)
-        x, y = displaced(tables.heights, x, y, np.float64(narrow), wo)
+        x = np.float64(queries.u[row]) + along * math.cos(angle)
+        y = np.float64(queries.v[row]) + along * math.sin(angle)
+        x, y = displaced(tables.heights, x, y, np.float64(narrow), queries.wo[row])
         add_mean(tables.maps, x, y, narrow, 1.0 / count, read)
 
 

@@ -32,8 +32,7 @@ from weaves.fabric import Fabric
 _AZIMUTHS: Final = 16
 _GRIDS: Final = {64: 16, 1024: 8}  # nodes along a piece, by the most different cells
 _COARSEST: Final = 4
-_SLOTS: Final = 4
-"""Pieces of a cell: the yarn on top, the one beneath on its low and on its high side, the gap."""
+_SLOTS: Final = 4  # pieces of a cell: the yarn on top, the one beneath on its low and on its high side, the gap
 
 
 class _HorizonMap(NamedTuple):
@@ -116,9 +115,8 @@ def _texels(field: HeightField, table: _HorizonMap, azimuths: Float64, shown: La
             total = 0.0
             for j in range(points):
                 for k in range(points):
-                    total += _at(
-                        field, table, azimuths, (column * points + k + 0.5) * dx, (row * points + j + 0.5) * dy
-                    )
+                    x, y = (column * points + k + 0.5) * dx, (row * points + j + 0.5) * dy
+                    total += _at(field, table, azimuths, x, y)
             lit[row, column] = total / (points * points)
     return lit
 

@@ -29,7 +29,7 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.materials.lobes import Reflectance, white_f0
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-from weaves.surface import GAP, WARP, ClothSurface, surface_at
+from weaves.surface import GAP, WARP, ClothSurface, surface_at, surface_maps
 
 SMALLEST_MAP: Final = 64
 """Shortest longer side, in texels."""
@@ -40,20 +40,15 @@ LARGEST_MAP: Final = 4096
 LEAST_TEXELS_PER_YARN: Final = 4
 """Fewest texels along a yarn spacing."""
 
-_SQUARE: Final = 0.01
-"""Difference of the sides of a texel that counts as none."""
-
-_COPIES: Final = 16
-"""Most repeats along the shorter side."""
-
 SAMPLES_PER_YARN: Final = 16
 """Fewest points along a yarn spacing: maps with fewer texels take several points a texel."""
 
 PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Axes of the six stored entries of a symmetric matrix."""
 
-_BAND: Final = 1 << 18
-"""Points evaluated at once."""
+_SQUARE: Final = 0.01  # difference of the sides of a texel that counts as none
+_COPIES: Final = 16  # most repeats along the shorter side
+_BAND: Final = 1 << 18  # points evaluated at once
 
 YarnColours = list[tuple[Float64, Float64, Float64]]
 """Base colours, F0 and transmitted colours of the ends and of the picks, linear RGB, each (threads, 3)."""
@@ -114,12 +109,7 @@ def layout(fabric: Fabric, size: int) -> Layout:
 
 def best_layout(fabric: Fabric, size: int) -> Layout:
     """Return the same, whether or not its texels are too large for the yarns."""
-    return min(_candidates(fabric.repeat, size), key=_order)
-
-
-def _candidates(repeat: tuple[int, int], size: int) -> list[Layout]:
-    """Return layouts whose longer side has `size` texels."""
-    layouts = []
+    repeat, layouts = fabric.repeat, []
     for halvings in range(4):
         for width, height in ((size, size >> halvings), (size >> halvings, size)):
             for copies in range(1, _COPIES + 1):
@@ -128,7 +118,7 @@ def _candidates(repeat: tuple[int, int], size: int) -> list[Layout]:
                 columns = max(1, round(copies * repeat[1] * width / (height * repeat[0])))
                 layouts.append(Layout(copies * repeat[0], rows * repeat[1], width, height))
                 layouts.append(Layout(columns * repeat[0], copies * repeat[1], width, height))
-    return layouts
+    return min(layouts, key=_order)
 
 
 def _order(candidate: Layout) -> tuple[float, float, int]:
@@ -141,8 +131,7 @@ def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
     """Sum a fabric's surface over the texels of the finest level."""
     per_texel = samples(shown)
     width, height = shown.width * per_texel, shown.height * per_texel
-    lowest = lowest_height(fabric)
-    colours = material_colours(fabric, share)
+    lowest, colours = lowest_height(fabric), material_colours(fabric, share)
     x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (shown.ends / width)
     y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (shown.picks / height)
     rows = max(1, _BAND // width // per_texel) * per_texel
@@ -186,10 +175,7 @@ def samples(shown: Layout) -> int:
 
 def lowest_height(fabric: Fabric) -> float:
     """Return the lowest height of the yarns."""
-    ends, picks = fabric.weave.repeat
-    count = max(8, min(64, 1024 // max(ends, picks)))
-    x, y = ((np.arange(extent * count) + 0.5) / count for extent in (ends, picks))
-    height = surface_at(fabric, x[None, :], y[:, None]).height
+    height = surface_maps(fabric, max(8, min(64, 1024 // max(fabric.weave.repeat)))).height
     return float(height[np.isfinite(height)].min())
 
 
@@ -199,24 +185,11 @@ def _sums(fabric: Fabric, surface: ClothSurface, x: Float64, y: Float64, dyed: Y
     tangent = surface.tangent
     smooth = np.array([1.0 - f.roughness**2 for f in (fabric.warp, fabric.weft)] + [0.0])[yarn]
     fibres = np.stack([smooth * tangent[..., a] * tangent[..., b] for a, b in PAIRS], axis=-1)
-    colours = (_colours(surface, x, y, ends, picks) for ends, picks in zip(*dyed, strict=True))
-    return Planes(
-        *(
-            np.asarray(plane, np.float32)
-            for plane in (
-                covered[..., 0],
-                np.where(np.isfinite(surface.height), surface.height, lowest),
-                covered * surface.normal,
-                fibres,
-                *colours,
-            )
-        )
-    )
-
-
-def _colours(surface: ClothSurface, x: Float64, y: Float64, ends: Float64, picks: Float64) -> Float64:
-    """Return the colour of points whose ends and picks have these colours, 0 in gaps."""
-    of_end, of_pick = ends[x.astype(np.intp) % len(ends)], picks[y.astype(np.intp) % len(picks)]
-    yarn = surface.yarn[..., None]
-    on_yarn = np.where(yarn == WARP, of_end[None, :, :], of_pick[:, None, :])
-    return np.asarray(np.where(yarn == GAP, 0.0, on_yarn))
+    height = np.where(np.isfinite(surface.height), surface.height, lowest)
+    colours = []
+    for ends, picks in zip(*dyed, strict=True):
+        of_end, of_pick = ends[x.astype(np.intp) % len(ends)], picks[y.astype(np.intp) % len(picks)]
+        on_yarn = np.where(yarn[..., None] == WARP, of_end[None, :, :], of_pick[:, None, :])
+        colours.append(np.where(covered, on_yarn, 0.0))
+    sums = (covered[..., 0], height, covered * surface.normal, fibres, *colours)
+    return Planes(*(np.asarray(plane, np.float32) for plane in sums))

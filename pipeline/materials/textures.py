@@ -32,8 +32,7 @@ from pipeline.materials.planes import PAIRS, Planes, material_colours
 from weaves.fabric import Fabric
 
 _TINY: Final = 1e-6
-_BAND: Final = 1 << 18
-"""Texels that are worked on at once."""
+_BAND: Final = 1 << 18  # texels that are worked on at once
 
 
 class Constants(NamedTuple):

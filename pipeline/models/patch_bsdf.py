@@ -18,9 +18,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.importance.lobes import STRAIGHT, TZ, Lobes, find_lobes, point_places
+from pipeline.analytic.importance import lobes as importance_lobes
+from pipeline.analytic.importance.lobes import STRAIGHT, TZ, Lobes
 from pipeline.analytic.importance.mixture import density_rows, draw_rows
-from pipeline.analytic.importance.surface import LobeSurface, tabulate_surface
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
 from pipeline.models.named import named_method
@@ -96,19 +96,19 @@ class PatchBSDF:
         self.fabric, self.bounces = fabric, bounces
         self.method = named_method(method, "PatchBSDF", "method") if isinstance(method, str) else method
         self._widening = widening
-        self._places = point_places(points)
-        self._front = tabulate_surface(fabric)
-        self._back: LobeSurface | None = None
+        self._places = importance_lobes.point_places(points)
+        self._front = importance_lobes.tabulate_surface(fabric)
+        self._back: importance_lobes.LobeSurface | None = None
 
     def lobes(self, looks: Queries) -> Lobes:
         """Return the mixtures of N looks, whose wi does not matter, for several calls about them."""
         behind = looks.wo[:, 2] < 0.0
         if not behind.any():
-            return find_lobes(self._front, looks, self._places, self._widening)
+            return importance_lobes.find_lobes(self._front, looks, self._places, self._widening)
         if self._back is None:
-            self._back = tabulate_surface(self.fabric.back())
-        front = find_lobes(self._front, looks.take(~behind), self._places, self._widening)
-        back = find_lobes(self._back, looks.turned().take(behind), self._places, self._widening)
+            self._back = importance_lobes.tabulate_surface(self.fabric.back())
+        front = importance_lobes.find_lobes(self._front, looks.take(~behind), self._places, self._widening)
+        back = importance_lobes.find_lobes(self._back, looks.turned().take(behind), self._places, self._widening)
         result = Lobes(*(np.empty((len(behind), *column.shape[1:]), np.float32) for column in front))
         for whole, own, other in zip(result, front, back, strict=True):
             whole[~behind], whole[behind] = own, other

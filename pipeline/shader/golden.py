@@ -15,9 +15,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.importance.lobes import TZ, Lobes, find_lobes, point_places
+from pipeline.analytic.importance.lobes import TZ, Lobes, LobeSurface, find_lobes, point_places
 from pipeline.analytic.importance.mixture import density_rows
-from pipeline.analytic.importance.surface import LobeSurface
 from pipeline.analytic.soft_nodes.answer import SMALLEST
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.compiled.arrays import Float32, Float64, Mask

@@ -21,9 +21,7 @@ AREA_SUM: Final = 5
 """Column of the denominator in every array of sums, after the four components and the transparency."""
 
 POINT_SUMS: Final = 6
-"""WideQueries of every array of sums."""
-
-SHAPES: Final = {"gaussian": GAUSSIAN, "box": BOX}
+"""Columns of every array of sums."""
 
 
 class ClothSide(NamedTuple):
@@ -102,7 +100,7 @@ def cloth_side(fabric: Fabric, options: TruthOptions, behind: bool = False) -> C
         back if behind else front,
         front if behind else back,
         Choices(options.frame == "macro", options.shadows, options.walls == "rim"),
-        SHAPES[options.footprint],
+        BOX if options.footprint == "box" else GAUSSIAN,
         options.normaliser == "projected",
         options.parallax,
         planes[behind],

@@ -65,10 +65,7 @@ def _auto_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: Tr
 
 
 def _node_table_rows(cloth: ClothSide, columns: WideQueries, index: Index, options: TruthOptions, seed: int) -> Raw:
-    """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever their error.
-
-    BadInput if the table does not know a query.
-    """
+    """Answer every query by the coarse table if its footprint is wide, else by the fine one, whatever their error."""
     known, wide = FINE.knows(cloth, columns), _wide(cloth, columns)
     if not known.all():
         row = int(np.flatnonzero(~known)[0])

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from pipeline.compiled.arrays import Float32, Float64
+from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.calibration import FRONT_FACTORS, SAMPLED
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, WideQueries, cloth_side, columns_of
@@ -38,6 +38,9 @@ SIGNIFICANCE: Final = 1e-4
 
 ROUNDING: Final = 2e-6
 """Relative error of a few operations on answers in single precision."""
+
+
+_Relation = Literal["=", "<="]
 
 
 class CheckResult(NamedTuple):
@@ -63,7 +66,7 @@ class CheckResult(NamedTuple):
 
 
 def exact(
-    name: str, measured: float, expected: float, tolerance: float, relation: Literal["=", "<="] = "=", note: str = ""
+    name: str, measured: float, expected: float, tolerance: float, relation: _Relation = "=", note: str = ""
 ) -> CheckResult:
     """Check a number without statistical error; NaN is broken."""
     beyond = measured - expected if relation == "<=" else abs(measured - expected)
@@ -71,14 +74,9 @@ def exact(
 
 
 def worst(
-    name: str,
-    measured: npt.ArrayLike,
-    expected: float,
-    errors: npt.ArrayLike,
-    freedom: int,
-    relation: Literal["=", "<="] = "=",
+    name: str, measured: npt.ArrayLike, expected: float, errors: npt.ArrayLike, freedom: int, relation: _Relation = "=",
     note: str = "",
-) -> CheckResult:
+) -> CheckResult:  # fmt: skip
     """Check many numbers; the result is that of the number furthest off, in its standard errors.
 
     `measured` (N,) have `errors` (N,), their standard errors, of so many degrees of freedom.
@@ -198,10 +196,9 @@ def range_of_values(fabric: Fabric) -> list[CheckResult]:
 def energy(fabric: Fabric) -> list[CheckResult]:
     """Test that the cloth gains no light: under unit radiance from everywhere it returns at most 1.
 
-    Each of k_d, k_dt and k_s is 1 in turn.
-
-    int f_P(wi, wo) d(wi) over the side of the viewer or the other one, at several angles of wo; k_s with all that goes
-    straight through. Directions are low-discrepancy points of the hemisphere, randomly shifted in each randomisation.
+    Each of k_d, k_dt and k_s is 1 in turn: int f_P(wi, wo) d(wi) over the side of the viewer or the other one, at
+    several angles of wo; k_s with all that goes straight through. Directions are low-discrepancy points of the
+    hemisphere, randomly shifted in each randomisation.
     """
     rng = np.random.default_rng(_SEED + 3)
     found = []
@@ -214,7 +211,7 @@ def energy(fabric: Fabric) -> list[CheckResult]:
             z, turn = ((steps + shift) % 1.0).reshape(-1, 2).T
             sine, turn = np.sqrt(1.0 - z * z), turn * 2.0 * math.pi
             wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), side * np.maximum(z, 1e-4)], axis=-1)
-            answers = estimate(fabric, _queries(fabric, wi, wo, _repeat_sigma(fabric), rng), _fixed(256), 4)
+            answers = estimate(fabric, _queries(fabric, wi, wo, _WIDE * max(fabric.weave.repeat), rng), _fixed(256), 4)
             mean = answers.mean.astype(np.float64).reshape(RANDOMISATIONS, _STEPS, 4).mean(axis=1) * 2.0 * math.pi
             diffuse.append(mean[:, 2:].sum(axis=1))
             specular.append(mean[:, :2].sum(axis=1))
@@ -242,13 +239,9 @@ def projected_area(fabric: Fabric) -> list[CheckResult]:
     found = []
     for theta, turn in ((0.0, 0.0), *product((30.0, 60.0, 80.0), (0.7, 1.4, 3.0))):
         wo = _turned(np.full(RANDOMISATIONS, theta), np.full(RANDOMISATIONS, turn))
-        queries = _queries(fabric, wo * (-1.0, -1.0, 1.0), wo, _repeat_sigma(fabric), rng)
-        projected, visible = (
-            estimate(fabric, queries, _fixed(16_384, normaliser=normaliser, parallax=False), 5)
-            .mean[:, 2:]
-            .sum(axis=1, dtype=np.float64)
-            for normaliser in ("projected", "visible")
-        )
+        queries = _queries(fabric, wo * (-1.0, -1.0, 1.0), wo, _WIDE * max(fabric.weave.repeat), rng)
+        ways = (_fixed(16_384, normaliser=name, parallax=False) for name in ("projected", "visible"))
+        projected, visible = (estimate(fabric, queries, way, 5).mean[:, 2:].sum(axis=1, dtype=float) for way in ways)
         share = projected / visible
         spread = share.std(ddof=1) / math.sqrt(RANDOMISATIONS)
         name = f"visible area / cos: {theta:.0f}°" + (f", azimuth {turn:g}" if theta else "")
@@ -296,15 +289,9 @@ def repeat_average(fabric: Fabric) -> list[CheckResult]:
 
 @allocating_kernel
 def _lattice(
-    cloth: ClothSide,
-    columns: WideQueries,
-    row: int,
-    side: int,
-    shifts: Float64,
-    colours: Float64,
-    mean: Float64,
+    cloth: ClothSide, columns: WideQueries, row: int, side: int, shifts: Float64, colours: Float64, mean: Float64,
     error: Float64,
-) -> float:
+) -> float:  # fmt: skip
     """Average a query over the repeat by shifted square lattices; write the components, return the coloured whole."""
     picks, ends = cloth.front.top.shape
     directions, sums, coloured = query_directions(columns, row), np.zeros((RANDOMISATIONS, POINT_SUMS)), 0.0
@@ -331,7 +318,9 @@ def translation(fabric: Fabric) -> list[CheckResult]:
     ends, picks = fabric.weave.repeat
     sizes = np.exp(rng.uniform(np.log(0.05), np.log(8.0), rows))
     near = _queries(fabric, _directions(rng, rows, 80.0), _directions(rng, rows, 80.0), sizes, rng)
-    near = near._replace(u=_coarse(near.u), v=_coarse(near.v))
+    # Rounded down to 1/256, which leaves single precision room for a thousand repeats.
+    u, v = (np.floor(places * 256.0) / 256.0 for places in (near.u, near.v))
+    near = near._replace(u=u, v=v)
     found = []
     for name, count in (("one repeat", 1), ("1000 repeats", 1000)):
         far = near._replace(u=near.u + np.float32(count * ends), v=near.v - np.float32(count * picks))
@@ -388,10 +377,6 @@ def _fixed(count: int, **choices: object) -> TruthOptions:
     return TruthOptions.model_validate({"estimator": "owen", **errors, **counts, **choices})
 
 
-def _repeat_sigma(fabric: Fabric) -> float:
-    return _WIDE * max(fabric.weave.repeat)
-
-
 def _turned(degrees: Float64, azimuth: Float64) -> Float64:
     """Return unit vectors (N, 3) at angles from the normal, degrees, and azimuths, radians."""
     theta = np.radians(degrees)
@@ -409,8 +394,3 @@ def _queries(fabric: Fabric, wi: Float64, wo: Float64, size: float | Float64, rn
     u, v = (rng.random(len(wi)) * n for n in fabric.weave.repeat)
     columns = u, v, np.broadcast_to(size, u.shape), wi, wo
     return Queries.round(*(np.array(column, np.float32) for column in columns))
-
-
-def _coarse(places: Float32) -> Float32:
-    """Round down to 1/256, which leaves single precision room for a thousand repeats."""
-    return np.asarray(np.floor(places * 256.0) / 256.0, np.float32)

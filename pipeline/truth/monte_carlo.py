@@ -140,19 +140,6 @@ def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
     return seen
 
 
-@kernel
-def _visible_share(sums: Float64, whole: float) -> tuple[float, float]:
-    """Return the visible share of a patch, and its standard error.
-
-    `sums` is (RANDOMISATIONS, POINT_SUMS), `whole` the sum of areas of one randomisation of a patch wholly visible.
-    """
-    mean = sums[:, AREA_SUM].sum() / RANDOMISATIONS
-    square = 0.0
-    for r in range(RANDOMISATIONS):
-        square += (sums[r, AREA_SUM] - mean) ** 2
-    return mean / whole, math.sqrt(square / (RANDOMISATIONS * (RANDOMISATIONS - 1))) / whole
-
-
 @allocating_kernel
 def sample_rows(
     cloth: ClothSide, columns: WideQueries, index: Index, method: int, limits: Limits, seed: np.uint64
@@ -202,6 +189,10 @@ def sample_rows(
                 break
             target = 2 * done
         counts[row] = done * RANDOMISATIONS
-        share, doubt = _visible_share(sums, directions.viewer.z * done)
-        conceal(share, doubt, mean, error)
+        # The visible share of the patch, and its error; `whole` is the area of a randomisation that sees all of it.
+        area, square, whole = sums[:, AREA_SUM].sum() / RANDOMISATIONS, 0.0, directions.viewer.z * done
+        for r in range(RANDOMISATIONS):
+            square += (sums[r, AREA_SUM] - area) ** 2
+        doubt = math.sqrt(square / (RANDOMISATIONS * (RANDOMISATIONS - 1))) / whole
+        conceal(area / whole, doubt, mean, error)
     return Raw(means, errors, counts, np.full(rows, SAMPLED))

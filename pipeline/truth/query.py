@@ -135,15 +135,6 @@ STEEPEST_CURVATURE = 1.0
 """Largest curvature: a cylinder as thick as two yarn spacings."""
 
 
-def _refuse_shapes(queries: Queries, where: str) -> None:
-    """Refuse columns that are not of N rows, or of N directions."""
-    rows = np.shape(queries.u)[:1] or (1,)
-    for name, column in zip(Queries._fields, queries, strict=True):
-        shape = (*rows, 3) if name in ("wi", "wo") else rows
-        if np.shape(column) != shape:
-            raise BadInput(where, f"shape of {name}", np.shape(column), f"must be {shape}: all columns have equal rows")
-
-
 def faults(queries: Queries, parallax: bool = False) -> dict[int, tuple[str, object, str]]:
     """Return the fault of each query that has no answer: row -> (column, value, what is allowed).
 
@@ -177,7 +168,11 @@ def faults(queries: Queries, parallax: bool = False) -> dict[int, tuple[str, obj
 
 def validate(queries: Queries, where: str = "queries", parallax: bool = False) -> None:
     """Refuse queries that have no answer with a BadInput that names the first and counts the others."""
-    _refuse_shapes(queries, where)
+    rows = np.shape(queries.u)[:1] or (1,)
+    for name, column in zip(Queries._fields, queries, strict=True):
+        shape = (*rows, 3) if name in ("wi", "wo") else rows
+        if np.shape(column) != shape:
+            raise BadInput(where, f"shape of {name}", np.shape(column), f"must be {shape}: all columns have equal rows")
     found = faults(queries, parallax)
     if not found:
         return

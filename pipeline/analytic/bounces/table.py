@@ -36,10 +36,8 @@ WALKS: Final = 1 << 16
 """Walks of a table."""
 _ANGLES: Final = 16
 _AZIMUTHS: Final = 24
-_STEEPEST: Final = math.radians(89.0)
-"""Angle to the normal of the last directions of the grid; beyond, functions are those of these."""
-_LEAST: Final = 1e-12
-"""Least divisor: where nothing is seen or lit, the quotients are 0."""
+_STEEPEST: Final = math.radians(89.0)  # angle of the last directions of the grid, whose functions hold beyond
+_LEAST: Final = 1e-12  # least divisor: where nothing is seen or lit, the quotients are 0
 _PASSES: Final = 3
 
 

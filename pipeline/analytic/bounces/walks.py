@@ -39,18 +39,13 @@ from pipeline.truth.geometry.march import ray, wrap
 from pipeline.truth.geometry.pieces import Cell, CellPiece, cell_pieces, leaders
 from pipeline.truth.geometry.visibility import visible
 
-_FEWEST: Final = 16
-"""Points of the smallest piece; fewer where a cloth has so many pieces that all walks are shared out."""
-_OFF: Final = 1e-9
-"""Distance from a wall at which walks go on, in yarn spacings: beyond its rounding, on the open side."""
-_IN_GAP: Final = 64
-"""Points of a gap."""
-_OF_CELL: Final = 4
-"""Walks from a cell, at least."""
-_LONGEST: Final = 4
-"""Yarns at which a walk counts the sun's light, from its third on."""
+_FEWEST: Final = 16  # points of the smallest piece; fewer of a cloth with so many that all walks are shared out
+_OFF: Final = 1e-9  # distance from a wall at which walks go on: beyond its rounding, on the open side
+_IN_GAP: Final = 64  # points of a gap
+_OF_CELL: Final = 4  # walks from a cell, at least
+_LONGEST: Final = 4  # yarns at which a walk counts the sun's light, from its third on
+# Root of x^5 = x + 1: its inverse powers are the steps of the additive sequence in four dimensions [Roberts2018R2].
 _FOUR: Final = 1.16730397826141868
-"""Root of x^5 = x + 1: its inverse powers are the steps of the additive sequence in four dimensions [Roberts2018R2]."""
 
 
 class Start(NamedTuple):
@@ -69,8 +64,8 @@ class Start(NamedTuple):
 class Transport(NamedTuple):
     """Sums of walks of W ways: 1 if yarns reflect light alone, 2 if they transmit it as well.
 
-    Families f are 0 for the warp, 1 for the weft. Places are 2 face + f, P = 2 W of them; colours, a and b, are
-    2 way + f; c and d are P way + place, Q = W P of them. With two ways, lights behind follow those in front.
+    Families f are 0 for the warp, 1 for the weft; way 0 reflects, 1 transmits. Places are 2 face + f, P = 2 W of them;
+    colours, a and b, are 2 way + f; c and d are P way + place, Q = W P of them. Lights behind follow those in front.
     """
 
     seen: Float64
@@ -105,11 +100,22 @@ class _Place(NamedTuple):
     nz: float
 
 
+class _Job(NamedTuple):
+    """Input and sums of all walks: both faces of the cloth, ways, directions of light, and scratch for these."""
+
+    front: HeightField
+    back: HeightField
+    ways: int
+    lights: Float64
+    light: Float32
+    sums: Transport
+
+
 def starting_points(field: HeightField, count: int) -> Start:
     """Spread about so many points evenly over what is seen from straight above, in x = r sin v across each yarn.
 
-    Cells that a translation maps onto each other share their points. Of a cloth with very many
-    different cells some are chosen at random.
+    Cells that a translation maps onto each other share their points. Of a cloth with very many different cells some
+    are chosen at random.
     """
     pieces, factor = _pieces(field, count)
     yarns = [(cell, piece) for cell, piece in pieces if piece.family != GAP]
@@ -148,17 +154,14 @@ def transport(
         np.zeros(((places + 1) * events, i + 1)),
     )
     faces = field, field if back is None else back
-    start, scratch = starting_points(field, count), (np.empty(o, np.float32), np.empty(i, np.float32))
     _see_gaps(*faces, *_gap_points(field, count), viewers, sums.seen)
-    _walk(*faces, ways, start, viewers, lights, sums, *scratch)
+    job = _Job(*faces, ways, lights, np.empty(i, np.float32), sums)
+    _walk(job, starting_points(field, count), viewers, np.empty(o, np.float32))
     return sums
 
 
 def _gap_points(field: HeightField, count: int) -> tuple[Float64, Float64, Float64]:
-    """Return places spread evenly over the gaps of the first cell of each kind, and the area that each stands for.
-
-    They are `_IN_GAP` a gap, or about `count` in all if that is less.
-    """
+    """Return places spread evenly over the gaps of the first cell of each kind, and the area that each stands for."""
     pieces, factor = _pieces(field, count)
     gaps = np.array([(*cell, *piece.box[0], *piece.box[1]) for cell, piece in pieces if piece.family == GAP])
     if not len(gaps):
@@ -171,10 +174,7 @@ def _gap_points(field: HeightField, count: int) -> tuple[Float64, Float64, Float
 
 
 def _pieces(field: HeightField, count: int) -> tuple[list[tuple[Cell, CellPiece]], float]:
-    """Return the pieces of the first cell of each kind, or of one for every `_OF_CELL` points, chosen at random.
-
-    Also the number of all kinds of cells over that of the chosen ones.
-    """
+    """Return pieces of the first cell of each kind, or of random ones, and the number of kinds over that of these."""
     cells, most = leaders(field), max(count // _OF_CELL, 1)
     factor = max(len(cells) / most, 1.0)
     if factor > 1.0:
@@ -197,18 +197,9 @@ def _see_gaps(
 
 
 @kernel
-def _walk(
-    front: HeightField,
-    back: HeightField,
-    ways: int,
-    start: Start,
-    viewers: Float64,
-    lights: Float64,
-    sums: Transport,
-    area: Float32,
-    light: Float32,
-) -> None:
-    """Add walks to the sums; `area` and `light` are scratch."""
+def _walk(job: _Job, start: Start, viewers: Float64, area: Float32) -> None:
+    """Add walks to the sums; `area` is scratch."""
+    front, ways, light, sums, count = job.front, job.ways, job.light, job.sums, len(job.lights)
     events = 2 * ways * ways
     for p in range(len(start.x)):
         x, y = start.x[p], start.y[p]
@@ -222,72 +213,55 @@ def _walk(
         choice = uniform(np.uint64(2), p, 0)
         for way_of_a in range(ways):
             a, key = 2 * way_of_a + family, derive(np.uint64(1 + 2 * way_of_a), p)
-            met, second = _next(front, back, ways, first, way_of_a, choice, start.first[p], start.second[p])
+            met, second = _next(job, first, way_of_a, choice, start.first[p], start.second[p])
             if not met:
                 continue
             for way_of_b in range(ways):
-                b, begin = 2 * way_of_b + second.family, (second.face ^ way_of_b) * len(lights)
-                _count(front, back, second, way_of_b, lights, light)
+                b, begin = 2 * way_of_b + second.family, (second.face ^ way_of_b) * count
+                _count(job, second, way_of_b)
                 for k in range(len(viewers)):
                     if area[k] > 0.0:
-                        for i in range(len(lights)):
+                        for i in range(count):
                             sums.second[k, a, b, begin + i] += area[k] * light[i]
-                met, third = _next(front, back, ways, second, way_of_b, *_numbers(key, 0))
+                met, third = _next(job, second, way_of_b, *_numbers(key, 0))
                 if not met:
                     continue
                 at = 2 * third.face + third.family
                 for k in range(len(viewers)):
                     sums.reached[k, a, b, at] += area[k]
                 for way in range(ways):
-                    begin = (third.face ^ way) * len(lights)
-                    _count(front, back, third, way, lights, light)
+                    begin = (third.face ^ way) * count
+                    _count(job, third, way)
                     for k in range(len(viewers)):
                         if area[k] > 0.0:
-                            for i in range(len(lights)):
+                            for i in range(count):
                                 sums.third[k, way_of_a, begin + i] += area[k] * light[i]
                     kind = b * events + 2 * ways * way + at
-                    if _go_on(front, back, ways, third, way, kind, key, start.area[p], lights, sums, light):
+                    if _go_on(job, third, way, kind, key, start.area[p]):
                         for k in range(len(viewers)):
                             sums.further[k, way_of_a] += area[k]
 
 
 @kernel
-def _go_on(
-    front: HeightField,
-    back: HeightField,
-    ways: int,
-    place: _Place,
-    way: int,
-    kind: int,
-    key: np.uint64,
-    weight: float,
-    lights: Float64,
-    sums: Transport,
-    light: Float32,
-) -> bool:
-    """Add what a walk meets from its third yarn on, whose `light` is known; return whether it meets a fourth."""
+def _go_on(job: _Job, place: _Place, way: int, kind: int, key: np.uint64, weight: float) -> bool:
+    """Add what a walk meets from its third yarn on, whose light is known; return whether it meets a fourth."""
+    ways, sums, count = job.ways, job.sums, len(job.lights)
     events = 2 * ways * ways
     for depth in range(_LONGEST):
         if depth:
-            _count(front, back, place, way, lights, light)
-        for i in range(len(lights)):
-            sums.later[kind, i] += weight * light[i]
-        sums.later[kind, len(lights)] += weight
-        met, place = _next(front, back, ways, place, way, *_numbers(key, 1 + depth))
+            _count(job, place, way)
+        for i in range(count):
+            sums.later[kind, i] += weight * job.light[i]
+        sums.later[kind, count] += weight
+        met, place = _next(job, place, way, *_numbers(key, 1 + depth))
         if not met:
             return depth > 0
         at = 2 * place.face + place.family
         sums.transfers[kind, at] += weight
         # From the fourth yarn on a walk takes one way of all.
-        way = _way(ways, key, depth)
+        way = 0 if ways == 1 else int(2.0 * uniform(key, depth, 3))
         kind = 2 * ways * events + 2 * ways * way + at
     return True
-
-
-@inlined_kernel
-def _way(ways: int, key: np.uint64, depth: int) -> int:
-    """Return one of the ways in which a point sends on light: 0 reflects, 1 transmits."""
-    return 0 if ways == 1 else int(2.0 * uniform(key, depth, 3))
 
 
 @inlined_kernel
@@ -305,16 +279,13 @@ def _facing(field: HeightField, place: _Place, x: float, y: float, z: float) -> 
 
 
 @kernel
-def _count(front: HeightField, back: HeightField, place: _Place, way: int, lights: Float64, light: Float32) -> None:
-    """Write the share of the sun's light that a point sends on, 1/sr, for each direction of the sun.
-
-    They are on the point's own side of the cloth or, for what it transmits, on the other one.
-    """
-    field, other = (front, back) if place.face == 0 else (back, front)
+def _count(job: _Job, place: _Place, way: int) -> None:
+    """Write the share of the light of each direction that a point sends on, 1/sr; what it transmits is from behind."""
+    field, other = (job.front, job.back) if place.face == 0 else (job.back, job.front)
     blend = field.yarn[place.family, BLEND]
     there = _across(other, place)
-    for i in range(len(lights)):
-        x, y, z = lights[i, 0], lights[i, 1], lights[i, 2]
+    for i in range(len(job.lights)):
+        x, y, z = job.lights[i, 0], job.lights[i, 1], job.lights[i, 2]
         if way == 0:
             ply, macro = _facing(field, place, x, y, z)
         else:
@@ -322,7 +293,7 @@ def _count(front: HeightField, back: HeightField, place: _Place, way: int, light
             ply, macro = z * place.nz - x * place.nx - y * place.ny, z
             if ply <= 0.0 or place.nz == 0.0 or _facing(other, there, x, y, z)[0] <= 0.0:
                 ply, macro = 0.0, 0.0
-        light[i] = (blend * ply + (1.0 - blend) * macro) / math.pi
+        job.light[i] = (blend * ply + (1.0 - blend) * macro) / math.pi
 
 
 @inlined_kernel
@@ -333,11 +304,9 @@ def _across(other: HeightField, place: _Place) -> _Place:
 
 
 @kernel
-def _next(
-    front: HeightField, back: HeightField, ways: int, place: _Place, way: int, choice: float, a: float, b: float
-) -> tuple[bool, _Place]:
+def _next(job: _Job, place: _Place, way: int, choice: float, a: float, b: float) -> tuple[bool, _Place]:
     """Return whether a walk goes on to another yarn, and where it meets it; three numbers in [0, 1) choose where to."""
-    field, other = (front, back) if place.face == 0 else (back, front)
+    field, other = (job.front, job.back) if place.face == 0 else (job.back, job.front)
     if choice < field.yarn[place.family, BLEND]:
         dx, dy, dz = _cosine_about(place.nx, place.ny, place.nz, a, b)
     else:
@@ -354,7 +323,7 @@ def _next(
     x, y, z = place.x, place.y, place.z
     hit = next_hit(field, x, y, z, place.side, ray(dx, dy, dz, 0.0))
     face = place.face
-    if ways == 2 and dz < 0.0 and z > 0.0:
+    if job.ways == 2 and dz < 0.0 and z > 0.0:
         down = -z / dz
         if hit.what == MISSED or hit.distance > down * math.hypot(dx, dy):
             picks, ends = field.top.shape
@@ -370,7 +339,10 @@ def _next(
         return family != GAP, _Place(face, hit.x, hit.y, z, side, family, nx, ny, nz)
     picks, ends = field.top.shape
     z = z + hit.distance / math.sqrt(dx * dx + dy * dy) * dz
-    nx, ny = _wall_normal(field, hit.x - hit.end, hit.y - hit.pick, dx, dy)
+    # Walls stand on borders of the cell and on sides of yarns.
+    along_x = _off_border(hit.x - hit.end, field.yarn[WARP, RADIUS])
+    along_y = _off_border(hit.y - hit.pick, field.yarn[WEFT, RADIUS])
+    nx, ny = (-math.copysign(1.0, dx), 0.0) if along_x < along_y else (0.0, -math.copysign(1.0, dy))
     # The wall is the end of the yarn behind it; walks go on before it.
     family, _, _, _, _, _, _, _, _ = surface_at(field, hit.x - _OFF * nx, hit.y - _OFF * ny, hit.end, hit.pick)
     x, y = wrap(hit.x + _OFF * nx, ends), wrap(hit.y + _OFF * ny, picks)
@@ -385,15 +357,6 @@ def _cosine_about(nx: float, ny: float, nz: float, a: float, b: float) -> tuple[
     # The rotation that turns z into the normal by the shortest way.
     share = (u * nx + v * ny) / (1.0 + nz)
     return u + w * nx - share * nx, v + w * ny - share * ny, w * nz - (u * nx + v * ny)
-
-
-@kernel
-def _wall_normal(field: HeightField, x: float, y: float, dx: float, dy: float) -> tuple[float, float]:
-    """Return the normal of the wall at a point of a cell: walls stand on borders of the cell and on sides of yarns."""
-    along_x, along_y = _off_border(x, field.yarn[WARP, RADIUS]), _off_border(y, field.yarn[WEFT, RADIUS])
-    if along_x < along_y:
-        return -math.copysign(1.0, dx), 0.0
-    return 0.0, -math.copysign(1.0, dy)
 
 
 @inlined_kernel

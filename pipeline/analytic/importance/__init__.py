@@ -1,1 +1,1 @@
-"""Importance sampling of the light scattered by a footprint, with exact densities: surface, lobes, mixture."""
+"""Importance sampling of the light scattered by a footprint, with exact densities: lobes, mixture."""

@@ -20,31 +20,28 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from pipeline.analytic.importance.surface import DIFFUSE, SPECULAR, THROUGH, LobeSurface
 from pipeline.analytic.soft_horizons import AZIMUTHS, above, around, ramp
+from pipeline.analytic.soft_nodes import nodes
 from pipeline.analytic.soft_nodes.answer import SMALLEST
 from pipeline.analytic.soft_nodes.nodes import BLOCK, BOUND, CURVE, FAMILY, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
 from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, tangent
-from pipeline.compiled.arrays import Float32
+from pipeline.compiled.arrays import Float32, Index
 from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel, kernel
 from pipeline.compiled.float32 import arcsine
 from pipeline.compiled.normal import normal_quantile
+from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import Footprints, footprints
 from pipeline.truth.footprint.sequences import r2_pair
-from pipeline.truth.geometry.heightfield import (
-    ALPHA,
-    BETA,
-    COS_TWIST,
-    GAP,
-    INVERSE_RADIUS,
-    RADIUS,
-    SIN_TWIST,
-    WARP,
-    WEFT,
-)
+from pipeline.truth.geometry import heightfield
+from pipeline.truth.geometry.heightfield import GAP, INVERSE_RADIUS, WARP, WEFT
+from pipeline.truth.geometry.pieces import longest_period
+from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.slab_float32 import unscattered
+from weaves.colour import luminance
+from weaves.fabric import Fabric
 
 FLAKE_ROWS: Final = 6
 """Rows of `Lobes.flakes`."""
@@ -55,12 +52,16 @@ TX, TY, TZ, SQUARE, SHARE, HEIGHT = range(FLAKE_ROWS)
 NEAR, FAR, STRAIGHT = range(3)
 """Columns of `Lobes.rest`: the cosine on the viewer's side, that on the other, light straight through."""
 
+SPECULAR, DIFFUSE, THROUGH = range(3)
+"""Rows of `LobeSurface.luminance`: k_s, k_d and k_dt."""
+
 SCATTERED: Final = 0.2
 """Light that leaves after one flake and meets no other yarn, as a share of what meets a flake, roughly."""
 
 BROAD: Final = 0.2
 """Share of a family's lobes that its broad one has."""
 
+_GRID = 12  # cells of a grid along each axis: some tens of kilobytes, which stay in the cache
 _POINT_ROWS = 7  # of the scratch
 _SINE, _PLACE, _CURVE, _LIMIT, _SEEN, _WARPNESS, _YARNNESS = range(_POINT_ROWS)
 _SCATTERED, _BROAD = np.float32(SCATTERED), np.float32(BROAD)
@@ -74,6 +75,44 @@ _ALONE = np.float32(0.999)  # sum of squared shares from which on a family has o
 _0, _1, _HALF, _TINY = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(1e-30)
 _INVERSE_PI, _HEIGHT = np.float32(1.0 / math.pi), np.float32(0.25 / math.pi)
 _LEVELS = np.float32(LEVELS)
+
+
+class LobeSurface(NamedTuple):
+    """One side of a cloth as lobes need it."""
+
+    repeat: Index
+    """Ends and picks, (2,)."""
+    yarn: Float32
+    """`HeightField.yarn`, (2, 8)."""
+    thickness: np.float32
+    """Optical thickness T."""
+    uniform: float
+    """Deviation from which on a Gaussian covers the cloth evenly."""
+    piece_starts: Index
+    pieces: Index
+    bounds: Float32
+    grid: npt.NDArray[np.uint8]
+    """As in `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, the grid flat."""
+    size: int
+    """Cells of a grid along each axis."""
+    luminance: Float32
+    """Luminances of the mean colours of warp and weft: SPECULAR, DIFFUSE, THROUGH, (3, 2)."""
+
+
+def tabulate_surface(fabric: Fabric) -> LobeSurface:
+    """Return the front of a fabric, as the default model of the truth sees it."""
+    model, average = cloth_side(fabric, TruthOptions()), fabric.average()
+    front, yarns = model.front, (average.warp, average.weft)
+    colours = [(y.specular_rgb, y.diffuse_rgb, y.diffuse_transmission_rgb) for y in yarns]
+    return LobeSurface(
+        repeat=np.array(front.top.shape[::-1], np.int64),
+        yarn=np.ascontiguousarray(front.yarn, np.float32),
+        thickness=np.float32(front.thickness),
+        uniform=nodes.EVEN * longest_period(front),
+        **nodes.tabulate_pieces(model, _GRID),
+        size=_GRID,
+        luminance=np.array([[luminance(rgb) for rgb in kind] for kind in zip(*colours, strict=True)], np.float32),
+    )
 
 
 class Lobes(NamedTuple):
@@ -227,7 +266,8 @@ def _family(cloth: LobeSurface, family: int) -> _Family:
     """Return the numbers of one family."""
     yarn, light = cloth.yarn, cloth.luminance
     return _Family(
-        yarn[family, SIN_TWIST], yarn[family, COS_TWIST], yarn[family, BETA], yarn[family, RADIUS], yarn[family, ALPHA],
+        yarn[family, heightfield.SIN_TWIST], yarn[family, heightfield.COS_TWIST], yarn[family, heightfield.BETA],
+        yarn[family, heightfield.RADIUS], yarn[family, heightfield.ALPHA],
         light[SPECULAR, family], light[DIFFUSE, family], light[THROUGH, family],
     )  # fmt: skip
 

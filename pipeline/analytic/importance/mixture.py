@@ -34,10 +34,8 @@ from pipeline.compiled.decorators import inlined_fast_kernel, kernel
 def _squeeze(
     wx: float, wy: float, wz: float, tx: float, ty: float, tz: float, alpha: float
 ) -> tuple[float, float, float, float]:
-    """Return S^(1/2) w, normalised, and the length it had, which is sigma(w).
-
-    t x (w x t) + alpha (w.t) t, unlike w - (1 - alpha)(w.t) t, keeps every digit near the fibre axis.
-    """
+    """Return S^(1/2) w, normalised, and the length it had, which is sigma(w)."""
+    # t x (w x t) + alpha (w.t) t, unlike w - (1 - alpha)(w.t) t, keeps every digit near the fibre axis.
     cx, cy, cz = wy * tz - wz * ty, wz * tx - wx * tz, wx * ty - wy * tx
     along = alpha * (wx * tx + wy * ty + wz * tz)
     x = ty * cz - tz * cy + along * tx
@@ -49,11 +47,8 @@ def _squeeze(
 
 @kernel
 def _sample_cosine(dx: float, dy: float, dz: float, first: float, second: float) -> tuple[float, float, float]:
-    """Return a unit n with density <n.d> / pi about unit d; n.d = sqrt(1 - first).
-
-    Drawn about the pole farther from d, then mirrored in the plane between the two: nothing cancels, and no d is
-    special.
-    """
+    """Return a unit n with density <n.d> / pi about unit d; n.d = sqrt(1 - first)."""
+    # About the pole farther from d, then mirrored in the plane between the two: nothing cancels, no d is special.
     pole = -1.0 if dz >= 0.0 else 1.0
     radius, azimuth = math.sqrt(first), 2.0 * math.pi * second
     x, y, z = radius * math.cos(azimuth), radius * math.sin(azimuth), pole * math.sqrt(1.0 - first)

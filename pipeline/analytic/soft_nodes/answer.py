@@ -73,25 +73,12 @@ def shortened(
     return np.float32(x), np.float32(y), np.float32(share * correlation * deviation_x * deviation_y / (x * y))
 
 
-@kernel
-def _rises(table: SoftNodeTable, wo: Float32, bend: np.float32) -> bool:
-    """Return whether rays over curved cloth rise again before they have sunk to the least height that is seen."""
-    depth = np.float32(table.plane) - table.shown[0]
-    return bool(wo[2] * wo[2] < np.float32(2.0) * bend * (wo[0] * wo[0] + wo[1] * wo[1]) * depth)
-
-
 # Not in `sum_queries`: what allocates counts references to every slice, a third of the time of a query.
 @kernel
 def _sum_rows(
-    table: SoftNodeTable,
-    scratch: Scratch,
-    patches: Footprints,
-    wi: Float32,
-    wo: Float32,
-    curvature: Float32,
-    result: Float32,
-    gaps: Float32,
-) -> None:
+    table: SoftNodeTable, scratch: Scratch, patches: Footprints, wi: Float32, wo: Float32, curvature: Float32,
+    result: Float32, gaps: Float32,
+) -> None:  # fmt: skip
     """Write sums and areas of all queries."""
     u, v, deviation_x, deviation_y, correlation = patches
     ends, picks = table.repeat[0], table.repeat[1]
@@ -118,8 +105,10 @@ def _sum_rows(
             x, y, dx, dy, rho, narrowest, wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2], low_i, high_i,
             turn_i, low_o, high_o, turn_o, bend_i, bend_o,
         )  # fmt: skip
-        # Where rays turn, nodes are seen far from one another.
-        lines = table.view_lines * (2.0 if _rises(table, wo[n], bend_o) else 1.0)
+        # Where rays rise before they have sunk to the least height that is seen, nodes are far from one another.
+        flat, depth = wo[n, 0] * wo[n, 0] + wo[n, 1] * wo[n, 1], np.float32(table.plane) - table.shown[0]
+        rises = wo[n, 2] * wo[n, 2] < np.float32(2.0) * bend_o * flat * depth
+        lines = table.view_lines * (2.0 if rises else 1.0)
         if narrowest < lines and nodes_on_lines(dx, dy, narrowest, table.spacing) <= MOST_ON_LINES:
             gaps[n] = sum_view_lines(table, scratch, look, result[n])
         else:

@@ -15,20 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.analytic.soft_nodes import shade
 from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
-from pipeline.analytic.soft_nodes.shade import (
-    AREA,
-    BARE_AREA,
-    DIFFUSE,
-    FADED,
-    LEAST_SEEN,
-    OPEN_DIFFUSE,
-    OPEN_SPECULAR,
-    SPECULAR,
-    THROUGH,
-    TINY,
-)
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fused_kernel
 from pipeline.truth.query import Queries
@@ -49,15 +38,15 @@ def _assemble(sums: Float32, gaps: Float32, reading: Reading) -> None:
     """Turn the sums of both families into what is read of N queries."""
     components, bounds = reading
     for n in range(len(sums)):
-        bare = sums[n, 0, BARE_AREA] + sums[n, 1, BARE_AREA] + gaps[n]
-        area = max(gaps[n] + sums[n, 0, AREA] + sums[n, 1, AREA], LEAST_SEEN * bare) + TINY
-        inverse, faded = _1 / area, area / (area + FADED * bare)
+        bare = sums[n, 0, shade.BARE_AREA] + sums[n, 1, shade.BARE_AREA] + gaps[n]
+        area = max(gaps[n] + sums[n, 0, shade.AREA] + sums[n, 1, shade.AREA], shade.LEAST_SEEN * bare) + shade.TINY
+        inverse, faded = _1 / area, area / (area + shade.FADED * bare)
         for f in range(2):
             own = sums[n, f]
-            components[n, f] = faded * (own[SPECULAR] * inverse)
-            components[n, 2 + f] = faded * (own[DIFFUSE] * (inverse * _INVERSE_PI))
-            bounds[n, f] = own[OPEN_SPECULAR] * (faded * inverse)
-            bounds[n, 2 + f] = own[OPEN_DIFFUSE] * (faded * (inverse * _INVERSE_PI))
+            components[n, f] = faded * (own[shade.SPECULAR] * inverse)
+            components[n, 2 + f] = faded * (own[shade.DIFFUSE] * (inverse * _INVERSE_PI))
+            bounds[n, f] = own[shade.OPEN_SPECULAR] * (faded * inverse)
+            bounds[n, 2 + f] = own[shade.OPEN_DIFFUSE] * (faded * (inverse * _INVERSE_PI))
 
 
 def read_queries(table: SoftNodeTable, queries: Queries) -> Reading:
@@ -74,11 +63,11 @@ def read_behind(table: SoftNodeTable, queries: Queries) -> Float32:
     The table knows light from behind; cloth is curved only if it knows that, too.
     """
     sums, gaps = query_sums(table, queries)
-    bare = sums[:, :, BARE_AREA].sum(axis=1) + gaps
-    area = np.maximum(sums[:, :, AREA].sum(axis=1) + gaps, LEAST_SEEN * bare) + TINY
-    faded = (area / (area + FADED * bare))[:, None]
+    bare = sums[:, :, shade.BARE_AREA].sum(axis=1) + gaps
+    area = np.maximum(sums[:, :, shade.AREA].sum(axis=1) + gaps, shade.LEAST_SEEN * bare) + shade.TINY
+    faded = (area / (area + shade.FADED * bare))[:, None]
     result = np.empty((len(area), 5), np.float32)
-    result[:, :2] = faded * sums[:, :, SPECULAR] / area[:, None]
-    result[:, 2:4] = faded * sums[:, :, DIFFUSE] / (math.pi * area[:, None])
-    result[:, 4] = np.minimum((sums[:, :, THROUGH].sum(axis=1) + gaps) / area, 1.0)
+    result[:, :2] = faded * sums[:, :, shade.SPECULAR] / area[:, None]
+    result[:, 2:4] = faded * sums[:, :, shade.DIFFUSE] / (math.pi * area[:, None])
+    result[:, 4] = np.minimum((sums[:, :, shade.THROUGH].sum(axis=1) + gaps) / area, 1.0)
     return result

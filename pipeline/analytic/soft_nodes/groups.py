@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.gauss_rules import Rule
+from pipeline.analytic.gauss_rules import Rule, gauss_rule, grid_edges, overlap
 from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
 from pipeline.compiled.arrays import Float64
 from pipeline.compiled.decorators import fast_kernel
@@ -91,6 +91,19 @@ class PieceGroup(NamedTuple):
     def nodes(self) -> int:
         """Nodes of the group."""
         return COLUMNS * self.lines
+
+    @property
+    def rules(self) -> tuple[Rule, Rule]:
+        """Its nodes across and along."""
+        columns = self.lines if self.piece.family == GAP else COLUMNS
+        across = gauss_rule(*self.piece.across, columns, self.piece.radius)
+        return across, gauss_rule(*self.piece.along, self.lines, 0.0)
+
+    def overlaps(self, size: int) -> tuple[Float64, Float64]:
+        """Return which shares of its nodes' boxes, across and along, lie in each of `size` cells of a grid."""
+        piece, (across, along) = self.piece, self.rules
+        of_across = overlap(across.borders, grid_edges(*piece.across, size, piece.radius))
+        return of_across, overlap(along.borders, grid_edges(*piece.along, size, 0.0))
 
 
 def gather(pieces: Sequence[tuple[Cell, CellPiece, int]], detail: Detail, by_thread: bool = False) -> list[PieceGroup]:
@@ -176,9 +189,6 @@ FLAT: Final = np.array([0.0, 0.0, 1.0, 1.0] + [0.0] * 9)
 _AXES = np.eye(3)
 _GAUSS = 1.0 / math.sqrt(3.0)
 
-LARGEST_SINE: Final = 0.999
-"""Largest sine of an inclination."""
-
 
 def piece_rows(yarn: Float64, piece: CellPiece, across: Rule, along: Rule) -> Float64:
     """Return the surface at the nodes of a piece, (SURFACE_ROWS, nodes); nodes across the yarn follow each other.
@@ -197,11 +207,10 @@ def piece_rows(yarn: Float64, piece: CellPiece, across: Rule, along: Rule) -> Fl
     places = turned * (np.repeat(along.places, columns) - 0.5 + piece.offset)
     half_across = 0.5 * np.tile(np.diff(across.borders), lines)
     half_along = 0.5 * np.repeat(np.diff(along.borders), columns)
-    bound = min(piece.steepest, LARGEST_SINE)
     fibre = Fibre(float(own[SIN_TWIST]), float(own[COS_TWIST]), float(own[BETA]))
     found = np.zeros((SURFACE_ROWS, len(sines)))
     curvature = float(piece.sign * piece.curve)
-    _fill_rows(sines, places, half_across, half_along, float(radius), curvature, float(bound), fibre, found)
+    _fill_rows(sines, places, half_across, half_along, float(radius), curvature, float(piece.steepest), fibre, found)
     return found
 
 

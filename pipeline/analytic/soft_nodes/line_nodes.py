@@ -14,18 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import Bend, above, ramp
+from pipeline.analytic.soft_nodes import shade
 from pipeline.analytic.soft_nodes.nodes import LEVELS, UPPER
 from pipeline.analytic.soft_nodes.scratch import DRAFT_ROWS
-from pipeline.analytic.soft_nodes.shade import (
-    Behind,
-    GridHorizons,
-    NodeFrame,
-    Six,
-    YarnDirections,
-    added,
-    shade_node,
-    yarn_layer,
-)
+from pipeline.analytic.soft_nodes.shade import Behind, GridHorizons, NodeFrame, Six, YarnDirections
 from pipeline.analytic.torus_frame import Fibre, bend, normal, tangent, turning
 from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
@@ -153,26 +145,17 @@ def _lit(
 
 @fast_kernel
 def shade_lines(
-    draft: Float32,
-    firsts: npt.NDArray[np.uint32],
-    rays: LineRays,
-    light: GridHorizons,
-    bent: Falls,
-    sharpness: np.float32,
-    d: YarnDirections,
-    yarn: Float32,
-    family: int,
-    thickness: np.float32,
-    behind: Behind,
+    draft: Float32, firsts: npt.NDArray[np.uint32], rays: LineRays, light: GridHorizons, bent: Falls,
+    sharpness: np.float32, d: YarnDirections, yarn: Float32, family: int, thickness: np.float32, behind: Behind,
     hidden_ends: bool = False,
-) -> Six:
+) -> Six:  # fmt: skip
     """Return the sums over drafted nodes of one family; `firsts` are the first cells of their grids.
 
     With the light behind, `light` has the horizons of the back. With `hidden_ends` the back then shows, at the rim
     where a float ends, the upright edge of a crossing yarn: light from the float's side does not reach it.
     """
     radius, fibre = yarn[RADIUS], Fibre(yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA])
-    layer = yarn_layer(yarn, thickness)
+    layer = shade.yarn_layer(yarn, thickness)
     size = light.size
     step_a, step_b = (1, size) if family == WARP else (size, 1)
     level, sharp = (d.iz if behind is None else -d.iz) * _LEVELS, sharpness / _LEVELS
@@ -186,5 +169,6 @@ def shade_lines(
             inwards = d.iy * draft[ROWS_PER, k]
             inwards = -inwards if at.row > np.float32(size) - near_end else (inwards if at.row < near_end else -_1)
             lit = _0 if inwards > _0 else lit
-        total = added(total, shade_node(d, at.frame, at.along, at.across, _1, lit, at.weight, layer, behind))
+        own = shade.shade_node(d, at.frame, at.along, at.across, _1, lit, at.weight, layer, behind)
+        total = shade.added(total, own)
     return total

@@ -18,28 +18,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.gauss_rules import Rule, gauss_rule, grid_edges, grid_middles, overlap
+from pipeline.analytic.gauss_rules import grid_middles
 from pipeline.analytic.soft_horizons import AZIMUTHS, CURVATURES, FALL, from_even, over_boxes
-from pipeline.analytic.soft_nodes.groups import (
-    COLUMNS,
-    DETAILS,
-    FLAT,
-    LARGEST_SINE,
-    USUAL,
-    PieceGroup,
-    gather,
-    piece_rows,
-)
-from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES, heights, rays_left, seen_areas
+from pipeline.analytic.soft_nodes.groups import COLUMNS, DETAILS, FLAT, USUAL, PieceGroup, gather, piece_rows
+from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES, Sample, heights, rays_left, seen_areas
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.cloth import ClothSide, cloth_side
-from pipeline.truth.geometry.heightfield import (
-    GAP,
-    RADIUS,
-    WARP,
-    WEFT,
-    HeightField,
-)  # fmt: skip
+from pipeline.truth.geometry.heightfield import GAP, RADIUS, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon_sines, horizons
 from pipeline.truth.geometry.pieces import CellPiece, cell_pieces, longest_period, orbits
 from pipeline.truth.options import TruthOptions
@@ -147,13 +132,9 @@ class SoftNodeTable(NamedTuple):
 
 
 def tabulate(
-    fabric: Fabric,
-    by_thread: bool = False,
-    behind: bool = False,
-    level: int = USUAL,
-    curved: bool = False,
+    fabric: Fabric, by_thread: bool = False, behind: bool = False, level: int = USUAL, curved: bool = False,
     rims: bool = True,
-) -> SoftNodeTable:
+) -> SoftNodeTable:  # fmt: skip
     """Build the table of a fabric's front, as the default model of the truth sees it.
 
     With `by_thread` every end and pick of the repeat has nodes of its own. With `behind` it knows light from behind,
@@ -169,7 +150,6 @@ def tabulate(
 
     # The nodes of every group, each kind in whole blocks.
     groups = gather(located.pieces, detail, by_thread)
-    rules = [_rules(group) for group in groups]
     starts, first_nodes, stop = [], [], 0
     kinds = (ends, picks) if by_thread else (1, 1)
     for kind in (*((WARP, end) for end in range(kinds[0])), *((WEFT, pick) for pick in range(kinds[1])), (GAP, 0)):
@@ -184,24 +164,23 @@ def tabulate(
     evenly, mean, variance = np.zeros(stop), np.zeros((AZIMUTHS, stop)), np.ones((AZIMUTHS, stop))
     behind_mean, behind_variance = (part[:, : stop if behind else 0].copy() for part in (mean, variance))
     falls = np.zeros((len(grid_falls), AZIMUTHS, stop))
-    for group, (across, along), start in zip(groups, rules, first_nodes, strict=True):
-        indices = _node_indices(group, across, start)
+    numbered = list(zip(groups, first_nodes, strict=True))
+    for group, start in numbered:
+        indices, (across, along) = _node_indices(group, start), group.rules
         nodes[:, indices] = piece_rows(front.yarn, group.piece, across, along)
         evenly[indices] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
-        mean[:, indices], variance[:, indices] = _soft_horizons(group, across, along, grid)
+        mean[:, indices], variance[:, indices] = _soft_horizons(group, grid)
         for of_nodes, of_grid in zip(falls, grid_falls, strict=True):
-            of_nodes[:, indices], _ = _soft_horizons(group, across, along, of_grid)
+            of_nodes[:, indices], _ = _soft_horizons(group, of_grid)
         if behind:
-            behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, across, along, behind_grid)
+            behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, behind_grid)
     behind_mean, behind_sharpness = _ramps(behind_mean, behind_variance)
     cell_groups: list[list[int]] = [[] for _ in range(ends * picks)]
     for index, group in enumerate(groups):
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    rays = _ray_columns(
-        model, located, grid, groups, rules, first_nodes, evenly, starts[-2] * BLOCK_NODES, rims, behind
-    )
+    rays = _ray_columns(model, located, grid, numbered, evenly, starts[-2] * BLOCK_NODES, rims, behind)
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
@@ -213,7 +192,7 @@ def tabulate(
         evenly=_in_blocks(evenly),
         mean=_in_blocks(mean),
         sharpness=_in_blocks(_sharpness(variance)),
-        groups=np.array([(k, g.lines, g.piece.family) for g, k in zip(groups, first_nodes, strict=True)], np.uint32),
+        groups=np.array([(k, group.lines, group.piece.family) for group, k in numbered], np.uint32),
         group_starts=np.concatenate([[0], np.cumsum([len(found) for found in cell_groups])]).astype(np.uint32),
         cell_groups=np.array([index for found in cell_groups for index in found], np.uint32),
         **_piece_columns(located),
@@ -249,17 +228,17 @@ def _horizon_grids(
 
 
 def _ray_columns(
-    model: ClothSide, located: _Located, grid: npt.NDArray[np.uint8], groups: list[PieceGroup],
-    rules: list[tuple[Rule, Rule]], first_nodes: list[int], evenly: Float64, gaps: int, rims: bool, behind: bool,
+    model: ClothSide, located: _Located, grid: npt.NDArray[np.uint8], numbered: list[tuple[PieceGroup, int]],
+    evenly: Float64, gaps: int, rims: bool, behind: bool,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return the columns of `SoftNodeTable` by which view rays meet heights."""
+    """Return the columns of `SoftNodeTable` by which view rays meet heights; groups come with their first node."""
     stop = len(evenly)
-    front, spots = model.front, _spots(model.front, groups, rules, first_nodes, stop)
+    front, spots = model.front, _spots(model.front, numbered, stop)
     shown = spots[:, 3][spots[:, 2] > 0.0]
     areas, ends = np.zeros((2, AZIMUTHS, SEEN_ANGLES, stop))
-    of_groups = seen_areas(front, located.samples, grid, list(zip(groups, rules, strict=True)), rims)
-    for group, (across, _), first, own in zip(groups, rules, first_nodes, of_groups, strict=True):
-        indices = _node_indices(group, across, first)
+    of_groups = seen_areas(front, located.samples, grid, [group for group, _ in numbered], rims)
+    for (group, first), own in zip(numbered, of_groups, strict=True):
+        indices = _node_indices(group, first)
         areas[..., indices], ends[..., indices] = own
     dark = LEVELS * (1.0 if front.yarn[:, RADIUS].min() >= 0.5 else _DARK_BESIDE_GAPS)
     shares = np.rint(dark * ends / np.maximum(areas, _LEAST_AREA))[: AZIMUTHS if behind and rims else 0]
@@ -279,18 +258,17 @@ def _ray_columns(
     }
 
 
-def _node_indices(group: PieceGroup, across: Rule, first: int) -> Index:
+def _node_indices(group: PieceGroup, first: int) -> Index:
     """Return which nodes are those of a group, given its first one."""
-    return (first + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(across.places)].ravel()
+    return (first + np.arange(group.nodes)).reshape(group.lines, COLUMNS)[:, : len(group.rules[0].places)].ravel()
 
 
-def _spots(
-    front: HeightField, groups: list[PieceGroup], rules: list[tuple[Rule, Rule]], first_nodes: list[int], stop: int
-) -> Float32:
+def _spots(front: HeightField, numbered: list[tuple[PieceGroup, int]], stop: int) -> Float32:
     """Return place in the cell, share of the cell and height of all nodes, (lines, 4, COLUMNS)."""
     spots = np.zeros((stop // COLUMNS, 4, COLUMNS), np.float32)
-    for group, (across, along), first in zip(groups, rules, first_nodes, strict=True):
-        (end, pick), piece, own = group.cells[0], group.piece, spots[first // COLUMNS :][: group.lines]
+    for group, first in numbered:
+        (across, along), (end, pick), piece = group.rules, group.cells[0], group.piece
+        own = spots[first // COLUMNS :][: group.lines]
         own, extents = own[:, :, : len(across.places)], (across.places, along.places[:, None])
         own[:, 0], own[:, 1] = extents if piece.family != WEFT else extents[::-1]
         own[:, 2] = np.outer(along.weights, across.weights)
@@ -306,11 +284,11 @@ def _in_blocks(values: Float64) -> Float32:
 
 
 def tabulate_pieces(model: ClothSide, size: int) -> dict[str, Any]:
-    """Return the columns of `SoftNodeTable` about pieces, of one side of a cloth: grids have `size` cells a side."""
+    """Return the columns of `SoftNodeTable` about pieces of one side of a cloth, the grid flat, `size` cells a side."""
     located = _locate(model.front)
     x, y, gap = _grid_places(located.samples, size)
     grid = _grids(horizon_sines(model.front, model.back, x, y, gap, 2 * AZIMUTHS), size)
-    return _piece_columns(located) | {"grid": grid}
+    return _piece_columns(located) | {"grid": grid.ravel()}
 
 
 class _Located(NamedTuple):
@@ -318,7 +296,7 @@ class _Located(NamedTuple):
 
     pieces: list[tuple[tuple[int, int], CellPiece, int]]
     starts: list[int]
-    samples: list[tuple[int, int, CellPiece]]
+    samples: list[Sample]
 
 
 def _locate(front: HeightField) -> _Located:
@@ -339,10 +317,11 @@ def _locate(front: HeightField) -> _Located:
 
 def _piece_columns(located: _Located) -> dict[str, Any]:
     """Return the columns of `SoftNodeTable` about pieces."""
+    bounds = [(*p.box[0], *p.box[1], p.offset, p.sign * p.curve, p.steepest) for _, p, _ in located.pieces]
     return {
         "piece_starts": np.array(located.starts, np.int64),
         "pieces": np.array([(piece.family, block) for _, piece, block in located.pieces], np.int64),
-        "bounds": np.array([_bounds(piece) for _, piece, _ in located.pieces], np.float32),
+        "bounds": np.array(bounds, np.float32),
     }
 
 
@@ -370,19 +349,7 @@ def _ramps(mean: Float64, variance: Float64) -> tuple[Float64, Float64]:
     return np.where(line & ~inside, of_line, np.where(mean > 0.5, 1.0 - middle, middle)), sharpness
 
 
-def _rules(group: PieceGroup) -> tuple[Rule, Rule]:
-    """Return the nodes of a group across and along."""
-    piece = group.piece
-    columns = group.lines if piece.family == GAP else COLUMNS
-    return gauss_rule(*piece.across, columns, piece.radius), gauss_rule(*piece.along, group.lines, 0.0)
-
-
-def _bounds(piece: CellPiece) -> tuple[float, ...]:
-    x, y = piece.box
-    return (*x, *y, piece.offset, piece.sign * piece.curve, min(piece.steepest, LARGEST_SINE))
-
-
-def _grid_places(samples: list[tuple[int, int, CellPiece]], size: int) -> tuple[Float64, Float64, Mask]:
+def _grid_places(samples: list[Sample], size: int) -> tuple[Float64, Float64, Mask]:
     """Return the middles of the cells of all grids of pieces, given with pick and end, and which lie in gaps."""
     xs, ys, gaps = [], [], []
     for pick, end, piece in samples:
@@ -399,14 +366,10 @@ def _grids(sines: Float64, size: int) -> npt.NDArray[np.uint8]:
     return np.ascontiguousarray(np.rint(LEVELS * grids), np.uint8)
 
 
-def _soft_horizons(
-    group: PieceGroup, across: Rule, along: Rule, grid: npt.NDArray[np.uint8]
-) -> tuple[Float64, Float64]:
+def _soft_horizons(group: PieceGroup, grid: npt.NDArray[np.uint8]) -> tuple[Float64, Float64]:
     """Return mean and variance of the horizon over each node's box and all cells of a group, (AZIMUTHS, nodes)."""
-    piece, size = group.piece, grid.shape[-1]
-    of_across = overlap(across.borders, grid_edges(*piece.across, size, piece.radius))
-    of_along = overlap(along.borders, grid_edges(*piece.along, size, 0.0))
+    of_across, of_along = group.overlaps(grid.shape[-1])
     blocks, counts = np.unique(group.blocks, return_counts=True)
-    values = (grid[blocks].transpose(0, 1, 3, 2) if piece.family == WEFT else grid[blocks]) / LEVELS
+    values = (grid[blocks].transpose(0, 1, 3, 2) if group.piece.family == WEFT else grid[blocks]) / LEVELS
     share = (counts / counts.sum())[:, None, None, None]
     return over_boxes((share * values).sum(axis=0), (share * values**2).sum(axis=0), of_along, of_across)

@@ -18,29 +18,21 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.analytic.gauss_rules import Rule, grid_edges, overlap
+from pipeline.analytic.gauss_rules import grid_edges
 from pipeline.analytic.soft_horizons import AZIMUTHS, azimuth_at
 from pipeline.analytic.soft_nodes.groups import PieceGroup
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_kernel
-from pipeline.truth.geometry.heightfield import (
-    GAP,
-    OFFSET,
-    TOP,
-    UNDER,
-    WARP,
-    WEFT,
-    HeightField,
-    height_beneath,
-    local_position,
-    surface_at,
-    torus_height,
-)
+from pipeline.truth.geometry import heightfield
+from pipeline.truth.geometry.heightfield import GAP, OFFSET, TOP, UNDER, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon
 from pipeline.truth.geometry.pieces import CellPiece
 
 SEEN_ANGLES: Final = 18
 """Angles of the viewer to the normal, 0 to 90 degrees, even in their power 3/2: finer where less is seen."""
+
+Sample = tuple[int, int, CellPiece]
+"""A piece that has a grid of horizons, with its pick and end."""
 
 _WALL_HEIGHTS, _WALL_PLACES = 3, 8  # points of a wall, upwards and along
 _RAMP = 0.02  # of the sine of a cell's horizon
@@ -60,24 +52,17 @@ def _directions() -> Float64:
 
 
 def seen_areas(
-    front: HeightField,
-    samples: list[tuple[int, int, CellPiece]],
-    grid: npt.NDArray[np.uint8],
-    groups: list[tuple[PieceGroup, tuple[Rule, Rule]]],
-    rims: bool,
+    front: HeightField, samples: list[Sample], grid: npt.NDArray[np.uint8], groups: list[PieceGroup], rims: bool
 ) -> Iterator[Float64]:
     """Yield the areas of each group's nodes, and of the walls where floats end in them, (2, azimuths, angles, nodes).
 
-    `samples` are the pieces of all grids, each with its pick and end, and `grid` their horizons, (grids, AZIMUTHS,
-    cells along y, cells along x); `groups` come with their rules, and their `blocks` are numbers of grids. Walls count
-    if `rims`.
+    `grid` are the horizons of the `samples`, (grids, AZIMUTHS, cells along y, cells along x); the `blocks` of the
+    groups are numbers of grids. Walls count if `rims`.
     """
     towards = _directions()
     of_grids = [_areas_of(front, sample, own, towards, rims) for sample, own in zip(samples, grid, strict=True)]
-    for group, (across, along) in groups:
-        piece, size = group.piece, grid.shape[-1]
-        of_across = overlap(across.borders, grid_edges(*piece.across, size, piece.radius))
-        of_along = overlap(along.borders, grid_edges(*piece.along, size, 0.0))
+    for group in groups:
+        of_across, of_along = group.overlaps(grid.shape[-1])
         blocks, counts = np.unique(group.blocks, return_counts=True)
         mean = sum(count * of_grids[block] for block, count in zip(blocks, counts, strict=True)) / counts.sum()
         yield (of_along @ mean @ of_across.T).reshape(2, SEEN_ANGLES, AZIMUTHS, -1).swapaxes(1, 2)
@@ -93,9 +78,7 @@ def rays_left(shares: Float64, gaps: int) -> Float64:
     return np.asarray((rise - free) / np.maximum(yarns, 1e-9))
 
 
-def _areas_of(
-    front: HeightField, sample: tuple[int, int, CellPiece], grid: npt.NDArray[np.uint8], towards: Float64, rims: bool
-) -> Float64:
+def _areas_of(front: HeightField, sample: Sample, grid: npt.NDArray[np.uint8], towards: Float64, rims: bool) -> Float64:
     """Return areas of a grid's cells and of the walls where its float ends, (2, angles, azimuths, along, across)."""
     pick, end, piece = sample
     size = grid.shape[-1]
@@ -126,14 +109,17 @@ def heights(
     for j in range(len(along)):
         for i in range(len(across)):
             x, y = (across[i], along[j]) if family == WARP else (along[j], across[i])
-            a, b = local_position(family, own[OFFSET], x + end, y + pick, end, pick)
-            height[j, i] = torus_height(yarn, own, a, b)[0] if side == TOP else height_beneath(yarn, own, a, b)[0]
+            a, b = heightfield.local_position(family, own[OFFSET], x + end, y + pick, end, pick)
+            if side == TOP:
+                height[j, i], _, _ = heightfield.torus_height(yarn, own, a, b)
+            else:
+                height[j, i], _, _ = heightfield.height_beneath(yarn, own, a, b)
     return height
 
 
 def _add_walls(
-    front: HeightField, sample: tuple[int, int, CellPiece], height: Float64, across: Float64, along: Float64,
-    area: Float64, ends: Float64, towards: Float64,
+    front: HeightField, sample: Sample, height: Float64, across: Float64, along: Float64, area: Float64, ends: Float64,
+    towards: Float64,
 ) -> None:  # fmt: skip
     """Add the walls below a piece's borders to the areas of the cells there; where its float ends, to `ends` too."""
     pick, end, piece = sample
@@ -168,15 +154,12 @@ def _add_walls(
 def _wall_horizons(
     front: HeightField, x: Float64, y: Float64, dx: float, dy: float, rim: Float64, azimuths: Float64
 ) -> tuple[Float64, Float64]:
-    """Return the height of the wall at each place of a border, and horizons at its points, as sines.
-
-    Shapes (places,) and (azimuths, places, heights).
-    """
+    """Return heights of the wall at places of a border, (P,), and sines of horizons, (azimuths, P, heights)."""
     picks, ends = front.top.shape
     height, sines = np.zeros(len(x)), np.ones((len(azimuths), len(x), _WALL_HEIGHTS))
     for k in range(len(x)):
         out_x, out_y = (x[k] + _OUTSIDE * dx) % ends, (y[k] + _OUTSIDE * dy) % picks
-        _, _, foot, _, _, _, _, _, _ = surface_at(front, out_x, out_y, int(out_x), int(out_y))
+        _, _, foot, _, _, _, _, _, _ = heightfield.surface_at(front, out_x, out_y, int(out_x), int(out_y))
         if rim[k] - foot < _LEAST_WALL:
             continue
         height[k] = rim[k] - foot

@@ -132,10 +132,7 @@ def directions(
 def _flakes(
     d: YarnDirections, h: np.float32, along: np.float32, across: np.float32, square: np.float32, scale: np.float32
 ) -> np.float32:
-    """Return a quarter of the flakes' density, mean of four places; `h` is the half vector's cosine with the tangent.
-
-    `along`, `across`: by how much that cosine changes to the four places.
-    """
+    """Return a quarter of the flakes' density, mean of four places, `along` and `across` from h.t in this cosine."""
     e, f = along + across, along - across
     q0, q1 = spread(h - e, d.size, square), spread(h - f, d.size, square)
     q2, q3 = spread(h + f, d.size, square), spread(h + e, d.size, square)
@@ -146,17 +143,9 @@ def _flakes(
 
 @inlined_fast_kernel
 def shade_node(
-    d: YarnDirections,
-    at: NodeFrame,
-    along: np.float32,
-    across: np.float32,
-    seen: np.float32,
-    lit: np.float32,
-    weight: np.float32,
-    layer: YarnLayer,
-    behind: Behind = None,
-    least: np.float32 = _0,
-) -> Six:
+    d: YarnDirections, at: NodeFrame, along: np.float32, across: np.float32, seen: np.float32, lit: np.float32,
+    weight: np.float32, layer: YarnLayer, behind: Behind = None, least: np.float32 = _0,
+) -> Six:  # fmt: skip
     """Return a node's shares of the sums; `along`, `across` as for `_flakes`.
 
     A node that faces away from the viewer has the cosine `least` to it. Of `seen`, what exceeds 1 are walls, which are

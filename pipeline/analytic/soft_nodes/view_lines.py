@@ -15,59 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import AZIMUTHS, above, bend_of, ramp, sharpness_of_points
-from pipeline.analytic.soft_nodes.cuts import NEAREST, in_grid, next_cut, piece_at
-from pipeline.analytic.soft_nodes.line_nodes import (
-    ACROSS,
-    ALONG_FROM,
-    APART,
-    AT,
-    BENDING,
-    BY_ACROSS,
-    BY_ALONG,
-    DENSITY,
-    FLOAT_BEND,
-    FLOAT_DROP,
-    FLOAT_HALF,
-    LENGTH,
-    ROWS_FROM,
-    ROWS_PER,
-    STEEPEST_SINE,
-    LineRays,
-    shade_lines,
-)
-from pipeline.analytic.soft_nodes.nodes import (
-    BLOCK,
-    BLOCK_NODES,
-    BOUND,
-    CURVE,
-    FAMILY,
-    LEVELS,
-    SHIFT,
-    X_HIGH,
-    X_LOW,
-    Y_HIGH,
-    Y_LOW,
-    SoftNodeTable,
-)
+from pipeline.analytic.soft_nodes import line_nodes, nodes, view_rays
+from pipeline.analytic.soft_nodes.line_nodes import LineRays, shade_lines
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, LEVELS, X_HIGH, X_LOW, Y_HIGH, Y_LOW, SoftNodeTable
 from pipeline.analytic.soft_nodes.scratch import DRAFT_ROWS, Scratch, SoftQuery
 from pipeline.analytic.soft_nodes.shade import GridHorizons, directions, write_sums
-from pipeline.analytic.soft_nodes.view_rays import (
-    FOOTPRINT_ENDS,
-    NEVER,
-    ViewRay,
-    YarnCurve,
-    curve_of,
-    place_of,
-    reached,
-    rising_crest,
-    rising_interval,
-    seen_at,
-    seen_interval,
-    seen_rising,
-    sunk,
-)
+from pipeline.analytic.soft_nodes.view_rays import FOOTPRINT_ENDS, NEAREST, NEVER, ViewRay, YarnCurve
 from pipeline.compiled.arrays import Float32, Float64
-from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel
 from pipeline.compiled.float32 import arcsine
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, WARP, WEFT
 
@@ -98,8 +53,8 @@ def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float, spa
     widest = math.sqrt(max(deviation_x**2 + deviation_y**2 - narrowest**2, narrowest**2))
     # Parts between borders of yarns, and rims, have a node more than their length takes.
     lines = 3.0 + 2.0 * FOOTPRINT_ENDS * (1.0 / (_COARSEST * spacing) + narrowest * (1.0 / (_BETWEEN * spacing) + 1.0))
-    nodes = 3.0 + 2.0 * FOOTPRINT_ENDS * (1.0 / (_DEVIATIONS * spacing) + widest * (1.0 / (_LENGTH * spacing) + 2.0))
-    return lines * nodes
+    each = 3.0 + 2.0 * FOOTPRINT_ENDS * (1.0 / (_DEVIATIONS * spacing) + widest * (1.0 / (_LENGTH * spacing) + 2.0))
+    return lines * each
 
 
 @fast_kernel
@@ -107,10 +62,7 @@ def _lines_across(
     ray: ViewRay, x: float, y: float, sigma: float, radii: tuple[float, float], reach: float, spacing: float,
     lines: Float64,
 ) -> int:  # fmt: skip
-    """Write places of lines across the azimuth and the widths that they stand for, (2, most); return their number.
-
-    Lines that run along yarns have places by Gauss's rule between the borders of yarns.
-    """
+    """Write places of lines across the azimuth and the widths that they stand for, (2, most); return their number."""
     along_x = abs(ray.dy) < abs(ray.dx)
     distance = spacing * min(_BETWEEN, _COARSEST * sigma)
     if reach * min(abs(ray.dx), abs(ray.dy)) >= _SMEARED:
@@ -119,11 +71,11 @@ def _lines_across(
         for j in range(2 * count + 1):
             lines[0, j], lines[1, j] = (j - count) * apart, apart
         return 2 * count + 1
-    # At w across the azimuth the line has x = x - w dy, or y = y + w dx.
+    # Along yarns, by Gauss's rule between borders. At w across the azimuth the line has x - w dy, or y + w dx.
     centre, factor, radius = (y, ray.dx, radii[WEFT]) if along_x else (x, -ray.dy, radii[WARP])
     place, stop, n = centre - FOOTPRINT_ENDS * sigma, centre + FOOTPRINT_ENDS * sigma, 0
     while place < stop - NEAREST and n < lines.shape[1] - MOST_GAUSS:
-        after = min(next_cut(place, True, radius), stop)
+        after = min(view_rays.next_cut(place, True, radius), stop)
         half, middle = 0.5 * (after - place), 0.5 * (after + place)
         # Widths of yarns are round numbers, and so may be the quotient: it must not fall below.
         count = min(1 + int((2.0 * half + NEAREST) / distance), MOST_GAUSS)
@@ -148,6 +100,16 @@ class ViewLine(NamedTuple):
     """That width."""
 
 
+class Piece(NamedTuple):
+    """A piece along a line: its curve, row of `SoftNodeTable.bounds`, family, first cell of its grid and its size."""
+
+    curve: YarnCurve
+    bounds: Float32
+    family: int
+    first: int
+    size: int
+
+
 # Eight statements in place of a loop: they become one instruction, which a loop over arrays that may overlap does not.
 @inlined_fast_kernel
 def _write_eight(row: Float32, k: int, values: Float32) -> None:
@@ -169,13 +131,10 @@ def _fill_eight(row: Float32, k: int, value: np.float32) -> None:
 
 @inlined_fast_kernel
 def _write_draft(
-    draft: Float32, k: int, start: float, stop: float, count: int, curve: YarnCurve, of_line: ViewLine, bounds: Float32,
-    family: int, size: int, line: Float32,
-) -> None:  # fmt: skip
-    """Write the nodes of an interval from `k` on: even along the line, or in the angle across the yarn.
-
-    An interval of no length is a rim, whose density is its whole weight.
-    """
+    scratch: Scratch, kind: int, k: int, start: float, stop: float, count: int, piece: Piece, of_line: ViewLine
+) -> None:
+    """Write the nodes of an interval from `k` on; one of no length is a rim, whose density is its whole weight."""
+    draft, line, curve, bounds = scratch.drafts[kind], scratch.line, piece.curve, piece.bounds
     turned = abs(curve.by_across) * (stop - start) > _STEEP * curve.radius
     first, last = np.float32(start), np.float32(stop)
     if turned:
@@ -185,33 +144,25 @@ def _write_draft(
     extent = abs(half) if turned else -abs(half)
     for i in range(8):
         line[0, i], line[1, i] = middle + half * GAUSS_PLACES[count, i], extent * GAUSS_WEIGHTS[count, i]
-    _write_eight(draft[AT], k, line[0])
-    _write_eight(draft[LENGTH], k, line[1])
-    _fill_eight(draft[ACROSS], k, np.float32(curve.across))
-    _fill_eight(draft[BY_ACROSS], k, np.float32(curve.by_across))
-    _fill_eight(draft[ALONG_FROM], k, np.float32(curve.along))
-    _fill_eight(draft[BY_ALONG], k, np.float32(curve.by_along))
-    _fill_eight(draft[DENSITY], k, np.float32(of_line.density))
-    _fill_eight(draft[APART], k, np.float32(of_line.apart))
-    _fill_eight(draft[FLOAT_BEND], k, np.float32(curve.side * curve.bend))
-    _fill_eight(draft[FLOAT_HALF], k, np.float32(curve.half) if curve.bend > 0.0 else _0)
-    _fill_eight(draft[FLOAT_DROP], k, np.float32(curve.drop))
-    _fill_eight(draft[BENDING], k, bounds[CURVE])
-    _fill_eight(draft[STEEPEST_SINE], k, bounds[BOUND])
-    low, high = (bounds[Y_LOW], bounds[Y_HIGH]) if family == WARP else (bounds[X_LOW], bounds[X_HIGH])
-    rows = np.float32(size) / (high - low)
-    _fill_eight(draft[ROWS_FROM], k, (_HALF - bounds[SHIFT] - low) * rows)
-    _fill_eight(draft[ROWS_PER], k, rows if family == WARP else -rows)
-
-
-class Piece(NamedTuple):
-    """A piece along a line: its curve, row of `SoftNodeTable.bounds`, family, first cell of its grid and its size."""
-
-    curve: YarnCurve
-    bounds: Float32
-    family: int
-    first: int
-    size: int
+    _write_eight(draft[line_nodes.AT], k, line[0])
+    _write_eight(draft[line_nodes.LENGTH], k, line[1])
+    _fill_eight(draft[line_nodes.ACROSS], k, np.float32(curve.across))
+    _fill_eight(draft[line_nodes.BY_ACROSS], k, np.float32(curve.by_across))
+    _fill_eight(draft[line_nodes.ALONG_FROM], k, np.float32(curve.along))
+    _fill_eight(draft[line_nodes.BY_ALONG], k, np.float32(curve.by_along))
+    _fill_eight(draft[line_nodes.DENSITY], k, np.float32(of_line.density))
+    _fill_eight(draft[line_nodes.APART], k, np.float32(of_line.apart))
+    _fill_eight(draft[line_nodes.FLOAT_BEND], k, np.float32(curve.side * curve.bend))
+    _fill_eight(draft[line_nodes.FLOAT_HALF], k, np.float32(curve.half) if curve.bend > 0.0 else _0)
+    _fill_eight(draft[line_nodes.FLOAT_DROP], k, np.float32(curve.drop))
+    _fill_eight(draft[line_nodes.BENDING], k, bounds[nodes.CURVE])
+    _fill_eight(draft[line_nodes.STEEPEST_SINE], k, bounds[nodes.BOUND])
+    low, high = (bounds[Y_LOW], bounds[Y_HIGH]) if piece.family == WARP else (bounds[X_LOW], bounds[X_HIGH])
+    rows = np.float32(piece.size) / (high - low)
+    _fill_eight(draft[line_nodes.ROWS_FROM], k, (_HALF - bounds[nodes.SHIFT] - low) * rows)
+    _fill_eight(draft[line_nodes.ROWS_PER], k, rows if piece.family == WARP else -rows)
+    for i in range(8):
+        scratch.firsts[kind, k + i] = piece.first
 
 
 @fast_kernel
@@ -219,28 +170,21 @@ def _write_meetings(
     scratch: Scratch, kind: int, k: int, ray: ViewRay, of_line: ViewLine, piece: Piece, start: float, stop: float,
     rising: bool,
 ) -> int:  # fmt: skip
-    """Write the nodes of an interval from `k` on, even in the place where they are seen; return where they end.
-
-    Where rays turn they see an endless length of a small piece: places along the line would be far apart there.
-    """
-    ends = seen_rising(piece.curve, ray, start)[0], seen_rising(piece.curve, ray, stop)[0]
+    """Write the nodes of an interval from `k` on, even in the place where they are seen; return where they end."""
+    # Where rays turn they see an endless length of a small piece: places along the line would be far apart there.
+    ends = view_rays.seen_rising(piece.curve, ray, start)[0], view_rays.seen_rising(piece.curve, ray, stop)[0]
     if not rising:
-        ends = seen_at(piece.curve, ray, start)[0], seen_at(piece.curve, ray, stop)[0]
+        ends = view_rays.seen_at(piece.curve, ray, start)[0], view_rays.seen_at(piece.curve, ray, stop)[0]
     half, middle, sigma = 0.5 * abs(ends[1] - ends[0]), 0.5 * (ends[0] + ends[1]), of_line.sigma
     count = min(1 + int(2.0 * half / (_DEVIATIONS * sigma)), MOST_GAUSS)
     if stop <= start or half <= NEAREST or k + count > scratch.drafts.shape[2] - 2 * BLOCK_NODES:
         return k
-    draft = scratch.drafts[kind]
     for i in range(count):
         q = middle + half * GAUSS_PLACES[count, i]
         share = of_line.density * half * GAUSS_WEIGHTS[count, i] * math.exp(-0.5 * (q / sigma) ** 2)
-        s = place_of(piece.curve, ray, start, stop, q, rising)
+        s = view_rays.place_of(piece.curve, ray, start, stop, q, rising)
         of_node = ViewLine(of_line.x, of_line.y, share, sigma, of_line.apart)
-        _write_draft(
-            draft, k + i, s, s, 1, piece.curve, of_node, piece.bounds, piece.family, piece.size, scratch.line
-        )  # fmt: skip
-        for j in range(8):
-            scratch.firsts[kind, k + i + j] = piece.first
+        _write_draft(scratch, kind, k + i, s, s, 1, piece, of_node)
     return k + count
 
 
@@ -250,7 +194,7 @@ def _fill_block(draft: Float32, firsts: npt.NDArray[np.uint32], stop: int) -> in
     for k in (stop, stop + 8):
         for row in range(DRAFT_ROWS):
             _fill_eight(draft[row], k, draft[row, stop - 1])
-        _fill_eight(draft[DENSITY], k, _0)
+        _fill_eight(draft[line_nodes.DENSITY], k, _0)
         for i in range(8):
             firsts[k + i] = firsts[stop - 1]
     return -(-stop // BLOCK_NODES) * BLOCK_NODES
@@ -280,13 +224,13 @@ def _place_line(
     of_warp, of_weft, stops = table.kinds[0], table.kinds[1], scratch.stops
     warp_radius, weft_radius = table.heights[WARP, RADIUS], table.heights[WEFT, RADIUS]
     x0, y0, ex, ey, sigma = view_line.x, view_line.y, ray.dx, ray.dy, view_line.sigma
-    of_gap, gaps, covered, limit = sunk(ray, 0.0)[0], 0.0, NEVER, scratch.drafts.shape[2] - 2 * BLOCK_NODES
+    of_gap, gaps, covered, limit = view_rays.sunk(ray, 0.0)[0], 0.0, NEVER, scratch.drafts.shape[2] - 2 * BLOCK_NODES
     stopped, slit_from, slit_to = 0.0, 0.0, 0.0
     left, right = -FOOTPRINT_ENDS * sigma, FOOTPRINT_ENDS * sigma
-    low = right + sunk(ray, table.highest)[0]
-    rising, lowest = ray.least > table.lowest, sunk(ray, max(ray.least, table.lowest))[0]
+    low = right + view_rays.sunk(ray, table.highest)[0]
+    rising, lowest = ray.least > table.lowest, view_rays.sunk(ray, max(ray.least, table.lowest))[0]
     if rising:
-        lowest = sunk(ray, table.highest)[0] - 2.0 * math.sqrt(
+        lowest = view_rays.sunk(ray, table.highest)[0] - 2.0 * math.sqrt(
             max(1.0 + 2.0 * ray.bend * ray.run * ray.run * (table.highest - ray.plane), 0.0)
         ) / (ray.bend * ray.run)  # fmt: skip
     last = max(left + lowest, low - _FARTHEST)
@@ -294,18 +238,18 @@ def _place_line(
         # The next cut on the way from the viewer.
         high, low = low, last
         if abs(ex) > NEAREST:
-            low = max(low, min((next_cut(x0 + high * ex, ex < 0.0, warp_radius) - x0) / ex, high - NEAREST))
+            low = max(low, min((view_rays.next_cut(x0 + high * ex, ex < 0.0, warp_radius) - x0) / ex, high - NEAREST))
         if abs(ey) > NEAREST:
-            low = max(low, min((next_cut(y0 + high * ey, ey < 0.0, weft_radius) - y0) / ey, high - NEAREST))
+            low = max(low, min((view_rays.next_cut(y0 + high * ey, ey < 0.0, weft_radius) - y0) / ey, high - NEAREST))
         in_x, in_y = x0 + 0.5 * (low + high) * ex, y0 + 0.5 * (low + high) * ey
         column, row = math.floor(in_x), math.floor(in_y)
         # Of whole numbers: a quotient of floats is rounded, and integer division is slow.
         repeats_x, repeats_y = math.floor((column + 0.5) * per_ends), math.floor((row + 0.5) * per_picks)
         cell = int((row - picks * repeats_y) * ends + column - ends * repeats_x)
-        p = piece_at(table.piece_starts, table.bounds, cell, np.float32(in_x - column), np.float32(in_y - row))
+        p = view_rays.piece_at(table, cell, np.float32(in_x - column), np.float32(in_y - row))
         if p < 0 or high - low < 2.0 * NEAREST:
             continue
-        family, first, bounds = table.pieces[p, FAMILY], table.pieces[p, BLOCK] * per_grid, table.bounds[p]
+        family, first, bounds = table.pieces[p, nodes.FAMILY], table.pieces[p, nodes.BLOCK] * per_grid, table.bounds[p]
         if family == GAP:
             q_low, q_high = max(low - of_gap, left), min(high - of_gap, right, covered)
             covered = min(covered, low - of_gap)
@@ -313,47 +257,44 @@ def _place_line(
                 q = 0.5 * (q_low + q_high)
                 share = view_line.density * (q_high - q_low) * math.exp(-0.5 * (q / sigma) ** 2)
                 at_x, at_y = np.float32(x0 + (q + of_gap) * ex - column), np.float32(y0 + (q + of_gap) * ey - row)
-                at = first + in_grid(bounds, family, _HALF, at_x, at_y, size)
+                at = first + view_rays.in_grid(bounds, family, _HALF, at_x, at_y, size)
                 through = float(_gap_seen(scratch, look, at, size * size))
                 gaps += share * through
                 stopped += share * (1.0 - through)
             continue
-        if low - sunk(ray, table.crowns[p])[0] >= min(covered, right):
+        if low - view_rays.sunk(ray, table.crowns[p])[0] >= min(covered, right):
             continue
-        curve = curve_of(table, p, ray, x0 - column, y0 - row)
-        wall_to, reached_to, before = min(covered, right), high, covered
-        reached_from = low
+        curve = view_rays.curve_of(table, p, ray, x0 - column, y0 - row)
+        piece = Piece(curve, bounds, family, first, size)
+        wall_to, begin, end, before = min(covered, right), low, high, covered
         if rising:
-            reached_from, reached_to = reached(curve, ray, low, high)
-            if reached_to <= reached_from:
+            begin, end = view_rays.reached(curve, ray, low, high)
+            if end <= begin:
                 continue
-            wall_to = min(wall_to, seen_rising(curve, ray, high)[0]) if reached_to == high else -NEVER
-        start, stop, seen, covered, wall_from = seen_interval(curve, ray, reached_from, reached_to, sigma, covered)
+            wall_to = min(wall_to, view_rays.seen_rising(curve, ray, high)[0]) if end == high else -NEVER
+        start, stop, seen, covered, wall_from = view_rays.seen_interval(curve, ray, begin, end, sigma, covered)
         kind = column % of_warp if family == WARP else of_warp + row % of_weft
         k, wall_from = stops[kind], max(wall_from, left)
         if table.rims and wall_to - wall_from > NEAREST and k < limit:
             rim = stopped + view_line.density * _under_bell(wall_from / sigma, wall_to / sigma) * sigma
             of_rim, stopped = ViewLine(x0, y0, rim, sigma, view_line.apart), 0.0
-            _write_draft(
-                scratch.drafts[kind], k, high, high, 1, curve, of_rim, bounds, family, size, scratch.line
-            )  # fmt: skip
-            for i in range(8):
-                scratch.firsts[kind, k + i] = first
+            _write_draft(scratch, kind, k, high, high, 1, piece, of_rim)
             k += 1
             stops[kind] = k
         if rising:
-            of_piece = Piece(curve, bounds, family, first, size)
-            k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, False)
-            crest = rising_crest(curve, ray, reached_from, reached_to)
-            start, stop = rising_interval(curve, ray, crest, reached_to, left, min(before, right))
-            k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, True)
+            k = _write_meetings(scratch, kind, k, ray, view_line, piece, start, stop, False)
+            crest = view_rays.rising_crest(curve, ray, begin, end)
+            start, stop = view_rays.rising_interval(curve, ray, crest, end, left, min(before, right))
+            k = _write_meetings(scratch, kind, k, ray, view_line, piece, start, stop, True)
             # Of rays that cleared the last piece, this one stops some, or it opens a new slit above it.
-            cleared = max(seen_rising(curve, ray, crest)[0], seen_at(curve, ray, reached_to)[0])
+            cleared = max(view_rays.seen_rising(curve, ray, crest)[0], view_rays.seen_at(curve, ray, end)[0])
             if cleared < before:
                 slit_from, slit_to = cleared, before
             elif slit_to > slit_from:
-                start, stop = rising_interval(curve, ray, crest, reached_to, max(slit_from, left), min(slit_to, right))
-                k = _write_meetings(scratch, kind, k, ray, view_line, of_piece, start, stop, True)
+                start, stop = view_rays.rising_interval(
+                    curve, ray, crest, end, max(slit_from, left), min(slit_to, right)
+                )
+                k = _write_meetings(scratch, kind, k, ray, view_line, piece, start, stop, True)
                 slit_from = max(slit_from, cleared)
             stops[kind] = k
             continue
@@ -361,22 +302,15 @@ def _place_line(
             continue
         count = 1 + int(max((stop - start + NEAREST) / _LENGTH, seen / (_DEVIATIONS * sigma)) / table.spacing)
         count = min(count, MOST_GAUSS)
-        _write_draft(
-            scratch.drafts[kind], k, start, stop, count, curve, view_line, bounds, family, size, scratch.line
-        )  # fmt: skip
-        for i in range(8):
-            scratch.firsts[kind, k + i] = first
+        _write_draft(scratch, kind, k, start, stop, count, piece, view_line)
         stops[kind] = k + count
     return gaps
 
 
 @inlined_fast_kernel
 def _place(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay) -> tuple[np.float32, np.float32]:
-    """Place the nodes of a footprint of rays; return the area seen through gaps, and 1 / deviation along lines.
-
-    Writes `Scratch.drafts` and `Scratch.firsts`, whole blocks of each kind of yarn, and in `Scratch.stops` how many.
-    Weights are shares of the footprint in the fabric plane, which A(wo) turns into shares of its rays.
-    """
+    """Place the nodes of a footprint of rays; return the area seen through gaps, and 1 / deviation along lines."""
+    # Weights are shares of the footprint in the fabric plane, which A(wo) turns into shares of its rays.
     scratch.stops[:] = 0
     xx, yy, xy = look.dx * look.dx, look.dy * look.dy, look.rho * look.dx * look.dy
     ex, ey, lines, gaps = ray.dx, ray.dy, scratch.view_lines, 0.0
@@ -397,13 +331,6 @@ def _place(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay
     return np.float32(gaps) * look.oz, np.float32(1.0 / sigma)
 
 
-@kernel
-def _offsets(table: SoftNodeTable, low: int, high: int) -> tuple[np.uint32, np.uint32]:
-    """Return what leads from a node's cell to its horizons at two azimuths."""
-    per_azimuth = table.grid.shape[2] * table.grid.shape[3]
-    return np.uint32(low * per_azimuth), np.uint32(high * per_azimuth)
-
-
 @inlined_kernel
 def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: Float32) -> np.float32:
     """Write the sums of a footprint of view rays (K, NODE_SUMS), and return the area seen through gaps."""
@@ -418,7 +345,8 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
     rays = LineRays(run, np.float32(table.plane), np.float32(2.0) * look.bend_o * run * run, inverse)
     back, of_warp, size = look.iz < _0, table.kinds[0], table.grid.shape[2]
     grid = scratch.behind_grid if back else scratch.grid
-    light = GridHorizons(grid, size, *_offsets(table, look.low_i, look.high_i), look.turn_i)
+    low, high = np.uint32(look.low_i * size * size), np.uint32(look.high_i * size * size)
+    light = GridHorizons(grid, size, low, high, look.turn_i)
     sharp, thickness = sharpness_of_points(min(look.narrowest, _BOX)), np.float32(table.thickness)
     bent = scratch.grid_falls, bend_of(look.bend_i)
     for kind in range(len(result)):

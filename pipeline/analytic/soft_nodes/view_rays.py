@@ -1,4 +1,4 @@
-"""How view rays meet a cloth along a line in the viewer's azimuth: which interval of each piece they see.
+"""How view rays meet a cloth along a line in the viewer's azimuth: where it crosses pieces, what is seen of each.
 
 A ray belongs to the point of the reference plane that it crosses. Seen in the viewer's azimuth, a point of height h at
 s is displaced to q = s - d, with d the distance in which a ray sinks from h to the plane; across the azimuth nothing is
@@ -17,9 +17,15 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from pipeline.analytic.soft_nodes.nodes import CURVE, FAMILY, SHIFT, SoftNodeTable
-from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel
-from pipeline.truth.geometry.heightfield import AXIS_DROP, BEND_RADIUS, BETA, HALF_LENGTH, INVERSE_RADIUS, RADIUS, WEFT
+import numpy as np
+
+from pipeline.analytic.soft_nodes import nodes
+from pipeline.analytic.soft_nodes.nodes import X_HIGH, X_LOW, Y_HIGH, Y_LOW, SoftNodeTable
+from pipeline.compiled.arrays import Float32
+from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
+from pipeline.compiled.float32 import arcsine
+from pipeline.truth.geometry import heightfield
+from pipeline.truth.geometry.heightfield import BETA, INVERSE_RADIUS, RADIUS, WARP, WEFT
 
 FOOTPRINT_ENDS: Final = 2.4
 """Deviations at which a footprint of rays ends."""
@@ -27,12 +33,57 @@ FOOTPRINT_ENDS: Final = 2.4
 NEVER: Final = 1e9
 """Place that no ray reaches."""
 
+NEAREST: Final = 1e-5
+"""Least length between cuts, in yarn spacings."""
+
 _CREST_STEPS: Final = 8
 _CREST_CLOSE: Final = 1e-2
 _ROOT_STEPS: Final = 8
 _THIRDS, _HALVINGS = 16, 24
 _CLOSE: Final = 0.02  # of a deviation: how near the end of an interval is found where something hides the rest,
 _WHERE_IT_ENDS: Final = 0.3  # and where the footprint ends
+_0, _HALF = np.float32(0.0), np.float32(0.5)
+_INVERSE_PI = np.float32(1.0 / math.pi)
+
+
+@kernel
+def next_cut(place: float, forward: bool, radius: float) -> float:
+    """Return the next border of a piece along an axis, of cells and of yarns of a radius."""
+    cell = math.floor(place + NEAREST) if forward else math.ceil(place - NEAREST) - 1
+    inside = place - cell
+    low, high = 0.5 - radius, 0.5 + radius
+    if forward:
+        if inside < low - NEAREST:
+            return cell + low
+        return cell + high if inside < high - NEAREST and radius < 0.5 else cell + 1.0
+    if inside > high + NEAREST:
+        return cell + high
+    return cell + low if inside > low + NEAREST and radius < 0.5 else float(cell)
+
+
+@inlined_kernel
+def piece_at(table: SoftNodeTable, cell: int, x: np.float32, y: np.float32) -> int:
+    """Return the piece of a cell at a place within it, -1 if there is none."""
+    for p in range(table.piece_starts[cell], table.piece_starts[cell + 1]):
+        box = table.bounds[p]
+        if box[X_LOW] <= x <= box[X_HIGH] and box[Y_LOW] <= y <= box[Y_HIGH]:
+            return p
+    return -1
+
+
+@kernel
+def in_grid(box: Float32, family: int, radius: np.float32, x: np.float32, y: np.float32, size: int) -> int:
+    """Return the cell of a piece's grid at a place, counted from its first; cells are even in v across a yarn."""
+    count = np.float32(size)
+    last = count - np.float32(0.01)
+    share_x = (x - box[X_LOW]) / (box[X_HIGH] - box[X_LOW])
+    share_y = (y - box[Y_LOW]) / (box[Y_HIGH] - box[Y_LOW])
+    if family == WARP:
+        share_x = arcsine((x - _HALF) / radius) * _INVERSE_PI + _HALF
+    elif family == WEFT:
+        share_y = arcsine((y - _HALF) / radius) * _INVERSE_PI + _HALF
+    row, column = min(max(share_y * count + nodes.UPPER, _0), last), min(max(share_x * count + nodes.UPPER, _0), last)
+    return size * int(row) + int(column)
 
 
 class ViewRay(NamedTuple):
@@ -84,10 +135,8 @@ def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
 
 @inlined_fast_kernel
 def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
-    """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the yarn's border.
-
-    The height is that of `torus_height` and `height_beneath`, sqrt((R +- rho)^2 - b^2) - R cos u_max times the relief.
-    """
+    """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the border."""
+    # As `torus_height` and `height_beneath`: sqrt((R +- rho)^2 - b^2) - R cos u_max, times the relief.
     sine = min(1.0, max(-1.0, (curve.across + s * curve.by_across) * curve.per_radius))
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     rho, b = curve.radius * cosine, curve.along + s * curve.by_along
@@ -198,10 +247,7 @@ def place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: fl
 def _crest(
     curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, q_high: float
 ) -> tuple[float, float]:  # fmt: skip
-    """Return where between a place that faces away and one that faces the viewer the displaced place is least, and it.
-
-    Illinois' method; the error of the least place is of second order.
-    """
+    """Return where the displaced place is least (Illinois' method, an error of second order), and this place."""
     kept, q = 0, q_high
     for _ in range(_CREST_STEPS):
         s = low + (high - low) * at_low / (at_low - at_high)
@@ -223,10 +269,8 @@ def _crest(
 def _at_place(
     curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_crest: float, q_high: float, target: float, near: float
 ) -> float:  # fmt: skip
-    """Return an s between the crest and `high` that is displaced to `target`, or to a place as `near` as that.
-
-    Displaced places rise between them. Steps are those of parabolas through both ends, level at the first one.
-    """
+    """Return an s between the crest and `high` that is displaced to `target`, or to a place as `near` as that."""
+    # Displaced places rise between them. Steps are those of parabolas through both ends, level at the first one.
     s = high
     for _ in range(_ROOT_STEPS):
         s = crest + (high - crest) * math.sqrt((target - q_crest) / (q_high - q_crest))
@@ -243,15 +287,15 @@ def _at_place(
 @inlined_fast_kernel
 def curve_of(table: SoftNodeTable, p: int, ray: ViewRay, x: float, y: float) -> YarnCurve:
     """Return the curve of a piece along a line that has s = 0 at (x, y) from the corner of the cell."""
-    family, box, own = table.pieces[p, FAMILY], table.bounds[p], table.floats[p]
-    yarn, side = table.heights[family], -1.0 if box[CURVE] < 0.0 else 1.0
-    a, by_a, b, by_b = x - 0.5, ray.dx, y - 0.5 + box[SHIFT], ray.dy
+    family, box, own = table.pieces[p, nodes.FAMILY], table.bounds[p], table.floats[p]
+    yarn, side = table.heights[family], -1.0 if box[nodes.CURVE] < 0.0 else 1.0
+    a, by_a, b, by_b = x - 0.5, ray.dx, y - 0.5 + box[nodes.SHIFT], ray.dy
     if family == WEFT:
         # Along a weft, y of its frame runs against x.
-        a, by_a, b, by_b = y - 0.5, ray.dy, -(x - 0.5 + box[SHIFT]), -ray.dx
+        a, by_a, b, by_b = y - 0.5, ray.dy, -(x - 0.5 + box[nodes.SHIFT]), -ray.dx
     return YarnCurve(
-        a, by_a, b, by_b, yarn[INVERSE_RADIUS], yarn[RADIUS], yarn[BETA], own[BEND_RADIUS], own[HALF_LENGTH],
-        own[AXIS_DROP], side,
+        a, by_a, b, by_b, yarn[INVERSE_RADIUS], yarn[RADIUS], yarn[BETA], own[heightfield.BEND_RADIUS],
+        own[heightfield.HALF_LENGTH], own[heightfield.AXIS_DROP], side,
     )  # fmt: skip
 
 

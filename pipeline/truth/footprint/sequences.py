@@ -62,10 +62,7 @@ def _scramble_reversed(x: np.uint32, seed: np.uint32) -> np.uint32:
 
 @kernel
 def _sobol_second_reversed(x: np.uint32) -> np.uint32:
-    """Return the second Sobol coordinate with its 32 bits reversed.
-
-    Its matrix is Pascal's triangle modulo 2, the fifth tensor power of [[1, 1], [0, 1]]: one step for each power.
-    """
+    """Return the second Sobol coordinate, bits reversed: its matrix is the fifth tensor power of [[1, 1], [0, 1]]."""
     x ^= (x >> np.uint32(16)) & np.uint32(0x0000FFFF)
     x ^= (x >> np.uint32(8)) & np.uint32(0x00FF00FF)
     x ^= (x >> np.uint32(4)) & np.uint32(0x0F0F0F0F)

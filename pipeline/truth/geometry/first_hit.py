@@ -90,21 +90,6 @@ def _meets_top(
 
 
 @inlined_kernel
-def _meets_strip(
-    field: HeightField, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
-) -> float:
-    """Return the same for the yarn beneath, whose height is not concave; meetings are sought between points."""
-    low, high = over_strip(field, x, y, z, towards, start, stop, 1, cell)
-    if high == math.inf:
-        return high
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        over, _ = above(field, UNDER, x, y, z, towards, middle, cell)
-        low, high = (low, middle) if over > 0.0 else (middle, high)
-    return high
-
-
-@inlined_kernel
 def _ends_in(
     field: HeightField, side: int, x: float, y: float, z: float, towards: Ray, start: float, stop: float, cell: Cell
 ) -> tuple[int, float]:
@@ -119,7 +104,12 @@ def _ends_in(
     if side == TOP:
         s = _meets_top(field, x, y, z, towards, start, stop, cell)
     else:
-        s = _meets_strip(field, x, y, z, towards, start, stop, cell)
+        # The height of the yarn beneath is not concave: meetings are sought between points.
+        low, s = over_strip(field, x, y, z, towards, start, stop, 1, cell)
+        for _ in range(_HALVINGS if s < math.inf else 0):
+            middle = 0.5 * (low + s)
+            over, _ = above(field, UNDER, x, y, z, towards, middle, cell)
+            low, s = (low, middle) if over > 0.0 else (middle, s)
     return (ON_YARN, s) if s <= stop else (MISSED, 0.0)
 
 
@@ -144,8 +134,7 @@ def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) ->
 def next_hit(field: HeightField, x: float, y: float, z: float, side: int, towards: Ray) -> Hit:
     """Return what a ray meets first that leaves the cloth's own point (x, y, z), above its tangent plane.
 
-    0 <= x < ends, 0 <= y < picks; `side` is TOP if the point is on the yarn on top. The ray may rise or sink; the cloth
-    is flat.
+    0 <= x < ends, 0 <= y < picks; `side` is TOP on the yarn on top. The ray may rise or sink; the cloth is flat.
     """
     if towards.rise == math.inf:
         return Hit(MISSED, x, y, int(x), int(y), 0.0)

@@ -156,8 +156,7 @@ def surface_at(
 ) -> tuple[int, int, float, float, float, float, float, float, float]:
     """Return the surface seen from above at (x, y) in cell (pick, end) of the repeat.
 
-    It is family (WARP, WEFT or GAP), side (TOP or UNDER), height, unit ply normal and unit fibre tangent; all 0 at a
-    gap.
+    It is family (WARP, WEFT or GAP), side (TOP or UNDER), height, unit ply normal and fibre tangent; 0 at a gap.
     """
     family = int(field.top[pick, end])
     side = TOP

@@ -15,28 +15,9 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
-from pipeline.truth.geometry.heightfield import (
-    GAP,
-    OFFSET,
-    TOP,
-    UNDER,
-    WARP,
-    HeightField,
-    local_position,
-    surface_at,
-    torus_height,
-)
-from pipeline.truth.geometry.march import (
-    Cell,
-    Ray,
-    first_cell,
-    float_on_top,
-    height_along,
-    level_ray,
-    next_cell,
-    span_on_top,
-    span_over,
-)
+from pipeline.truth.geometry import heightfield, march
+from pipeline.truth.geometry.heightfield import GAP, OFFSET, TOP, UNDER, WARP, HeightField
+from pipeline.truth.geometry.march import Cell, Ray
 
 _HALVINGS, _SECANTS = 3, 4
 _STRIP_POINTS = 8
@@ -62,19 +43,19 @@ def _slope_of_top(
     # The ray in the frame of the float.
     family = int(field.top[cell.pick, cell.end])
     yarn, own = field.yarn[family], field.floats[cell.pick, cell.end, TOP]
-    x, y = local_position(family, own[OFFSET], x, y, cell.column, cell.row)
+    x, y = heightfield.local_position(family, own[OFFSET], x, y, cell.column, cell.row)
     dx, dy, curvature = towards.dx, towards.dy, towards.bend
     if family != WARP:
         dx, dy = dy, -dx
 
     a = max(a, _NEAREST)
-    low, slope_x, slope_y = torus_height(yarn, own, x + a * dx, y + a * dy)
+    low, slope_x, slope_y = heightfield.torus_height(yarn, own, x + a * dx, y + a * dy)
     rise_a = slope_x * dx + slope_y * dy - curvature * a
     low -= z + 0.5 * curvature * a * a
     fall_a = low - a * rise_a
     if fall_a >= 0.0:
         return max(best, low / a)
-    high, slope_x, slope_y = torus_height(yarn, own, x + b * dx, y + b * dy)
+    high, slope_x, slope_y = heightfield.torus_height(yarn, own, x + b * dx, y + b * dy)
     rise_b = slope_x * dx + slope_y * dy - curvature * b
     high -= z + 0.5 * curvature * b * b
     fall_b = high - b * rise_b
@@ -95,7 +76,7 @@ def _slope_of_top(
             share = min(max(fall_a / (fall_a - fall_b), 0.02), 0.98)
         theta = first + (last - first) * share
         s = middle - half * math.cos(theta)
-        height, slope_x, slope_y = torus_height(yarn, own, x + s * dx, y + s * dy)
+        height, slope_x, slope_y = heightfield.torus_height(yarn, own, x + s * dx, y + s * dy)
         height -= z + 0.5 * curvature * s * s
         rise = slope_x * dx + slope_y * dy - curvature * s
         best = max(best, height / s)
@@ -111,17 +92,14 @@ def _slope_of_top(
 def _slope_of_strip(
     field: HeightField, x: float, y: float, z: float, towards: Ray, a: float, b: float, cell: Cell, best: float
 ) -> float:
-    """Return the greatest slope to the yarn beneath between distances a and b, or `best` if that is greater.
-
-    It is tested at `_STRIP_POINTS` points.
-    """
+    """Return the greatest slope to points of the yarn beneath between distances a and b, or `best` if it is greater."""
     family = 1 - int(field.top[cell.pick, cell.end])
-    a, b = span_over(field, family, x, y, towards, a, b, cell)
+    a, b = march.span_over(field, family, x, y, towards, a, b, cell)
     if b < a:
         return best
     for k in range(_STRIP_POINTS):
         s = max(a + (b - a) * k / (_STRIP_POINTS - 1.0), _NEAREST)
-        height, _ = height_along(field, UNDER, x, y, towards, s, cell)
+        height, _ = march.height_along(field, UNDER, x, y, towards, s, cell)
         best = max(best, (height - z) / s - 0.5 * towards.bend * s)
     return best
 
@@ -134,9 +112,9 @@ def horizon(
 
     The point is as in `visible`; the base has the `curvature` along the azimuth. Over a flat base the slope is >= 0.
     """
-    towards = level_ray(dx, dy, curvature)
-    cell = first_cell(x, y, towards)
-    own_family, own_yarn, own_centre = float_on_top(field, cell)
+    towards = march.level_ray(dx, dy, curvature)
+    cell = march.first_cell(x, y, towards)
+    own_family, own_yarn, own_centre = march.float_on_top(field, cell)
     # A ray below the first value meets the base at the cloth's lowest point.
     best = 0.0 if curvature == 0.0 else -math.sqrt(2.0 * curvature * max(z - field.lowest, 0.0))
     distance = 0.0
@@ -150,9 +128,9 @@ def horizon(
         nearest = distance if curvature == 0.0 else min(max(-best / curvature, distance), leave)
         reached = best * nearest + 0.5 * curvature * nearest * nearest
         if field.crown[cell.pick, cell.end] - z > reached and leave > distance:
-            family, yarn, centre = float_on_top(field, cell)
+            family, yarn, centre = march.float_on_top(field, cell)
             is_own = side == TOP and family == own_family and yarn == own_yarn and centre == own_centre
-            enter, exit_ = span_on_top(field, cell, x, y, towards, distance, leave)
+            enter, exit_ = march.span_on_top(field, cell, x, y, towards, distance, leave)
             if enter > distance:
                 best = _slope_of_strip(field, x, y, z, towards, distance, enter, cell, best)
             if leave > exit_:
@@ -160,7 +138,7 @@ def horizon(
             if exit_ > enter and not is_own:
                 best = _slope_of_top(field, x, y, z, towards, enter, exit_, cell, best)
         distance = leave
-        cell = next_cell(field, cell, towards)
+        cell = march.next_cell(field, cell, towards)
     return best
 
 
@@ -190,7 +168,7 @@ def _horizons(field: HeightField, x: Float64, y: Float64, azimuths: int, own_pla
     """Compute `horizons`."""
     slopes = np.zeros((azimuths, len(x)), np.float32)
     for k in range(len(x)):
-        family, side, z, nx, ny, nz, _, _, _ = surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
+        family, side, z, nx, ny, nz, _, _, _ = heightfield.surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
         if family == GAP:
             side, z = UNDER, 0.0
         for a in range(azimuths):

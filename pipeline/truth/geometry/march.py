@@ -6,17 +6,8 @@ import math
 from typing import NamedTuple
 
 from pipeline.compiled.decorators import inlined_kernel, kernel
-from pipeline.truth.geometry.heightfield import (
-    OFFSET,
-    RADIUS,
-    TOP,
-    UNDER,
-    WARP,
-    HeightField,
-    height_beneath,
-    local_position,
-    torus_height,
-)
+from pipeline.truth.geometry import heightfield
+from pipeline.truth.geometry.heightfield import OFFSET, RADIUS, TOP, UNDER, WARP, HeightField
 
 
 @inlined_kernel
@@ -124,11 +115,12 @@ def height_along(
     if side == UNDER:
         family = 1 - family
     yarn, own, dx, dy = field.yarn[family], field.floats[cell.pick, cell.end, side], towards.dx, towards.dy
-    across, along = local_position(family, own[OFFSET], x + distance * dx, y + distance * dy, cell.column, cell.row)
+    x, y = x + distance * dx, y + distance * dy
+    across, along = heightfield.local_position(family, own[OFFSET], x, y, cell.column, cell.row)
     if side == TOP:
-        height, slope_x, slope_y = torus_height(yarn, own, across, along)
+        height, slope_x, slope_y = heightfield.torus_height(yarn, own, across, along)
     else:
-        height, slope_x, slope_y = height_beneath(yarn, own, across, along)
+        height, slope_x, slope_y = heightfield.height_beneath(yarn, own, across, along)
     if family == WARP:
         return height, slope_x * dx + slope_y * dy
     return height, slope_x * dy - slope_y * dx
@@ -140,7 +132,7 @@ def span_over(
 ) -> tuple[float, float]:
     """Return the part of the way from `start` to `stop` that lies over a yarn of a cell; none of it: stop < start."""
     radius, slope = field.yarn[family, RADIUS], towards.dx if family == WARP else towards.dy
-    across, _ = local_position(family, 0.0, x, y, cell.column, cell.row)
+    across, _ = heightfield.local_position(family, 0.0, x, y, cell.column, cell.row)
     if slope == 0.0:
         return (start, stop) if abs(across) <= radius else (stop, start - 1.0)
     first, second = (-radius - across) / slope, (radius - across) / slope

@@ -50,13 +50,10 @@ def _open_at(field: HeightField, x: float, y: float) -> tuple[bool, float]:
 
 @kernel
 def _passes(front: HeightField, back: HeightField, x: float, y: float, towards: Ray) -> bool:
-    """Return whether a sinking ray from the boundary above (x, y) goes through a gap and meets no yarn.
-
-    With H the boundary's height, rise < 0 the ray's slope there and q its slope where it crosses the plane, downwards:
-    q^2 = rise^2 - 2 kappa H.
-    """
+    """Return whether a sinking ray from the boundary above (x, y) goes through a gap and meets no yarn."""
     picks, ends = front.top.shape
     dx, dy, bend, high = towards.dx, towards.dy, towards.bend, front.highest
+    # Its slope q where it crosses the plane, downwards: q^2 = rise^2 - 2 kappa H, H the boundary's height.
     square = towards.rise * towards.rise - 2.0 * bend * high
     if square <= 0.0:
         return False
@@ -97,21 +94,18 @@ def _passes(front: HeightField, back: HeightField, x: float, y: float, towards: 
 
 
 @kernel
-def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray) -> bool:
-    """Return whether a ray, z < 0, that enters the boundary above the point (x, y) of the repeat hits any yarn."""
+def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray, filled: bool = False) -> bool:
+    """Return whether a ray, z < 0, that enters the boundary above (x, y) of the repeat hits a yarn or `filled` gap."""
     if visible(front, x, y, front.highest, UNDER, towards):
         return False
-    return not (has_gaps(front) and _passes(front, back, x, y, towards))
+    return filled or not (has_gaps(front) and _passes(front, back, x, y, towards))
 
 
 @allocating_kernel
 def _opacity_rows(
     cloth: ClothSide, columns: WideQueries, index: Index, limits: Limits, seed: np.uint64, filled: bool
 ) -> tuple[Float64, Float64]:
-    """Return opacities and their standard errors (N,): ratios of randomisations' sums, doubled up to the tolerance.
-
-    With gaps `filled` a ray that would pass through one has hit the cloth.
-    """
+    """Return opacities and their standard errors (N,): ratios of randomisations' sums, doubled up to the tolerance."""
     rows = len(index)
     open_cloth = has_gaps(cloth.front) and not filled
     means, errors = np.zeros(rows), np.zeros(rows)
@@ -135,11 +129,7 @@ def _opacity_rows(
                     first, second = owen_pair(randomisation, k)
                     x, y, weight = place_point(columns, row, cloth, first, second)
                     sums[r, 1] += weight
-                    if filled:
-                        met = not visible(cloth.front, x, y, cloth.front.highest, UNDER, towards)
-                    else:
-                        met = hits(cloth.front, cloth.back, x, y, towards)
-                    if met:
+                    if hits(cloth.front, cloth.back, x, y, towards, filled):
                         sums[r, 0] += weight
                         hit += 1
             done = target

@@ -16,22 +16,12 @@ import numpy as np
 import weaves.draft
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import kernel
-from pipeline.truth.geometry.heightfield import (
-    BEND_RADIUS,
-    GAP,
-    HALF_LENGTH,
-    OFFSET,
-    RADIUS,
-    TOP,
-    UNDER,
-    WARP,
-    HeightField,
-    height_beneath,
-    torus_height,
-)
+from pipeline.truth.geometry import heightfield
+from pipeline.truth.geometry.heightfield import GAP, OFFSET, RADIUS, TOP, UNDER, WARP, HeightField
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _NONE: Final = 1e-6  # width of margins, in yarn spacings, that are not there
+_STEEPEST: Final = 0.999  # largest sine of an inclination
 
 Extent = tuple[float, float]
 
@@ -61,7 +51,7 @@ class CellPiece(NamedTuple):
     @property
     def steepest(self) -> float:
         """Largest sine of the inclination along the yarn; beneath, the arc ends with the float."""
-        return self.half * self.curve if self.side == UNDER and self.curve else 1.0
+        return min(self.half * self.curve, _STEEPEST) if self.side == UNDER and self.curve else _STEEPEST
 
     @property
     def box(self) -> tuple[Extent, Extent]:
@@ -81,11 +71,9 @@ def cell_pieces(field: HeightField, pick: int, end: int) -> list[CellPiece]:
     radius, radius_beneath = float(field.yarn[top, RADIUS]), float(field.yarn[beneath, RADIUS])
 
     def on_yarn(family: int, side: int, radius: float, along: Extent) -> CellPiece:
-        own = field.floats[pick, end, side]
-        bend = float(own[BEND_RADIUS])
-        curve = 1.0 / bend if bend else 0.0
-        across = (0.5 - radius, 0.5 + radius)
-        return CellPiece(family, side, across, along, radius, float(own[OFFSET]), curve, float(own[HALF_LENGTH]))
+        offset, bend, half, _ = field.floats[pick, end, side].tolist()
+        across, curve = (0.5 - radius, 0.5 + radius), 1.0 / bend if bend else 0.0
+        return CellPiece(family, side, across, along, radius, offset, curve, half)
 
     found = [on_yarn(top, TOP, radius, (0.0, 1.0))]
     found += [on_yarn(beneath, UNDER, radius_beneath, margin) for margin in _margins(radius)]
@@ -211,9 +199,9 @@ def _piece(
         for k in range(len(nodes)):
             y = middle + half * nodes[k]
             if side == TOP:
-                h, _, _ = torus_height(yarn, own, radius * math.sin(v), y)
+                h, _, _ = heightfield.torus_height(yarn, own, radius * math.sin(v), y)
             else:
-                h, _, _ = height_beneath(yarn, own, radius * math.sin(v), y)
+                h, _, _ = heightfield.height_beneath(yarn, own, radius * math.sin(v), y)
             height += share * weights[k] * h
             area += share * weights[k]
     return height, area

@@ -14,17 +14,9 @@ from __future__ import annotations
 import math
 
 from pipeline.compiled.decorators import inlined_kernel
+from pipeline.truth.geometry import march
 from pipeline.truth.geometry.heightfield import TOP, UNDER, HeightField
-from pipeline.truth.geometry.march import (
-    Cell,
-    Ray,
-    first_cell,
-    float_on_top,
-    height_along,
-    next_cell,
-    span_on_top,
-    span_over,
-)
+from pipeline.truth.geometry.march import Cell, Ray
 
 _STRIP_POINTS = 8
 _MAX_CELLS = 100_000  # a ray this long is as good as parallel to the cloth
@@ -43,7 +35,7 @@ def above(
     field: HeightField, side: int, x: float, y: float, z: float, towards: Ray, distance: float, cell: Cell
 ) -> tuple[float, float]:
     """Return how far a piece of a cell is above the ray at a distance, and how fast that grows."""
-    height, slope = height_along(field, side, x, y, towards, distance, cell)
+    height, slope = march.height_along(field, side, x, y, towards, distance, cell)
     return height - _altitude(z, towards, distance), slope - (towards.rise + towards.bend * distance)
 
 
@@ -115,7 +107,7 @@ def _strip_blocks(
 ) -> bool:
     """Return whether the yarn beneath reaches the ray between `start` and `stop`."""
     # A yarn may be narrower than the distance of points along the whole way.
-    start, stop = span_over(field, 1 - int(field.top[cell.pick, cell.end]), x, y, towards, start, stop, cell)
+    start, stop = march.span_over(field, 1 - int(field.top[cell.pick, cell.end]), x, y, towards, start, stop, cell)
     return stop >= start and over_strip(field, x, y, z, towards, start, stop, 0, cell)[1] < math.inf
 
 
@@ -130,8 +122,8 @@ def visible(field: HeightField, x: float, y: float, z: float, side: int, towards
         return True
     if rise <= 0.0 and (bend <= 0.0 or z - 0.5 * rise * rise / bend <= field.lowest):
         return False
-    cell = first_cell(x, y, towards)
-    own_family, own_yarn, own_centre = float_on_top(field, cell)
+    cell = march.first_cell(x, y, towards)
+    own_family, own_yarn, own_centre = march.float_on_top(field, cell)
     distance = 0.0
     for _ in range(_MAX_CELLS):
         if rise + bend * distance >= 0.0 and _altitude(z, towards, distance) >= field.highest:
@@ -140,9 +132,9 @@ def visible(field: HeightField, x: float, y: float, z: float, side: int, towards
         # A ray is lowest where it enters the cell, unless it still sinks.
         turn = min(max(-rise / bend, distance), leave) if bend > 0.0 else distance
         if field.crown[cell.pick, cell.end] > _altitude(z, towards, turn) and leave > distance:
-            family, yarn, centre = float_on_top(field, cell)
+            family, yarn, centre = march.float_on_top(field, cell)
             is_own = side == TOP and family == own_family and yarn == own_yarn and centre == own_centre
-            enter, exit_ = span_on_top(field, cell, x, y, towards, distance, leave)
+            enter, exit_ = march.span_on_top(field, cell, x, y, towards, distance, leave)
             if exit_ > enter and not is_own and _piece_blocks(field, x, y, z, towards, enter, exit_, cell):
                 return False
             if enter > distance and _strip_blocks(field, x, y, z, towards, distance, enter, cell):
@@ -150,5 +142,5 @@ def visible(field: HeightField, x: float, y: float, z: float, side: int, towards
             if leave > exit_ and _strip_blocks(field, x, y, z, towards, exit_, leave, cell):
                 return False
         distance = leave
-        cell = next_cell(field, cell, towards)
+        cell = march.next_cell(field, cell, towards)
     return True

@@ -15,23 +15,11 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import allocating_kernel
-from pipeline.truth.geometry.heightfield import (
-    ALPHA,
-    BEND,
-    GAP,
-    HALF_LENGTH,
-    RADIUS,
-    SIN_TWIST,
-    TOP,
-    UNDER,
-    WARP,
-    WEFT,
-    HeightField,
-    surface_at,
-)
+from pipeline.truth.geometry import heightfield
+from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, UNDER, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizons
 from pipeline.truth.geometry.pieces import cell_pieces, lattice, longest_period, orbits
-from pipeline.truth.node_table.walls import WallNodes, no_walls, wall_nodes
+from pipeline.truth.node_table.walls import Edges, Grid, WallNodes, no_walls, wall_nodes
 
 _RESOLVED = 1.2  # nodes a half-width of a highlight: sums of it are then right to 1e-3
 _FINEST = 16
@@ -84,37 +72,32 @@ def tabulate(
     """
     picks, ends = front.top.shape
     alike = orbits(front)
-    kinds: list[tuple[float, ...]] = []
-    rows, copies, grids = [], [], []
+    kinds: dict[Edges, int] = {}
+    rows, copies, grids, at, areas = [], [], [], [], []
     start, fine_start = 0, 0
     for orbit in alike:
         pick, end = orbit[0]
         for family, x_edges, y_edges in _pieces(front, pick, end, nodes):
-            for edges in (x_edges, y_edges):
-                if edges not in kinds:
-                    kinds.append(edges)
             columns, lines = len(x_edges) - 1, len(y_edges) - 1
             finer = (1, 1) if family == GAP else _finer(front, family, pick, end, columns, lines)
-            kind_x, kind_y = kinds.index(x_edges), kinds.index(y_edges)
+            kind_x, kind_y = (kinds.setdefault(edges, len(kinds)) for edges in (x_edges, y_edges))
             rows.append((start, columns, lines, kind_x, kind_y, family, fine_start, finer[0] * finer[1]))
             copies.append([(e, p) for p, e in orbit])
-            grids.append((end, pick, family, x_edges, y_edges, finer))
+            grids.append((end, pick, family, x_edges, y_edges))
+            at.append(_positions(front, grids[-1], finer))
+            areas.append(np.outer(np.diff(y_edges), np.diff(x_edges)).ravel() * len(orbit))
             start += columns * lines
             fine_start += columns * lines * finer[0] * finer[1]
 
-    # Positions of the nodes and of the finer ones; then what the surface is there.
-    at = [_positions(front, *grid) for grid in grids]
-    x, y = (np.concatenate([part[axis] for part in at]) for axis in (0, 1))
-    fine_x, fine_y = (np.concatenate([part[axis] for part in at]) for axis in (2, 3))
-    areas = [np.outer(np.diff(g[4]), np.diff(g[3])).ravel() * len(c) for g, c in zip(grids, copies, strict=True)]
+    x, y, fine_x, fine_y = (np.concatenate(parts) for parts in zip(*at, strict=True))
     size = max(map(len, kinds))
     slope = horizons(front, x, y, azimuths, False)
     behind = behind or any(family == GAP for _, _, family, *_ in grids)
     slope_behind = horizons(back, x, y, azimuths, True) if behind else np.zeros((0, len(x)), np.float32)
-    pieces, surface = np.array(rows, np.int64), _surface(front, x, y)
+    surface = _surface(front, x, y)
     return ExactNodes(
         repeat=np.array([ends, picks], np.int64),
-        pieces=pieces,
+        pieces=np.array(rows, np.int64),
         copies=np.array(copies, np.int64),
         edges=np.array([edges + (edges[-1],) * (size - len(edges)) for edges in kinds], np.float32),
         evenly=(np.concatenate(areas) / (ends * picks)).astype(np.float32),
@@ -125,21 +108,19 @@ def tabulate(
         uniform=_FADED * longest_period(front),
         lattice=lattice(front),
         places=np.array([x, y, surface[7]], np.float32),
-        walls=wall_nodes(front, back, [g[:5] for g in grids], len(alike[0]), behind, azimuths) if rims else no_walls(),
+        walls=wall_nodes(front, back, grids, len(alike[0]), behind, azimuths) if rims else no_walls(),
     )
 
 
-def _pieces(
-    field: HeightField, pick: int, end: int, nodes: int
-) -> list[tuple[int, tuple[float, ...], tuple[float, ...]]]:
+def _pieces(field: HeightField, pick: int, end: int, nodes: int) -> list[tuple[int, Edges, Edges]]:
     """Return family, x edges and y edges of everything seen from above in a cell."""
     around = [tuple((0.5 + radius * np.sin(np.linspace(-math.pi / 2, math.pi / 2, nodes + 1))).tolist())
               for radius in field.yarn[:, RADIUS]]  # fmt: skip
 
-    def straight(low: float, high: float) -> tuple[float, ...]:
+    def straight(low: float, high: float) -> Edges:
         return tuple(np.linspace(low, high, max(2, math.ceil(nodes * (high - low))) + 1).tolist())
 
-    def beneath_another(low: float, high: float) -> tuple[float, ...]:
+    def beneath_another(low: float, high: float) -> Edges:
         # The back of the cloth is a yarn across, which turns away from steep light close to its sides only.
         places = straight(low, high)
         step = _SIDE * (places[1] - low)
@@ -163,27 +144,20 @@ def _pieces(
 def _finer(field: HeightField, family: int, pick: int, end: int, columns: int, lines: int) -> tuple[int, int]:
     """Return how many finer nodes, along x and along y, resolve the highlights of a piece."""
     side = TOP if family == field.top[pick, end] else UNDER
-    alpha = field.yarn[family, ALPHA]
-    length = 2.0 * field.floats[pick, end, side, HALF_LENGTH]
+    alpha = field.yarn[family, heightfield.ALPHA]
+    length = 2.0 * field.floats[pick, end, side, heightfield.HALF_LENGTH]
     across, along = (columns, lines) if family == WARP else (lines, columns)
-    turn_along = 2.0 * field.yarn[family, BEND] / length / along
-    turn_across = math.pi * abs(field.yarn[family, SIN_TWIST]) / across
+    turn_along = 2.0 * field.yarn[family, heightfield.BEND] / length / along
+    turn_across = math.pi * abs(field.yarn[family, heightfield.SIN_TWIST]) / across
     counts = [min(_FINEST, max(1, math.ceil(_RESOLVED * turn / alpha))) for turn in (turn_across, turn_along)]
     return (counts[0], counts[1]) if family == WARP else (counts[1], counts[0])
 
 
-def _positions(
-    field: HeightField,
-    end: int,
-    pick: int,
-    family: int,
-    x_edges: tuple[float, ...],
-    y_edges: tuple[float, ...],
-    finer: tuple[int, int],
-) -> tuple[Float64, Float64, Float64, Float64]:
+def _positions(field: HeightField, grid: Grid, finer: tuple[int, int]) -> tuple[Float64, Float64, Float64, Float64]:
     """Return x and y of the nodes of a piece, row by row, and of its finer nodes, place by place."""
+    end, pick, family, x_edges, y_edges = grid
 
-    def middles(edges: tuple[float, ...], count: int, bent: bool, radius: float) -> Float64:
+    def middles(edges: Edges, count: int, bent: bool, radius: float) -> Float64:
         # (count, nodes): within each node, `count` evenly spaced places; evenly in v across a yarn.
         places = np.array(edges)
         borders = np.arcsin(np.clip((places - 0.5) / radius, -1.0, 1.0)) if bent else places
@@ -193,14 +167,14 @@ def _positions(
 
     radius = 0.0 if family == GAP else float(field.yarn[family, RADIUS])
     bent = (family == WARP, family not in (WARP, GAP))
-    grids = []
+    places = []
     for counts in ((1, 1), finer):
         xs = end + middles(x_edges, counts[0], bent[0], radius)
         ys = pick + middles(y_edges, counts[1], bent[1], radius)
         shape = (counts[1], counts[0], ys.shape[1], xs.shape[1])
-        grids.append(np.broadcast_to(xs[None, :, None, :], shape).ravel())
-        grids.append(np.broadcast_to(ys[:, None, :, None], shape).ravel())
-    return grids[0], grids[1], grids[2], grids[3]
+        places.append(np.broadcast_to(xs[None, :, None, :], shape).ravel())
+        places.append(np.broadcast_to(ys[:, None, :, None], shape).ravel())
+    return places[0], places[1], places[2], places[3]
 
 
 @allocating_kernel
@@ -208,7 +182,7 @@ def _surface(field: HeightField, x: Float64, y: Float64) -> Float32:
     """Return normal, 1 / n_z, tangent and height at points, (8, N); a gap's normal is +z."""
     found = np.zeros((8, len(x)), np.float32)
     for k in range(len(x)):
-        family, _, height, nx, ny, nz, tx, ty, tz = surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
+        family, _, height, nx, ny, nz, tx, ty, tz = heightfield.surface_at(field, x[k], y[k], int(x[k]), int(y[k]))
         if family == GAP:
             nx, ny, nz = 0.0, 0.0, 1.0
         values = (nx, ny, nz, 1.0 / nz, tx, ty, tz, height)

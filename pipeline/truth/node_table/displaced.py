@@ -200,18 +200,12 @@ def _find(
 
 @fast_kernel
 def _read(
-    grid: Float32,
-    stride: np.uint32,
-    squares: Squares,
-    part_x: Float32,
-    part_y: Float32,
-    evenly: Float32,
-    weight: Float32,
+    grid: Float32, step: np.uint32, squares: Squares, part_x: Float32, part_y: Float32, evenly: Float32, weight: Float32
 ) -> None:
-    """Write `evenly` times the density of the grid."""
+    """Write `evenly` times the density of the grid, whose rows have `step` points."""
     for k in range(len(weight)):
         at = squares[k]
-        above = np.uint32(at + stride)
+        above = np.uint32(at + step)
         low, high = grid[at], grid[above]
         low += part_x[k] * (grid[np.uint32(at + _NEXT)] - low)
         high += part_x[k] * (grid[np.uint32(above + _NEXT)] - high)

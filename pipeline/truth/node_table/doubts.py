@@ -21,9 +21,7 @@ from pipeline.truth.node_table.build import FIRST_NODE, NODES_X, NODES_Y, PIECE_
 from pipeline.truth.node_table.kernels import SMOOTH, NodeShares
 from pipeline.truth.node_table.weights import any_weight
 
-_LEFT: Final = 0.35
-"""Share of the requested squared error that nodes which are not refined may keep."""
-
+_LEFT: Final = 0.35  # share of the requested squared error that nodes which are not refined may keep
 _KNOWN, _JUMPED = np.float32(0.05), np.float32(0.1)  # squared error of a border's place, in nodes: by margins; unknown
 _JUMP = np.float32(3.0)  # times the change of the margin beside it
 _SURE = np.float32(1e30)  # doubt of a node whose horizons disagree: always refined
@@ -180,11 +178,7 @@ def _doubt_links(piece: Index, shares: NodeShares, mean: Float64, squares: float
 
 @kernel
 def _border(margins: Float32, k: int, axis: int, start: int, across: int, stop: int) -> tuple[np.float32, np.float32]:
-    """Return by how much of a node the border beyond node k lies off half-way, and the square of what is unknown.
-
-    The first is positive if node k counts for more than half of the way. A border that the link at a right angle
-    crosses too counts in parts.
-    """
+    """Return by how much of a node the border lies beyond half-way from node k, and the square of what is unknown."""
     column = (k - start) % across
     step, turn = (1, across) if axis == 0 else (across, 1)
     room_before = column > 0 if axis == 0 else k - across >= start
@@ -195,6 +189,7 @@ def _border(margins: Float32, k: int, axis: int, start: int, across: int, stop: 
     before = abs(margins[k - step] - here) if room_before else change
     after = abs(margins[k + 2 * step] - there) if room_after else change
     aside = k + turn if room_aside else k - turn
+    # A border that the link at a right angle crosses too counts in parts.
     weight = change / (change + (abs(here - margins[aside]) if aside >= start else change) + _TINY)
     if change > _JUMP * max(before, after):
         return _0, weight * _JUMPED

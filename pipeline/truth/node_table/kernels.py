@@ -232,8 +232,7 @@ def _crossing(
 ) -> tuple[np.float32, np.float32]:
     """Return the change of the visible node's share by a border between margins m and n, and its squared error.
 
-    `before` and `after` are the margins beyond them, `change` how much m and n differ, and `across` the change at a
-    right angle, which shares the border with the links in that direction.
+    `change` is how much m and n differ, `across` the same at a right angle, where links share the border.
     """
     weight = _1 / (change + across + _TINY)
     jump = change > _JUMP * max(abs(before - m), abs(n - after))

@@ -11,23 +11,13 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import fast_kernel, kernel
 from pipeline.truth.cloth import ClothSide
 from pipeline.truth.geometry.heightfield import BLEND, RADIUS, WARP, WEFT
+from pipeline.truth.node_table import kernels
 from pipeline.truth.node_table.build import ExactNodes
 from pipeline.truth.node_table.displaced import DensityRoom, read_density
-from pipeline.truth.node_table.kernels import (
-    Direction,
-    HorizonSlopes,
-    NodeDirections,
-    Normals,
-    Tangents,
-    crossing,
-    flake_layer,
-    scatter,
-)
-from pipeline.truth.node_table.walls import HEIGHTS
+from pipeline.truth.node_table.kernels import Direction, HorizonSlopes, NodeDirections, Normals, Tangents
+from pipeline.truth.node_table.walls import HEIGHTS, WallNodes
 
-_DOUBT: Final = 0.04
-"""Error of what walls show, relative to it."""
-
+_DOUBT: Final = 0.04  # error of what walls show, relative to it
 _GRAZING = np.float32(1e-5)
 _STEP = np.float32(1e-4)
 _0, _HALF, _1 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
@@ -57,15 +47,9 @@ def wall_room(table: ExactNodes) -> WallRoom:
 
 @kernel
 def sum_walls(
-    cloth: ClothSide,
-    table: ExactNodes,
-    towards: NodeDirections,
-    points: int,
-    density: DensityRoom,
-    room: WallRoom,
-    sums: Float64,
-    squares: Float64,
-) -> tuple[float, float]:
+    cloth: ClothSide, table: ExactNodes, towards: NodeDirections, points: int, density: DensityRoom, room: WallRoom,
+    sums: Float64, squares: Float64,
+) -> tuple[float, float]:  # fmt: skip
     """Add the shares of all walls to the sums, and their squared errors; return those of the denominator.
 
     `density` holds the footprint on a grid of so many `points` on a yarn spacing; with 0 points it is even.
@@ -76,11 +60,7 @@ def sum_walls(
     for family in range(2):
         a, b = walls.starts[2 * family + 1], walls.starts[2 * family + 2]
         if b > a:
-            _write_seen_deep(
-                first[:, a:b], second[:, a:b], walls.passing[viewer.first, :, a:b],
-                walls.passing[viewer.second, :, a:b], viewer, walls.places[:, a:b], walls.height[a:b],
-                cloth.front.yarn[:, RADIUS], room.seen[a:b], room.places[2, a:b],
-            )  # fmt: skip
+            _write_seen_deep(walls, viewer, cloth.front.yarn[:, RADIUS], a, b, room)
     weight = walls.evenly
     if points > 0:
         weight = room.weight
@@ -92,7 +72,7 @@ def sum_walls(
         a, b = walls.starts[2 * family], walls.starts[2 * family + 2]
         if a == b:
             continue
-        layer = flake_layer(cloth.front, family, 1)
+        layer = kernels.flake_layer(cloth.front, family, 1)
         normal = Normals(walls.normal[0, a:b], walls.normal[1, a:b], walls.normal[2, a:b], walls.normal[3, a:b])
         tangent = Tangents(walls.tangent[0, a:b], walls.tangent[1, a:b], walls.tangent[2, a:b])
         areas, lit, speculars = room.areas[a:b], room.lit[a:b], room.speculars[a:b]
@@ -103,12 +83,12 @@ def sum_walls(
         )  # fmt: skip
         if own == _0:
             continue
-        sums[4] += crossing(normal, tangent, viewer, layer, areas)
+        sums[4] += kernels.crossing(normal, tangent, viewer, layer, areas)
         area += own
         area_error += (_DOUBT * own) ** 2
         if diffuse > _0:
             speculars[:] = _0
-            specular = scatter(normal, tangent, towards, layer, lit, speculars)
+            specular = kernels.scatter(normal, tangent, towards, layer, lit, speculars)
             sums[family] += specular
             sums[2 + family] += diffuse / math.pi
             squares[family] += (_DOUBT * specular) ** 2
@@ -120,10 +100,7 @@ def sum_walls(
 def _write_seen(
     first: Float32, second: Float32, viewer: Direction, rim: Float32, height: Float32, seen: Float32, middle: Float32
 ) -> None:
-    """Write how much of the height of each wall a viewer sees, and the height of the middle of that.
-
-    `first` and `second` are horizons (HEIGHTS, W) at the azimuths around the viewer.
-    """
+    """Write how much of each wall's height a viewer sees, and the height of its middle, from horizons (HEIGHTS, W)."""
     for k in range(len(seen)):
         of_first, of_second = _0, _0
         for h in range(HEIGHTS - 1):
@@ -137,19 +114,13 @@ def _write_seen(
 
 @kernel
 def _write_seen_deep(
-    first: Float32,
-    second: Float32,
-    passing: Float32,
-    passing_second: Float32,
-    viewer: Direction,
-    places: Float32,
-    height: Float32,
-    radius: Float64,
-    seen: Float32,
-    middle: Float32,
+    walls: WallNodes, viewer: Direction, radius: Float64, start: int, stop: int, room: WallRoom
 ) -> None:
-    """Do the same for deep walls below `places`, but for rays that pass: over a gap of the plane, clear of the back."""
-    for k in range(len(seen)):
+    """Do the same for the deep walls from `start` to `stop`, for rays that pass: over a gap, clear of the back."""
+    first, second = walls.horizon[viewer.first], walls.horizon[viewer.second]
+    passing, passing_second = walls.passing[viewer.first], walls.passing[viewer.second]
+    places, height = walls.places, walls.height
+    for k in range(start, stop):
         total, deepest, top = _0, _0, places[2, k]
         for own, free, share in ((first, passing, _1 - viewer.turn), (second, passing_second, viewer.turn)):
             for h in range(HEIGHTS - 1):
@@ -162,28 +133,16 @@ def _write_seen_deep(
                 part = share * min(max(min(clear, met), _0), _1)
                 total += part
                 deepest += part * (np.float32(h) + _HALF)
-        seen[k] = height[k] * _OF_STEPS * total
-        middle[k] = top - height[k] * _OF_STEPS * deepest / max(total, _STEP)
+        room.seen[k] = height[k] * _OF_STEPS * total
+        room.places[2, k] = top - height[k] * _OF_STEPS * deepest / max(total, _STEP)
 
 
 @fast_kernel
 def _weigh_walls(
-    normal: Normals,
-    out_x: Float32,
-    out_y: Float32,
-    light: Direction,
-    light_horizon: HorizonSlopes,
-    viewer: Direction,
-    blend: np.float32,
-    seen: Float32,
-    weight: Float32,
-    areas: Float32,
-    lit: Float32,
-) -> tuple[np.float32, np.float32]:
-    """Write the walls' shares of the area, and those of lit ones over the rim's cosine; return area and diffuse sums.
-
-    A rim that turns away from the viewer shows nothing.
-    """
+    normal: Normals, out_x: Float32, out_y: Float32, light: Direction, light_horizon: HorizonSlopes, viewer: Direction,
+    blend: np.float32, seen: Float32, weight: Float32, areas: Float32, lit: Float32,
+) -> tuple[np.float32, np.float32]:  # fmt: skip
+    """Write the walls' shares of the area, those of lit ones over the rim's cosine; return area and diffuse sums."""
     area, diffuse = _0, _0
     for k in range(len(seen)):
         cos_o = viewer.x * normal.x[k] + viewer.y * normal.y[k] + viewer.z * normal.z[k]

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
+from pipeline.truth import options
 from pipeline.truth.calibration import BEHIND_FACTORS, COARSE_TABLE, FINE_TABLE, FRONT_FACTORS, REFINED
 from pipeline.truth.cloth import ClothSide, Raw, WideQueries
 from pipeline.truth.footprint.mixture import FINE_LINE, Line, axes
@@ -24,15 +25,6 @@ from pipeline.truth.geometry.heightfield import BEND, BETA, RADIUS, HeightField
 from pipeline.truth.geometry.pieces import different_cells
 from pipeline.truth.node_table.answer import Requested, sum_rows
 from pipeline.truth.node_table.build import ExactNodes, tabulate
-from pipeline.truth.options import (
-    FEWEST_NODES,
-    NARROWEST_RIMS,
-    RAYS_RESOLVED,
-    TABLE_CELLS,
-    TABLE_SIGMA,
-    seen_distance,
-    steepness,
-)
 
 FINE_NODES: Final = 32
 """Nodes per yarn spacing of the fine table, across and along; for a cloth of more than `_FEW` different cells, down to
@@ -50,9 +42,9 @@ _COARSE_RAYS: Final = 1.8  # below it, errors of the coarse table are larger tha
 _KEPT: Final = 24  # tables of 1 to 5 MB: those of a benchmark with about a dozen cloths in turn
 
 ALLOWED: Final = (
-    f"flat cloth of at most {TABLE_CELLS} different cells, footprints of at least {TABLE_SIGMA:.3g} yarn spacings and "
-    "not too thin (with parallax: Gaussian ones, from a size on that grows with the viewer's angle), and the default "
-    "frame and shadows: take auto"
+    f"flat cloth of at most {options.TABLE_CELLS} different cells, footprints of at least {options.TABLE_SIGMA:.3g} "
+    "yarn spacings and not too thin (with parallax: Gaussian ones, from a size on that grows with the viewer's angle), "
+    "and the default frame and shadows: take auto"
 )
 """Queries that a table answers, as the end of a sentence."""
 
@@ -80,42 +72,39 @@ class NodeTable:
         """Return which queries a table answers, (N,)."""
         other = cloth.choices.macro or not cloth.choices.shadows
         other |= cloth.parallax and cloth.shape != GAUSSIAN
-        other |= cloth.choices.rims and bool(cloth.front.yarn[:, RADIUS].min() < NARROWEST_RIMS)
-        if other or different_cells(cloth.front) > TABLE_CELLS:
+        other |= cloth.choices.rims and bool(cloth.front.yarn[:, RADIUS].min() < options.NARROWEST_RIMS)
+        if other or different_cells(cloth.front) > options.TABLE_CELLS:
             return np.zeros(len(columns.u), np.bool_)
         narrow = np.minimum(columns.sigma, columns.sigma_minor)
-        known = (narrow >= TABLE_SIGMA) & (columns.curvature == 0.0)
+        known = (narrow >= options.TABLE_SIGMA) & (columns.curvature == 0.0)
         if cloth.parallax:
-            resolved = max(self._rays_resolved, RAYS_RESOLVED["rim" if cloth.choices.rims else "left_out"])
+            resolved = max(self._rays_resolved, options.RAYS_RESOLVED["rim" if cloth.choices.rims else "left_out"])
             known &= narrow >= resolved * self.seen_distance(cloth, columns)
-        if (rotated := ~_axial(cloth, columns)).any():
+        axial = columns.angle == 0.0
+        if cloth.shape == GAUSSIAN:
+            axial |= columns.sigma == columns.sigma_minor
+        if not axial.all():
             x, y, correlation = np.abs(axes(columns.sigma, columns.sigma_minor, columns.angle))
-            blurred = np.sqrt(1.0 - correlation) * np.minimum(x, y) >= TABLE_SIGMA
-            known &= ~rotated | (blurred & (correlation <= self._line.most) & (cloth.shape == GAUSSIAN))
+            blurred = np.sqrt(1.0 - correlation) * np.minimum(x, y) >= options.TABLE_SIGMA
+            known &= axial | (blurred & (correlation <= self._line.most) & (cloth.shape == GAUSSIAN))
         return np.asarray(known)
 
     def seen_distance(self, cloth: ClothSide, columns: WideQueries) -> Float64:
         """Return the largest distance of neighbouring nodes as the viewers see them, in yarn spacings, (N,)."""
-        steepest = max(steepness(yarn[BETA], 2.0 * yarn[RADIUS], yarn[BEND]) for yarn in cloth.front.yarn)
-        return seen_distance(steepest, columns.wo[:, 2], self._nodes(different_cells(cloth.front)))
+        steepest = max(options.steepness(yarn[BETA], 2.0 * yarn[RADIUS], yarn[BEND]) for yarn in cloth.front.yarn)
+        return options.seen_distance(steepest, columns.wo[:, 2], self._nodes(different_cells(cloth.front)))
 
     def answer(
-        self,
-        cloth: ClothSide,
-        columns: WideQueries,
-        index: Index,
-        relative_error: float,
-        absolute_error: float,
-        seed: int,
+        self, cloth: ClothSide, columns: WideQueries, index: Index, relative: float, absolute: float, seed: int
     ) -> Raw:
         """Answer queries that the table knows; nodes are refined where the standard error exceeds the requested one.
 
-        `index` and `seed` name the random numbers of refined nodes.
+        It is `relative` to the norm of the components, `absolute` in 1/sr. `index` and `seed` name random numbers.
         """
         table = self.table(cloth, bool((columns.wi[:, 2] < 0.0).any()))
         factors = ((side[self._stage], side[REFINED]) for side in (FRONT_FACTORS, BEHIND_FACTORS))
-        requested = Requested(relative_error, absolute_error, *factors)
-        answers = sum_rows(cloth, table, columns, index, requested, np.uint64(seed), self._line)
+        requested = Requested(relative, absolute, *factors)
+        answers = sum_rows(cloth, table, columns, index, requested, seed, self._line)
         return answers._replace(stage=np.where(answers.stage == REFINED, REFINED, self._stage))
 
     def table(self, cloth: ClothSide, behind: bool) -> ExactNodes:
@@ -133,17 +122,9 @@ class NodeTable:
         return table
 
 
-def _axial(cloth: ClothSide, columns: WideQueries) -> Mask:
-    """Return which footprints are round or lie along the axes."""
-    along = columns.angle == 0.0
-    if cloth.shape == GAUSSIAN:
-        along |= columns.sigma == columns.sigma_minor
-    return np.asarray(along)
-
-
 def _fine_nodes(cells: int) -> int:
     """Return an even number of nodes: with more different cells, more borders average out."""
-    return max(FEWEST_NODES, min(FINE_NODES, 2 * round(0.5 * FINE_NODES * math.sqrt(_FEW / cells))))
+    return max(options.FEWEST_NODES, min(FINE_NODES, 2 * round(0.5 * FINE_NODES * math.sqrt(_FEW / cells))))
 
 
 def _coarse_nodes(cells: int) -> int:

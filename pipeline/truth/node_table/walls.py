@@ -27,7 +27,8 @@ from pipeline.truth.geometry.horizon import horizon, horizons
 HEIGHTS: Final = 6
 """Points of a wall from the rim to the foot."""
 
-Grid = tuple[int, int, int, tuple[float, ...], tuple[float, ...]]
+Edges = tuple[float, ...]
+Grid = tuple[int, int, int, Edges, Edges]
 """End, pick, family, and the edges of a piece's nodes along x and y."""
 
 _INSET, _OUTSET = 1e-9, 1e-7  # distances from the border
@@ -152,10 +153,7 @@ def _rims(front: HeightField, back: HeightField, at: Float64, beside: Float64) -
 def _wall_horizons(
     field: HeightField, at: Float64, out: Float64, points: Float64, wanted: Index, azimuths: int
 ) -> Float32:
-    """Return the slope of the horizon at points (HEIGHTS, N) over places (2, N), (azimuths, HEIGHTS, N).
-
-    It is 1e4 where a wall faces away, or is not `wanted`.
-    """
+    """Return horizons at points (HEIGHTS, N) over places (2, N); 1e4 if a wall faces away, or is not `wanted`."""
     count = len(wanted)
     slopes = np.full((azimuths, HEIGHTS, count), _UNSEEN, np.float32)
     for k in range(count):

@@ -28,20 +28,7 @@ from pipeline.truth.footprint.place import GAUSSIAN, Axis
 from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.monte_carlo import OWEN, query_directions, sample_rows
 from pipeline.truth.options import Limits, TruthOptions
-from pipeline.truth.quadrature.rules import (
-    BOX_WEIGHT,
-    CUTS,
-    KIND,
-    MASS,
-    PART,
-    RULES,
-    TURNING,
-    QueryPatch,
-    cut_parts,
-    integrate,
-    lean_of,
-    rectangles,
-)
+from pipeline.truth.quadrature import rules
 
 SAFETY: Final = 1.5
 """Times the estimated error that the reported one is; fitted so that 95 % of the norms of true errors are covered."""
@@ -70,9 +57,9 @@ def integrate_rows(
     means, errors = np.zeros((rows, AREA_SUM)), np.zeros((rows, AREA_SUM))
     counts, barely = np.zeros(rows, np.int64), np.zeros(rows, np.bool_)
     picks, ends = cloth.front.top.shape
-    everything = rectangles(cloth.front, np.ones((picks, ends), np.bool_))
-    kinds, share = rectangles(cloth.front, different), picks * ends / different.sum()
-    across, along = np.zeros((CUTS, 3)), np.zeros((CUTS, 3))
+    everything = rules.rectangles(cloth.front, np.ones((picks, ends), np.bool_))
+    kinds, share = rules.rectangles(cloth.front, different), picks * ends / different.sum()
+    across, along = np.zeros((rules.CUTS, 3)), np.zeros((rules.CUTS, 3))
     grid, states = np.zeros((64, 64, POINT_SUMS)), np.zeros((64, 64), np.int64)
     for row in range(rows):
         directions = query_directions(columns, row)
@@ -84,12 +71,12 @@ def integrate_rows(
         y_axis = Axis(cloth.shape, columns.v[row], sigma_y, float(picks))
         even = cloth.shape == GAUSSIAN and sigma_x >= _EVEN * ends and sigma_y >= _EVEN * picks
         wo = directions.viewer
-        x_lean, y_lean = lean_of(cloth, wo.x, wo.z), lean_of(cloth, wo.y, wo.z)
-        patch = QueryPatch(cloth, directions, x_axis, y_axis, x_lean, y_lean)
+        x_lean, y_lean = rules.lean_of(cloth, wo.x, wo.z), rules.lean_of(cloth, wo.y, wo.z)
+        patch = rules.QueryPatch(cloth, directions, x_axis, y_axis, x_lean, y_lean)
         parts = _all_parts(patch, kinds if even else everything, across, along)
         if even:
-            parts[:, BOX_WEIGHT] *= share
-            parts[:, MASS] *= share
+            parts[:, rules.BOX_WEIGHT] *= share
+            parts[:, rules.MASS] *= share
         total = len(parts)
 
         # The first rule on every part; then the worst parts get the next, at first all of them.
@@ -97,7 +84,7 @@ def integrate_rows(
         changes, earlier = np.zeros((total, POINT_SUMS)), np.zeros((total, POINT_SUMS))
         costs, badness = np.zeros(total, np.int64), np.zeros(total)
         for p in range(total):
-            counts[row] += integrate(patch, parts[p], first, split, grid, states, sums[p])
+            counts[row] += rules.integrate(patch, parts[p], first, split, grid, states, sums[p])
         cut = -1.0
         while True:
             refined = False
@@ -107,7 +94,7 @@ def integrate_rows(
                     earlier[p] = changes[p]
                     changes[p] = sums[p]
                     levels[p] += 1
-                    costs[p] = integrate(patch, parts[p], levels[p], split, grid, states, sums[p])
+                    costs[p] = rules.integrate(patch, parts[p], levels[p], split, grid, states, sums[p])
                     changes[p] = sums[p] - changes[p]
                     counts[row] += costs[p]
                     refined = True
@@ -129,16 +116,14 @@ def integrate_rows(
 
 
 @allocating_kernel
-def _all_parts(patch: QueryPatch, pieces: Float64, across: Float64, along: Float64) -> Float64:
+def _all_parts(patch: rules.QueryPatch, pieces: Float64, across: Float64, along: Float64) -> Float64:
     """Return the parts of all rectangles that the footprint reaches, (n, PART)."""
-    nothing, yarn = np.zeros((0, PART)), patch.cloth.front.yarn
-    total = 0
+    parts, total = np.zeros((0, rules.PART)), 0
     for p in range(len(pieces)):
-        total += cut_parts(pieces[p], yarn, patch.x, patch.y, patch.x_lean, patch.y_lean, across, along, nothing)
-    parts = np.zeros((total, PART))
-    total = 0
+        total += rules.cut_parts(patch, pieces[p], across, along, parts)
+    parts, total = np.zeros((total, rules.PART)), 0
     for p in range(len(pieces)):
-        total += cut_parts(pieces[p], yarn, patch.x, patch.y, patch.x_lean, patch.y_lean, across, along, parts[total:])
+        total += rules.cut_parts(patch, pieces[p], across, along, parts[total:])
     return parts
 
 
@@ -176,11 +161,11 @@ def _estimate_errors(
             residual = (changes[p, c] - mean[c] * changes[p, AREA_SUM]) / area
             signed += residual
             n = float(2 << levels[p])
-            missed = _SLIVER / (n * n * n) * parts[p, MASS] * cosine / area * mean[c]
+            missed = _SLIVER / (n * n * n) * parts[p, rules.MASS] * cosine / area * mean[c]
             before = _FADING * (earlier[p, c] - mean[c] * earlier[p, AREA_SUM]) / area
             square = max(residual * residual, before * before) + missed * missed
-            if c == parts[p, KIND] and parts[p, TURNING] > 0.0:
-                missed = 2.0 * math.exp(-_HIGHLIGHT * n / parts[p, TURNING]) * sums[p, AREA_SUM] / area
+            if c == parts[p, rules.KIND] and parts[p, rules.TURNING] > 0.0:
+                missed = 2.0 * math.exp(-_HIGHLIGHT * n / parts[p, rules.TURNING]) * sums[p, AREA_SUM] / area
                 square += missed * missed * size
             unsigned += square
             if c < 4:
@@ -203,7 +188,7 @@ def quadrature_rows(cloth: ClothSide, columns: WideQueries, index: Index, option
     answers = Raw.empty(len(index))
     if aligned.any():
         mean, error, count, barely = integrate_rows(
-            cloth, columns.take(aligned), first_cells(cloth.front), options.limits, _SPLIT, _FIRST, RULES - 1
+            cloth, columns.take(aligned), first_cells(cloth.front), options.limits, _SPLIT, _FIRST, rules.RULES - 1
         )
         curved = columns.curvature[aligned] > 0.0
         answers.put(aligned, mean, error, count, np.where(curved, QUADRATURE_CURVED, QUADRATURE))

@@ -22,21 +22,8 @@ from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide
 from pipeline.truth.footprint.place import BOX_SIDE, GAUSSIAN, Axis, folded_box
-from pipeline.truth.geometry.heightfield import (
-    ALPHA,
-    BEND,
-    BEND_RADIUS,
-    GAP,
-    HALF_LENGTH,
-    OFFSET,
-    RADIUS,
-    TOP,
-    UNDER,
-    WARP,
-    WEFT,
-    HeightField,
-    surface_at,
-)
+from pipeline.truth.geometry import heightfield
+from pipeline.truth.geometry.heightfield import GAP, RADIUS, TOP, UNDER, WARP, WEFT, HeightField
 from pipeline.truth.scattering.point import Directions, point_share
 
 _REACH: Final = 5.5
@@ -68,7 +55,8 @@ def rectangles(field: HeightField, wanted_cells: Mask) -> Float64:
             for side in (TOP, UNDER):
                 family = int(field.top[pick, end]) if side == TOP else 1 - int(field.top[pick, end])
                 radius, margin = field.yarn[family, RADIUS], 0.5 - field.yarn[1 - family, RADIUS]
-                half, offset = field.floats[pick, end, side, HALF_LENGTH], field.floats[pick, end, side, OFFSET]
+                own = field.floats[pick, end, side]
+                half, offset = own[heightfield.HALF_LENGTH], own[heightfield.OFFSET]
                 middle = (end if family == WARP else pick) + 0.5
                 cell = float(pick if family == WARP else end)
                 # A yarn that never changes side has floats without end: it is cut at the cells.
@@ -89,8 +77,8 @@ def rectangles(field: HeightField, wanted_cells: Mask) -> Float64:
                         found[count, at], found[count, at + 1] = middle - radius, middle + radius
                         found[count, 2 - at], found[count, 3 - at] = low, high
                         found[count, 4] = family
-                        if field.floats[pick, end, side, BEND_RADIUS] > 0.0:
-                            found[count, 5] = field.yarn[family, BEND] / half
+                        if own[heightfield.BEND_RADIUS] > 0.0:
+                            found[count, 5] = field.yarn[family, heightfield.BEND] / half
                         count += 1
             width, height = 0.5 - field.yarn[WARP, RADIUS], 0.5 - field.yarn[WEFT, RADIUS]
             if width > 0.0 and height > 0.0:
@@ -182,10 +170,7 @@ def _cut(axis: Axis, lean: Lean, low: float, high: float, pieces: Float64) -> in
 
 @kernel
 def _mass(axis: Axis, lean: Lean, low: float, high: float) -> float:
-    """Return the integral of `density` over a resolved interval, by Simpson's rule: 4 % at worst, heights apart.
-
-    Over heights the density is taken to be that of a wider kernel.
-    """
+    """Return the integral of `density`, over heights that of a wider kernel, by Simpson's rule: 4 % off at worst."""
     wider = Axis(axis.shape, axis.centre + 0.5 * (lean.least + lean.most), axis.sigma, axis.repeat)
     if lean.most > lean.least:
         wider = Axis(axis.shape, wider.centre, axis.sigma + 0.25 * (lean.most - lean.least), axis.repeat)
@@ -193,22 +178,24 @@ def _mass(axis: Axis, lean: Lean, low: float, high: float) -> float:
     return (high - low) / 6.0 * (density(wider, low) + 4.0 * density(wider, middle) + density(wider, high))
 
 
+class QueryPatch(NamedTuple):
+    """A query's patch of one side of a cloth."""
+
+    cloth: ClothSide
+    directions: Directions
+    x: Axis
+    y: Axis
+    x_lean: Lean
+    y_lean: Lean
+
+
 @kernel
-def cut_parts(
-    rectangle: Float64,
-    yarn: Float64,
-    x_axis: Axis,
-    y_axis: Axis,
-    x_lean: Lean,
-    y_lean: Lean,
-    across: Float64,
-    along: Float64,
-    parts: Float64,
-) -> int:
+def cut_parts(patch: QueryPatch, rectangle: Float64, across: Float64, along: Float64, parts: Float64) -> int:
     """Write the parts of a rectangle that the footprint reaches if `parts` has rows; return their number.
 
     `across` and `along` are scratch: what is cut along each axis of the yarn.
     """
+    x_axis, y_axis, x_lean, y_lean = patch.x, patch.y, patch.x_lean, patch.y_lean
     first, second, at = (y_axis, x_axis, 2) if rectangle[4] == WEFT else (x_axis, y_axis, 0)
     first_lean, second_lean = (y_lean, x_lean) if rectangle[4] == WEFT else (x_lean, y_lean)
     low, high = rectangle[at], rectangle[at + 1]
@@ -230,7 +217,7 @@ def cut_parts(
                 part[MASS] = part[BOX_WEIGHT] * _mass(x_axis, x_lean, x[0], x[1]) * _mass(y_axis, y_lean, y[0], y[1])
                 if rectangle[4] != GAP:
                     turn = max(to - from_, rectangle[5] * (along[n, 1] - along[n, 0]))
-                    part[TURNING] = turn / yarn[int(rectangle[4]), ALPHA]
+                    part[TURNING] = turn / patch.cloth.front.yarn[int(rectangle[4]), heightfield.ALPHA]
     return columns * rows
 
 
@@ -238,28 +225,14 @@ _BISECTIONS: Final = 8
 RULES: Final = 6
 """Number of rules; level l has 2^(l + 1) nodes an axis."""
 
-_RULES: Final = [np.polynomial.legendre.leggauss(count) for count in (2, 4, 8, 16, 32, 64)]
+_RULES: Final = [np.polynomial.legendre.leggauss(2 << level) for level in range(RULES)]
 _NODES: Final = np.concatenate([nodes for nodes, _ in _RULES])  # rule of 2^(l + 1) nodes from 2^(l + 1) - 2 on
 _WEIGHTS: Final = np.concatenate([weights for _, weights in _RULES])
 
 
-class QueryPatch(NamedTuple):
-    """A query's patch of one side of a cloth."""
-
-    cloth: ClothSide
-    directions: Directions
-    x: Axis
-    y: Axis
-    x_lean: Lean
-    y_lean: Lean
-
-
 @kernel
 def _shares(patch: QueryPatch, part: Float64, a: float, b: float, shares: Float64) -> int:
-    """Write the shares of a point of a part in the sums; return which of viewer, light and back it sees, as bits.
-
-    Shares are those of a unit of the coordinates across and along.
-    """
+    """Write the shares of a point of a part in the sums; return which of viewer, light and back it sees, as bits."""
     cloth, directions = patch.cloth, patch.directions
     picks, ends = cloth.front.top.shape
     across = a if part[KIND] == GAP else part[MIDDLE] + part[HALF] * math.sin(a)
@@ -269,7 +242,7 @@ def _shares(patch: QueryPatch, part: Float64, a: float, b: float, shares: Float6
     family, area, specular, diffuse, through = point_share(cloth.front, cloth.back, x, y, directions, cloth.choices)
     above = 0.0
     if cloth.parallax:
-        above = surface_at(cloth.front, x, y, int(x), int(y))[2] - cloth.plane
+        above = heightfield.surface_at(cloth.front, x, y, int(x), int(y))[2] - cloth.plane
     weight = density(patch.x, x - patch.x_lean.slope * above) * density(patch.y, y - patch.y_lean.slope * above)
     if part[KIND] != GAP:
         weight *= part[HALF] * math.cos(a)
@@ -310,13 +283,9 @@ def integrate(
     sums[:] = 0.0
     line, point = np.zeros(POINT_SUMS), np.zeros(POINT_SUMS)
     middle, half = (mid_a, half_a) if inner_a else (mid_b, half_b)
+    mid_outer, half_outer = (mid_b, half_b) if inner_a else (mid_a, half_a)
     for k in range(n):
-        if inner_a:
-            fixed = mid_b + half_b * _NODES[rule + k]
-            outer = half_b * _WEIGHTS[rule + k]
-        else:
-            fixed = mid_a + half_a * _NODES[rule + k]
-            outer = half_a * _WEIGHTS[rule + k]
+        fixed, outer = mid_outer + half_outer * _NODES[rule + k], half_outer * _WEIGHTS[rule + k]
         line[:] = 0.0
         begin, first = middle - half, 0
         for m in range(1, n + 1):

@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.coverage import quick_coverage, tabulate_coverage
+from pipeline.analytic.coverage import quick_coverage
+from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.geometry.opacity import coverage
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
@@ -15,7 +16,7 @@ from weaves.fabric import load_fabric
 def looks(fabric, rows, sigma, curvature, seed=0, depth=0.6):
     """Return looks at random places whose rays sink to at most `depth` of the heights of the yarns."""
     random = np.random.default_rng(seed)
-    field = tabulate_coverage(fabric).field
+    field = height_field(fabric)
     bend = np.exp(random.uniform(*np.log(curvature), rows))
     slope = random.random(rows) * np.sqrt(2.0 * bend * depth * (field.highest - field.lowest))
     azimuth, flat = 2.0 * math.pi * random.random(rows), 1.0 / np.sqrt(1.0 + slope**2)

@@ -5,7 +5,6 @@ import pytest
 
 from pipeline.analytic.importance import lobes as point
 from pipeline.analytic.importance.mixture import STRAIGHT_ON, density_rows
-from pipeline.analytic.importance.surface import tabulate_surface
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import ALPHA, GAP, surface_at
 from pipeline.truth.geometry.march import ray
@@ -31,7 +30,7 @@ def points_of(fabric):
 
 def lobes_of(fabric, queries):
     """Return the lobes of points, and the densities of their wi."""
-    lobes = point.find_lobes(tabulate_surface(fabric), queries, point.point_places(1), 2.0)
+    lobes = point.find_lobes(point.tabulate_surface(fabric), queries, point.point_places(1), 2.0)
     pdf = np.empty(COUNT, np.float32)
     density_rows(lobes, queries.wi, queries.wo, pdf)
     return lobes, pdf

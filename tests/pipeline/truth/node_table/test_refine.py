@@ -8,9 +8,9 @@ from pipeline.truth.calibration import REFINED
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, cloth_side, columns_of
 from pipeline.truth.estimator import uncalibrated
 from pipeline.truth.monte_carlo import add_point, query_directions
-from pipeline.truth.node_table.cut import Known, Row, add_row, row_room
 from pipeline.truth.node_table.doubts import doubtful_from, no_doubts
 from pipeline.truth.node_table.kernels import no_shares
+from pipeline.truth.node_table.refine import Known, Row, add_row, refine_room
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.truth.cloths import fixed
@@ -35,7 +35,7 @@ def test_cut_rows_are_unbiased(name, behind):
     fabric = load_fabric(name)
     cloth = cloth_side(fabric, TruthOptions(parallax=False))
     columns = columns_of(draw_queries(QueryOptions(behind=behind), fabric.weave.repeat, 61, 0, 60))
-    room, size, tilt = row_room(), 1.0 / 64, 0.6
+    room, size, tilt = refine_room(1), 1.0 / 64, 0.6
     randoms = {known: np.random.default_rng(3) for known in (EVERYWHERE, EVERY_PLACE)}
     scores, crossed = {known: [] for known in randoms}, dict.fromkeys(randoms, 0)
     for row in range(60):
