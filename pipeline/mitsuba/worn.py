@@ -173,7 +173,8 @@ class Worn:
         looks, lobes = self._looks(hits), self._lobes(hits)
         runs = [slice(start, start + RUN) for start in range(0, len(random), RUN)]
         tasks = [(looks.take(run), random[run], known) for run, known in zip(runs, lobes, strict=True)]
-        parts = _on_all_cores(lambda task: self._bsdf.sample(*task, _seed(task[0].u, task[1])), tasks)
+        draw = self._bsdf.sample
+        parts = _on_all_cores(lambda task: draw(task[0], task[1], task[2], _seed(task[0].u, task[1])), tasks)
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
         light = np.where(straight[:, None], -hits.viewer, _turned(wi.astype(np.float64), self._turn))
         weight[~straight & ~_lit(hits, light)] = 0.0

@@ -99,7 +99,7 @@ def train(
                 with torch.autocast(device.type, torch.bfloat16, enabled=mixed(training, device)):
                     loss = learnt(batch, random)
                 optimiser.zero_grad()
-                loss.backward()  # type: ignore[no-untyped-call]
+                loss.backward()
                 norm = nn.utils.clip_grad_norm_(network.parameters(), training.gradient_clip)
                 optimiser.step()
 

@@ -42,7 +42,7 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
     names = {"median_ns": "ns", "colour_rrmse": "error"}
     names |= {f"colour_rrmse{end}": f"error{end}" for end in (LEAST, MOST)}
     moving = aliasing if aliasing is not None and len(aliasing) else pd.DataFrame(columns=[*keys, "flicker"])
-    parts = []
+    parts: list[pd.DataFrame] = []
     for _, group in errors.groupby("role", sort=False):
         whole = group[group["fabrics"] == group["fabrics"].max()]
         part = whole.merge(timing[timing["method"] != TRUTH], on=["method", "setting"])

@@ -79,8 +79,10 @@ def sum_rows(
     nodes = table.normal.shape[1]
     own, sums = kernels.no_shares(nodes), np.zeros((3, 5))
     shares = own, own._replace(weight=table.evenly)
-    rooms = weight_room(table, line), density_room(table, line), wall_room(table)
-    work = _Work(cloth, table, requested, line, *shares, *rooms, sums[0], sums[1], sums[2], refine_room(nodes))
+    weights, density, walls = weight_room(table, line), density_room(table, line), wall_room(table)
+    moved, mean, error = sums
+    rest = refine_room(nodes)
+    work = _Work(cloth, table, requested, line, *shares, weights, density, walls, moved, mean, error, rest)
     answers = Raw.empty(len(columns.u))
     _answer_rows(work, columns, index, np.uint64(seed), answers)
     return answers
