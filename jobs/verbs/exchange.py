@@ -54,6 +54,9 @@ class ExportFlags:
     ] = field(default_factory=list)
     solar: Annotated[str | None, Parameter(help="Of a BSDF: the same fabric in the colours of the solar band.")] = None
     points: Annotated[Whole | None, Parameter(help="Of a BSDF: points of a pair of patches, a power of two; 4.")] = None
+    basis: Annotated[
+        str | None, Parameter(help="Of a BSDF: klems (default), or tensor_tree, which Radiance alone reads.")
+    ] = None
 
 
 def import_draft(

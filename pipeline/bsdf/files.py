@@ -1,6 +1,7 @@
-"""BSDFs as files: Klems XML of LBNL WINDOW, or Parquet with one value a row, which is only read.
+"""BSDFs as files: XML of LBNL WINDOW, or Parquet with one value a row, which is only read.
 
-In XML rows of a block are patches scattered to, columns patches of the light. The front is the face that the sun meets.
+XML has matrices in a Klems basis, or tensor trees, which Radiance alone reads. Rows of a matrix are patches scattered
+to, columns patches of the light. The front is the face that the sun meets.
 As seen from the room, the layer's back, x runs to the right and y upwards: labels have -x of the fabric.
 
 A row of the Parquet form is one pair of patches of a Klems basis. Its columns are `kind` (reflection, transmission),
@@ -17,7 +18,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from pipeline.atomic import atomic_write
-from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Basis, Scattering
+from pipeline.bsdf.klems import BASES, FACES, KLEMS_FULL, SCATTERED, Basis, Scattering
+from pipeline.bsdf.tensor_tree import RANKS, SHIRLEY_CHIU, Square, read_tree, tree_text
 from pipeline.compiled.arrays import Float64, Index
 from pipeline.shards.query_file import open_queries
 from weaves.errors import BadInput, nearest, one_line
@@ -35,6 +37,8 @@ _BANDS: Final = {  # name in files, source and detector
     "visible": ("Visible", "CIE Illuminant D65 1nm.ssp", "ASTM E308 1931 Y.dsp"),
     "solar": ("Solar", "CIE Illuminant D65 1nm.ssp", "None"),
 }
+_MATRIX_KEYS: Final[tuple[str, ...]] = ("ColumnAngleBasis", "RowAngleBasis")  # elements that name the basis
+_TREE_KEYS: Final[tuple[str, ...]] = ("AngleBasis",)
 _BLOCKS = [f"{kind.capitalize()} {side.capitalize()}" for kind in SCATTERED for side in FACES]
 
 
@@ -47,8 +51,11 @@ class LayerFacts(NamedTuple):
     thickness: float
 
 
-def write_klems(path: Path, scattering: Scattering, facts: LayerFacts) -> None:
-    """Write a file, whole or not at all. A file without a solar band has the visible one there too."""
+def write_xml(path: Path, scattering: Scattering, facts: LayerFacts, straight: Float64 | None = None) -> None:
+    """Write a file, whole or not at all: a tensor tree if the basis is a `Square`.
+
+    A layer without a solar band has the visible one there too. `straight` is as in `tree_text`, for a tree alone.
+    """
     ElementTree.register_namespace("", NAMESPACE)
     root = ElementTree.Element(f"{{{NAMESPACE}}}WindowElement")
     _add_texts(root, WindowElementType="System", FileType="BSDF")
@@ -59,28 +66,39 @@ def write_klems(path: Path, scattering: Scattering, facts: LayerFacts) -> None:
     _add_texts(material, DeviceType="Other", EmissivityFront=emissivity, EmissivityBack=emissivity)
     _add_texts(material, TIR=openness, EffectiveOpennessFraction=openness)
     definition, basis = _add(layer, "DataDefinition"), scattering.basis
-    _add(definition, "IncidentDataStructure", "Columns")
-    angles = _add(definition, "AngleBasis")
-    _add(angles, "AngleBasisName", basis.name)
-    for low, high, count in zip(basis.bounds, basis.bounds[1:], basis.counts, strict=False):
-        ring = _add(angles, "AngleBasisBlock")
-        _add_texts(ring, Theta=f"{0.5 * (low + high) if low else 0:g}", nPhis=str(count))
-        _add_texts(_add(ring, "ThetaBounds"), LowerTheta=f"{low:g}", UpperTheta=f"{high:g}")
+    keys, bands = _MATRIX_KEYS, scattering.mirrored().bands
+    if isinstance(basis, Square):
+        _add(definition, "IncidentDataStructure", "TensorTree4")
+        keys, straight = _TREE_KEYS, None if straight is None else straight[basis.of_lobes.mirror]
+    else:
+        _add(definition, "IncidentDataStructure", "Columns")
+        _add_rings(_add(definition, "AngleBasis"), basis)
     for band, (label, source, detector) in _BANDS.items():
-        blocks = mirrored(basis, scattering.bands.get(band, scattering.bands["visible"]))
-        for direction, values in zip(_BLOCKS, blocks.reshape(4, basis.patches, -1), strict=True):
+        for direction, values in zip(
+            _BLOCKS, bands.get(band, bands["visible"]).reshape(4, basis.patches, -1), strict=True
+        ):
             # One block each: some readers look at the first alone.
             data = _add(layer, "WavelengthData")
             _add(data, "LayerNumber", "System")
             _add(data, "Wavelength", label, unit="Integral")
             _add_texts(data, SourceSpectrum=source, DetectorSpectrum=detector)
-            block, function = _add(data, "WavelengthDataBlock"), "BRDF" if "Reflection" in direction else "BTDF"
-            _add_texts(block, WavelengthDataDirection=direction, ColumnAngleBasis=basis.name, RowAngleBasis=basis.name)
-            # Readers expect a comma behind the last number of a row too.
-            rows = ("".join(f"{value:.6g}, " for value in row) for row in values)
-            _add_texts(block, ScatteringDataType=function, ScatteringData="\n".join(rows))
+            block, reflected = _add(data, "WavelengthDataBlock"), "Reflection" in direction
+            _add_texts(block, WavelengthDataDirection=direction, **dict.fromkeys(keys, basis.name))
+            if isinstance(basis, Square):
+                text = tree_text(values, basis, None if reflected else straight)
+            else:  # readers expect a comma behind the last number of a row too
+                text = "\n".join("".join(f"{value:.6g}, " for value in row) for row in values)
+            _add_texts(block, ScatteringDataType="BRDF" if reflected else "BTDF", ScatteringData=text)
     ElementTree.indent(root)
     atomic_write(path, b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root))
+
+
+def _add_rings(parent: ElementTree.Element, basis: Basis) -> None:
+    _add(parent, "AngleBasisName", basis.name)
+    for low, high, count in zip(basis.bounds, basis.bounds[1:], basis.counts, strict=False):
+        ring = _add(parent, "AngleBasisBlock")
+        _add_texts(ring, Theta=f"{0.5 * (low + high) if low else 0:g}", nPhis=str(count))
+        _add_texts(_add(ring, "ThetaBounds"), LowerTheta=f"{low:g}", UpperTheta=f"{high:g}")
 
 
 def _add_texts(parent: ElementTree.Element, **texts: str) -> None:
@@ -107,27 +125,33 @@ def read_bsdf(path: Path) -> Scattering:
 
 
 def _read_xml(path: Path) -> Scattering:
-    """Read bands, in lower case, with NaN in the blocks that the file lacks."""
+    """Read bands, in lower case, with NaN in the blocks that the file lacks; a tensor tree as Klems full."""
     where = str(path)
     try:
         root = ElementTree.fromstring(read_bytes(path, 64 * MIB, _NEEDED))
     except ElementTree.ParseError as error:
         raise BadInput(where, "", f"broken XML ({one_line(error)})", f"{_NEEDED} is needed") from error
     form = root.findtext(".//{*}IncidentDataStructure", "").strip()
-    if form != "Columns":
-        raise BadInput(where, "IncidentDataStructure", form, "must be Columns: matrices in a Klems basis are read")
+    if form not in ("Columns", *RANKS):
+        raise BadInput(where, "IncidentDataStructure", form, f"must be one of Columns, {', '.join(RANKS)}")
     bands: dict[str, Float64] = {}
-    basis = BASES[_name(where, root, "ColumnAngleBasis", tuple(BASES))]
+    if form in RANKS:
+        keys, basis, known = _TREE_KEYS, KLEMS_FULL, (SHIRLEY_CHIU,)
+    else:
+        keys = _MATRIX_KEYS
+        basis = BASES[_name(where, root, keys[0], tuple(BASES))]
+        known = (basis.name,)
     for data in root.iterfind(".//{*}WavelengthData"):
         band = data.findtext("{*}Wavelength", "").strip().lower()
         for block in data.iterfind("{*}WavelengthDataBlock"):
-            for key in ("ColumnAngleBasis", "RowAngleBasis"):
-                _name(where, block, key, (basis.name,))
+            for key in keys:
+                _name(where, block, key, known)
             kind, side = _name(where, block, "WavelengthDataDirection", tuple(_BLOCKS)).lower().split()
-            values = _values(where, block.findtext("{*}ScatteringData", ""), basis.patches)
+            text = block.findtext("{*}ScatteringData", "")
+            values = read_tree(where, text, RANKS[form]) if form in RANKS else _values(where, text, basis.patches)
             blocks = bands.setdefault(band, np.full((2, 2, basis.patches, basis.patches), np.nan))
             blocks[SCATTERED.index(kind), FACES.index(side)] = values
-    return Scattering(basis, {band: mirrored(basis, blocks) for band, blocks in bands.items()})
+    return Scattering(basis, bands).mirrored()
 
 
 def _name(where: str, element: ElementTree.Element, key: str, known: tuple[str, ...]) -> str:
@@ -168,7 +192,7 @@ def _read_parquet(path: Path) -> Scattering:
         raise BadInput(where, "theta_in, phi_in", "no patch", f"middles of patches are needed: {', '.join(BASES)}")
     blocks = np.full((2, 2, basis.patches, basis.patches), np.nan)
     blocks[kind, side, out, into] = angles["value"]
-    return Scattering(basis, {"visible": mirrored(basis, blocks)})
+    return Scattering(basis, {"visible": blocks}).mirrored()
 
 
 def _numbers(where: str, table: Any, name: str, known: tuple[str, str]) -> Index:
@@ -198,11 +222,3 @@ def _patches(basis: Basis, theta: Float64, phi: Float64) -> Index:
     patch = np.concatenate([[0], np.cumsum(basis.counts)[:-1]])[ring] + np.round(turn).astype(int) % counts
     good = (np.abs(theta - middles[ring]) < _TOLERANCE) & (np.abs(turn - np.round(turn)) < _TOLERANCE)
     return np.asarray(np.where(good, patch, -1))
-
-
-def mirrored(basis: Basis, blocks: Float64) -> Float64:
-    """Return blocks (..., P, P) with labels (-x, y) in place of (x, y)."""
-    counts = np.array(basis.counts)[basis.ring]
-    # Azimuth a becomes 180 degrees - a.
-    mirror = np.arange(basis.patches) - basis.number + (counts // 2 - basis.number) % counts
-    return np.asarray(blocks[..., mirror[:, None], mirror])

@@ -61,6 +61,26 @@ class Basis(NamedTuple):
         counts = np.array(self.counts)[self.ring]
         return np.asarray(np.arange(self.patches) - self.number + (self.number + counts // 2) % counts)
 
+    @property
+    def mirror(self) -> Index:
+        """Patch of the label (-x, y) of each patch, (P,): azimuth a becomes 180 degrees - a."""
+        counts = np.array(self.counts)[self.ring]
+        return np.asarray(np.arange(self.patches) - self.number + (counts // 2 - self.number) % counts)
+
+    @property
+    def normal(self) -> int:
+        """Patch of the normal, or one of those beside it."""
+        return 0
+
+    @property
+    def of_lobes(self) -> Basis:
+        """Basis in which files have light that goes straight through."""
+        return self
+
+    def means(self, shares: Float64) -> Float64:
+        """Return means over patches of numbers in `of_lobes`, (P,)."""
+        return shares
+
     def directions(self, patch: Index, u: Float64, v: Float64) -> Float64:
         """Return labels (N, 3), z > 0, of N points of patches: u, v in [0, 1) are even in projected solid angle."""
         square, counts = np.sin(np.radians(self.bounds)) ** 2, np.array(self.counts)
@@ -104,6 +124,11 @@ class Scattering(NamedTuple):
     def _sums(self, band: str) -> Float64:
         """Return the same without the viewers of whom nothing is known."""
         return np.asarray(np.einsum("ksoi,o->ksi", np.nan_to_num(self.bands[band]), self.basis.projected_solid_angle))
+
+    def mirrored(self) -> Scattering:
+        """Return the layer with labels (-x, y) in place of (x, y)."""
+        mirror = self.basis.mirror
+        return Scattering(self.basis, {band: x[..., mirror[:, None], mirror] for band, x in self.bands.items()})
 
     def direct(self, band: str) -> Float64:
         """Return the share of light that keeps its patch in transmission, (2, P), what is scattered there included."""

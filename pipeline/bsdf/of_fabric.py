@@ -32,7 +32,7 @@ EVEN_SIGMA: Final = 32.0
 """Standard deviation of the footprint, in yarn spacings, at least: it covers the cloth evenly."""
 
 _TRUTH: Final = TruthOptions()
-_OF_DIRECT: Final = 64  # points of a patch for light that goes straight through
+_OF_DIRECT: Final = 64  # points of a patch for light that goes straight through; a quarter if patches are small
 _STEEPEST: Final = np.sin(np.radians(88.9)) ** 2  # the truth has no view rays from 89 degrees on
 _LABELS = np.array([-1.0, -1.0, 1.0])  # from the label of light to the direction to its source
 
@@ -73,13 +73,12 @@ def fabric_bsdf(
             bands[band][kind, side] = value.reshape(count, count, points).mean(axis=-1)
     whole = Scattering(basis, bands)
     asymmetry = float(max(whole.reciprocity(band).max() for band in bands))
-    direct = _direct(fabric, basis)
+    direct = _direct(fabric, basis.of_lobes)
+    lobe = np.diag(basis.means(direct) / basis.projected_solid_angle)
     for blocks in bands.values():
         for side in (0, 1):
             blocks[0, side] = 0.5 * (blocks[0, side] + exchanged(basis, blocks[0, side]))
-        blocks[1, 0] = 0.5 * (blocks[1, 0] + exchanged(basis, blocks[1, 1])) + np.diag(
-            direct / basis.projected_solid_angle
-        )
+        blocks[1, 0] = 0.5 * (blocks[1, 0] + exchanged(basis, blocks[1, 1])) + lobe
         blocks[1, 1] = exchanged(basis, blocks[1, 0])
     return FabricBsdf(whole.checked("export"), direct, asymmetry)
 
@@ -105,24 +104,24 @@ def pair_queries(
     fabric: Fabric, basis: Basis, lit: PatchPoints, seen: PatchPoints, lit_from: int | Index, seen_from: int | Index
 ) -> Queries:
     """Return queries about the whole cloth of N pairs of points in patches; sides are 0, the front, or 1."""
-    wi, wo = basis.directions(*_below(basis, lit)) * _LABELS, basis.directions(*_below(basis, seen))
+    wi, wo = _not_grazing(basis.directions(*lit)) * _LABELS, _not_grazing(basis.directions(*seen))
     wi[:, 2] *= 1 - 2 * lit_from
     wo[:, 2] *= 1 - 2 * seen_from
     nothing = np.zeros(len(wi))
     return Queries.round(nothing, nothing, nothing + max(EVEN_SIGMA, *fabric.weave.repeat), wi, wo)
 
 
-def _below(basis: Basis, points: PatchPoints) -> PatchPoints:
-    """Return points no lower than the lowest view of the truth."""
-    patch, u, v = points
-    square = np.sin(np.radians(basis.bounds)) ** 2
-    ring = basis.ring[patch]
-    return patch, np.minimum(u, (_STEEPEST - square[ring]) / (square[ring + 1] - square[ring])), v
+def _not_grazing(labels: Float64) -> Float64:
+    """Return labels (N, 3) no lower than the lowest view of the truth."""
+    square = (labels[:, :2] ** 2).sum(axis=1)
+    lowered = np.minimum(square, _STEEPEST)
+    scale = np.sqrt(lowered / np.where(square > 0.0, square, 1.0))
+    return np.stack([labels[:, 0] * scale, labels[:, 1] * scale, np.sqrt(1.0 - lowered)], axis=-1)
 
 
 def _direct(fabric: Fabric, basis: Basis) -> Float64:
     """Return the share of light of each patch that goes straight through, (P,): the mean of both ways."""
-    place = qmc.Sobol(2, scramble=False).random(_OF_DIRECT)
+    place = qmc.Sobol(2, scramble=False).random(_OF_DIRECT if basis.patches < _OF_DIRECT**2 else _OF_DIRECT // 4)
     patch, (u, v) = np.repeat(np.arange(basis.patches), len(place)), np.tile(place, (basis.patches, 1)).T
     # The light plays no part in the transparency; in front it is cheap.
     through = estimate(fabric, pair_queries(fabric, basis, (patch, u, v), (patch, u, v), 0, 0), _TRUTH, 9).transparency

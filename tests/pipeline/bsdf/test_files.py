@@ -5,7 +5,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipeline.bsdf.files import LayerFacts, read_bsdf, write_klems
+from pipeline.bsdf.files import LayerFacts, read_bsdf, write_xml
 from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Scattering
 from tests.refusals import refusal
 from weaves.errors import BadInput
@@ -20,7 +20,7 @@ def layer(basis, most=0.5):
 
 @pytest.mark.parametrize("basis", BASES.values())
 def test_a_file_that_was_written_is_read_again(basis, tmp_path):
-    write_klems(tmp_path / "layer.xml", layer(basis), LayerFacts("cloth", 0.05, 0.9, 1e-3))
+    write_xml(tmp_path / "layer.xml", layer(basis), LayerFacts("cloth", 0.05, 0.9, 1e-3))
     again = read_bsdf(tmp_path / "layer.xml")
     assert again.basis == basis and set(again.bands) == {"visible", "solar"}
     assert again.bands["visible"] == pytest.approx(layer(basis).bands["visible"], rel=1e-5)
@@ -53,7 +53,7 @@ def test_one_row_is_one_pair_and_blocks_that_a_file_lacks_are_not_known(tmp_path
     pq.write_table(table(), tmp_path / "rows.parquet")
     blocks = read_bsdf(tmp_path / "rows.parquet").bands["visible"]
     assert np.isfinite(blocks).sum() == 1 and blocks.shape == (2, 2, 41, 41)
-    write_klems(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
+    write_xml(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
     path.write_text(path.read_text().replace("Reflection Back", "Reflection Front"))
     blocks = read_bsdf(path).bands["visible"]
     assert np.isnan(blocks[SCATTERED.index("reflection"), FACES.index("back")]).all()
@@ -63,7 +63,7 @@ def test_one_row_is_one_pair_and_blocks_that_a_file_lacks_are_not_known(tmp_path
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("Columns<", "TensorTree3<", "IncidentDataStructure = 'TensorTree3': must be Columns"),
+        ("Columns<", "TensorTree5<", "IncidentDataStructure = 'TensorTree5': must be one of Columns"),
         ("LBNL/Klems Quarter</ColumnAngleBasis", "Own</ColumnAngleBasis", "ColumnAngleBasis = 'Own': known"),
         ("Transmission Front", "Transmission", "WavelengthDataDirection = 'Transmission'"),
         ("</WindowElement>", "", "broken XML"),
@@ -72,6 +72,6 @@ def test_one_row_is_one_pair_and_blocks_that_a_file_lacks_are_not_known(tmp_path
     ],
 )
 def test_an_xml_file_that_cannot_be_used_is_refused_in_one_sentence(old, new, sentence, tmp_path):
-    write_klems(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
+    write_xml(path := tmp_path / "layer.xml", layer(QUARTER), LayerFacts("cloth", 0.05, 0.9, 1e-3))
     path.write_text(path.read_text().replace(old, new))
     assert sentence in refusal(read_bsdf, path)
