@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
-MOST_SENTENCES: Final = 20
-"""Most sentences of one kind that a verb prints; it counts the others."""
+MOST_SENTENCES: Final = 20  # most sentences of one kind that a verb prints; it counts the others
 
 
 class Terminal(Console):

@@ -24,11 +24,9 @@ from pipeline.atomic import atomic_write, disk_errors
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed
 
-_FILES: Final = "files"
-"""Key of a listing that has the SHA-256 of each file, by its path in the folder."""
+_FILES: Final = "files"  # key of a listing that has the SHA-256 of each file, by its path in the folder
 
-Hashes = dict[str, set[str]]
-"""SHA-256 of every state of a file that the command wrote, by its path in the folder."""
+Hashes = dict[str, set[str]]  # SHA-256 of every state of a file that the command wrote, by its path in the folder
 
 
 @contextmanager

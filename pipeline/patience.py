@@ -16,11 +16,9 @@ from typing import Final, Literal, TypeVar
 
 from weaves.errors import WorkFailed, one_line
 
-MOST_SECONDS: Final = 600.0
-"""Time for which a request is repeated."""
+MOST_SECONDS: Final = 600.0  # time for which a request is repeated
 
-UNREACHED_SECONDS: Final = 4.0
-"""Time for which a request is repeated if no request of this run was ever answered."""
+UNREACHED_SECONDS: Final = 4.0  # time for which a request is repeated if no request of this run was ever answered
 
 _FIRST_PAUSE: Final = 0.5
 _LONGEST_PAUSE: Final = 10.0  # seconds

@@ -12,26 +12,20 @@ from typing import Final
 TRUTH: Final = 9
 """Ground truth, its random sequences, the queries that are drawn: every shard and every picture of the truth."""
 
-TRAINING: Final = 4
-"""The training loop and the files that it writes."""
+TRAINING: Final = 4  # the training loop and the files that it writes
 
 MODELS: Final[dict[str, int]] = {"curved": 2, "point_sampled": 6, "prefiltered": 2, "selvage": 10, "soft_nodes": 9}
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
-BOUND: Final = 2
-"""How the energy bound changes the answers of a network (`pipeline.models.bounded`)."""
+BOUND: Final = 2  # how the energy bound changes the answers of a network (`pipeline.models.bounded`)
 
 FALLBACK: Final = 10
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
-SCENES: Final = 3
-"""The shipped scenes, and the queries of any scene."""
+SCENES: Final = 3  # the shipped scenes, and the queries of any scene
 
-SCENE_BENCH: Final = 5
-"""Measurements in scenes and the files they write (`reports.measure.scene`)."""
+SCENE_BENCH: Final = 5  # measurements in scenes and the files they write (`reports.measure.scene`)
 
-VIEWER: Final = 4
-"""The page of a live fabric: its shaders, scripts and views (`reports.viewer`)."""
+VIEWER: Final = 4  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
 
-EXTREMES: Final = 1
-"""Measurements at extremes (`reports.measure.extremes`)."""
+EXTREMES: Final = 1  # measurements at extremes (`reports.measure.extremes`)

@@ -12,8 +12,7 @@ from typing import Final, Literal, NamedTuple
 
 from pipeline.models.added.added_code import AddedFunction
 
-Better = Literal["lower", "higher", "near 0", ""]
-"""Direction of a better value; empty where none is better."""
+Better = Literal["lower", "higher", "near 0", ""]  # direction of a better value; empty where none is better
 
 Format = Literal[
     "scientific", "signed", "percent", "fine percent", "whole percent", "three decimals", "two decimals", "one decimal",

@@ -23,11 +23,9 @@ LATENT_PAIRS: Final[tuple[tuple[str, str, Literal["yarns", "draft"]], ...]] = (
 )
 """Presets between whose latents errors are measured: each first one, with the yarns or the draft of the other."""
 
-Role = Literal["seen", "unseen"]
-"""Role of a measured fabric: `seen` if general models saw it in training."""
+Role = Literal["seen", "unseen"]  # role of a measured fabric: `seen` if general models saw it in training
 
-Side = Annotated[int, Field(ge=16, le=4096)]
-"""Side of a picture in pixels."""
+Side = Annotated[int, Field(ge=16, le=4096)]  # side of a picture in pixels
 
 RuntimeName = Literal["eager-bf16", "eager-fp16", "compile", "compile-bf16", "onnx", "onnx-int8"]
 """Ways to run a trained method, `pipeline.models.runtimes` says which."""
@@ -192,8 +190,7 @@ StudyName = Literal[
 """Modules of `reports.truth` that measure the truth, importance sampling, frames in Mitsuba, or fits to real cloth."""
 
 LEAST_TILE: Final = 8
-MOST_TILE: Final = 512
-"""Fewest and most pixels along each side of a picture of the truth on a live page."""
+MOST_TILE: Final = 512  # fewest and most pixels along each side of a picture of the truth on a live page
 
 
 class LiveOptions(Frozen):

@@ -23,16 +23,14 @@ import pandas as pd
 from reports.record import Provenance, Record
 
 LEAST: Final = "_least"
-MOST: Final = "_most"
-"""Ends of the names of the columns of a range."""
+MOST: Final = "_most"  # ends of the names of the columns of a range
 
 _NUMBERS: Final = ("value", "standard_error", "low", "high")
 _SHARED: Final = [name for name in Provenance.model_fields if name not in ("model", "seed")]
 
 Table = Callable[[Sequence[Record]], pd.DataFrame]
 
-Statistic = Callable[[Any], float]
-"""Function of the numbers of the trainings."""
+Statistic = Callable[[Any], float]  # function of the numbers of the trainings
 
 
 def trainings(records: Sequence[Record]) -> dict[tuple[str, str], int]:

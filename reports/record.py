@@ -37,8 +37,7 @@ PACKAGES: Final = (
 )  # fmt: skip
 """Packages whose versions are noted."""
 
-TRUTH: Final = "truth"
-"""Name of the reference, where methods are named."""
+TRUTH: Final = "truth"  # name of the reference, where methods are named
 
 OF_A_PAGE: Final = "records.json"
 """File in a page's folder that holds all its Records; the machine of the times lies beside it."""
@@ -51,8 +50,7 @@ def _known(metric: str) -> str:
     return metric
 
 
-Metric = Annotated[str, AfterValidator(_known)]
-"""Name of a metric, a key of `reports.catalogue.METRICS`."""
+Metric = Annotated[str, AfterValidator(_known)]  # name of a metric, a key of `reports.catalogue.METRICS`
 
 
 class Provenance(Frozen):

@@ -18,11 +18,9 @@ from weaves.errors import BadInput, nearest
 from weaves.validation import Frozen
 from weaves.yarn import Yarn
 
-MOST_COLOURS: Final = 256
-"""Most colours of a palette."""
+MOST_COLOURS: Final = 256  # most colours of a palette
 
-MOST_THREADS: Final = 4096
-"""Most ends, and most picks, after which the colours must repeat."""
+MOST_THREADS: Final = 4096  # most ends, and most picks, after which the colours must repeat
 
 Run = tuple[str, Annotated[StrictInt, Field(ge=1, le=MOST_THREADS)]]
 """A name of the palette, and the number of neighbouring threads that have this colour."""

@@ -28,8 +28,7 @@ from weaves.errors import BadInput
 from weaves.validation import Frozen, validated
 from weaves.yarn import NARROWEST_YARN, Yarn
 
-PerCm = Annotated[float, Strict(), Field(ge=0.1, le=1000)]
-"""Yarns per centimetre."""
+PerCm = Annotated[float, Strict(), Field(ge=0.1, le=1000)]  # yarns per centimetre
 
 TEX_TIMES_NE: Final = 1e3 * 453.59237 / (840 * 0.9144)
 """Product of a yarn's counts in tex and in Ne: grams a pound and metres a hank."""
@@ -107,14 +106,10 @@ def _width(given: dict[str, Any], yarn: Mapping[str, Any], per_cm: Any, axis: in
 class Cover(NamedTuple):
     """How closely a cloth is woven."""
 
-    warp: float
-    """Share of the area that the warp covers, 0 to 1."""
-    weft: float
-    """Share that the weft covers."""
-    cloth: float
-    """Share that either covers."""
-    openness: float
-    """Share of the gaps."""
+    warp: float  # share of the area that the warp covers, 0 to 1
+    weft: float  # share that the weft covers
+    cloth: float  # share that either covers
+    openness: float  # share of the gaps
     cut_off_along_warp: float
     """Angle to the normal, in degrees, from which on no light inclined along the warp passes straight; 0: none does."""
     cut_off_along_weft: float

@@ -19,8 +19,7 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from weaves.errors import BadInput
 from weaves.validation import Frozen
 
-LARGEST_REPEAT = 256
-"""Most ends, and most picks, of a repeat."""
+LARGEST_REPEAT = 256  # most ends, and most picks, of a repeat
 
 Bools = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]
@@ -133,10 +132,8 @@ def numbered(rows: Sequence[Hashable]) -> tuple[list[int], list[Hashable]]:
 class Cells(NamedTuple):
     """The floats that pass through every cell of a repeat; arrays (picks, ends)."""
 
-    top: npt.NDArray[np.int8]
-    """The yarn on top: 0 warp, 1 weft."""
-    top_offset: Floats
-    """Cell centre minus centre of the float, along +y for a warp and +x for a weft, in cells."""
+    top: npt.NDArray[np.int8]  # the yarn on top: 0 warp, 1 weft
+    top_offset: Floats  # cell centre minus centre of the float, along +y for a warp and +x for a weft, in cells
     top_length: Floats
     """Cells over which the yarn stays on top (beneath); infinite, with offset 0, if it never changes side."""
     under_offset: Floats

@@ -11,8 +11,7 @@ import reprlib
 from collections.abc import Iterable
 from typing import Final
 
-MOST_LETTERS: Final = 300
-"""Most letters of a sentence."""
+MOST_LETTERS: Final = 300  # most letters of a sentence
 
 _PART = 80  # letters of a file, a key or a value in it
 _WORD = 60  # letters of a name that is compared with known ones

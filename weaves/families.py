@@ -24,8 +24,7 @@ from pydantic import BeforeValidator, Field, StrictInt
 from weaves.draft import LARGEST_REPEAT, Draft, Family
 from weaves.errors import BadInput
 
-MOST_WIDTH = LARGEST_REPEAT // 2
-"""Most ends of a stripe of a herringbone, which has two."""
+MOST_WIDTH = LARGEST_REPEAT // 2  # most ends of a stripe of a herringbone, which has two
 
 
 def _listed(value: Any) -> Any:

@@ -19,10 +19,8 @@ from weaves.draft import Floats
 from weaves.fabric import Fabric
 from weaves.surface import WARP, WEFT, surface_at
 
-INSIDE: Final = 1e-12
-"""Distance inside a piece at which its border is sampled, so that it is on top there."""
-LEAST_STEP: Final = 1e-6
-"""Pieces whose heights differ by less than this meet without a wall, in yarn spacings."""
+INSIDE: Final = 1e-12  # distance inside a piece at which its border is sampled, so that it is on top there
+LEAST_STEP: Final = 1e-6  # pieces whose heights differ by less than this meet without a wall, in yarn spacings
 
 
 class Mesh(NamedTuple):

@@ -35,10 +35,8 @@ FamilyName = Literal[_Usual, "compound_twill", "large_satin", "irregular"]
 LONGEST_TWILL = 8
 SATIN_ENDS = (5, 7, 8)
 LARGE_SATIN_ENDS = (9, 10)
-IRREGULAR_REPEATS = (4, 8)
-"""Fewest and most ends, and picks, of an irregular draft."""
-LONGEST_FLOAT = 4
-"""Longest float of an irregular draft, in cells."""
+IRREGULAR_REPEATS = (4, 8)  # fewest and most ends, and picks, of an irregular draft
+LONGEST_FLOAT = 4  # longest float of an irregular draft, in cells
 
 
 def _range_of(key: str) -> Callable[[tuple[float, float]], tuple[float, float]]:

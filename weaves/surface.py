@@ -35,12 +35,9 @@ GAP: Final = 2
 class ClothSurface(NamedTuple):
     """Surface at given points; arrays of one shape."""
 
-    yarn: npt.NDArray[np.int8]
-    """`WARP`, `WEFT`, or `GAP` where no yarn covers the point, int8."""
-    under: Bools
-    """True where the yarn on top is too narrow and the one beneath shows."""
-    height: Floats
-    """In yarn spacings, -inf in gaps; the axis of a yarn is at 0 where a float begins and ends."""
+    yarn: npt.NDArray[np.int8]  # `WARP`, `WEFT`, or `GAP` where no yarn covers the point, int8
+    under: Bools  # true where the yarn on top is too narrow and the one beneath shows
+    height: Floats  # in yarn spacings, -inf in gaps; the axis of a yarn is at 0 where a float begins and ends
     normal: Floats
     tangent: Floats
     """Unit ply normal n_p (upward) and unit fibre tangent t; +z and 0 in gaps, float64 (..., 3)."""

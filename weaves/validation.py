@@ -19,8 +19,7 @@ from weaves.reading import MOST_TEXT, read_text
 
 Model = TypeVar("Model", bound=BaseModel)
 
-MOST_DEPTH: Final = 16
-"""Most tables and lists inside one another; recipes have five."""
+MOST_DEPTH: Final = 16  # most tables and lists inside one another; recipes have five
 
 # A key of more parts, joined by dots: tomllib takes their number squared in time and memory. Bounded repetitions, and
 # none that goes back, keep the search itself linear.

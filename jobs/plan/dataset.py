@@ -22,8 +22,7 @@ from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask
 if TYPE_CHECKING:
     from pipeline.shards.manifest import ShardEntry
 
-DATASETS: Final = "datasets"
-"""Folder of all data sets, relative to the output folder."""
+DATASETS: Final = "datasets"  # folder of all data sets, relative to the output folder
 
 _START: Final = 0.1  # seconds of any shard
 

@@ -16,8 +16,7 @@ from typing import Final, NamedTuple
 from jobs.plan.ready import Ready
 from jobs.plan.task import Task
 
-LEAST_GAIN: Final = 0.05
-"""Share of the time that twice the workers must save; else the plan has stopped scaling."""
+LEAST_GAIN: Final = 0.05  # share of the time that twice the workers must save; else the plan has stopped scaling
 
 # Seconds of work that count as much as what is assumed before: of everything, of a stage, of a kind. The first tasks of
 # a run, which load kernels and are short, say little about other stages.
@@ -35,10 +34,8 @@ class Schedule(NamedTuple):
     workers: int
     makespan: float
     """Seconds from the first start to the last end."""
-    work: float
-    """Seconds of all tasks."""
-    tail: float
-    """Seconds at the end in which not all workers are busy: the straggler tail."""
+    work: float  # seconds of all tasks
+    tail: float  # seconds at the end in which not all workers are busy: the straggler tail
 
     @classmethod
     def of(cls, tasks: Sequence[Task], seconds: Mapping[str, float], workers: int) -> Schedule:

@@ -25,16 +25,13 @@ Stage = Literal["generate", "train", "bench", "report"]
 STAGES: Final[tuple[Stage, ...]] = ("generate", "train", "bench", "report")
 """The stages in the order of work; each is a verb of the command line."""
 
-Progress = Callable[[float], None]
-"""Function that receives the finished share of a task."""
+Progress = Callable[[float], None]  # function that receives the finished share of a task
 
 PLACE: Final = "place"
 """Marks a field that only says where things lie: `Annotated[..., PLACE]`. It is no part of an identity."""
 
-Place = Annotated[str, PLACE]
-"""A path relative to the output folder, or a name that a recipe gives."""
-Places = Annotated[tuple[str, ...], PLACE]
-"""Several of them."""
+Place = Annotated[str, PLACE]  # a path relative to the output folder, or a name that a recipe gives
+Places = Annotated[tuple[str, ...], PLACE]  # several of them
 
 
 class TaskPart(Frozen):
@@ -142,10 +139,8 @@ def _look(fabric: Fabric, dump: SerializerFunctionWrapHandler, info: Serializati
     return {"name": fabric.name, "optics": fabric.optics(), "colours": colours}
 
 
-Uncoloured = Annotated[Fabric, WrapSerializer(_optics)]
-"""A fabric whose colours do not change the result."""
-Coloured = Annotated[Fabric, WrapSerializer(_look)]
-"""A fabric whose colours change the result."""
+Uncoloured = Annotated[Fabric, WrapSerializer(_optics)]  # a fabric whose colours do not change the result
+Coloured = Annotated[Fabric, WrapSerializer(_look)]  # a fabric whose colours change the result
 
 
 def held(owner: BaseModel, kind: type[_Kind]) -> Iterator[_Kind]:

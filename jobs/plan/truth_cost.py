@@ -14,8 +14,7 @@ from pipeline.truth.options import NARROWEST_RIMS, TABLE_CELLS, TruthOptions
 from weaves.draft import Draft
 from weaves.fabric import Fabric
 
-SECONDS_A_POINT: Final = 5.5e-7
-"""One point of the truth, on one core of a server of 2021."""
+SECONDS_A_POINT: Final = 5.5e-7  # one point of the truth, on one core of a server of 2021
 
 _POINTS_A_ROW: Final = 1100  # for 2 % relative error, on average
 _SAMPLED: Final = 0.15  # share of the points of sampling that `auto` takes where tables answer most rows

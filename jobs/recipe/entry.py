@@ -16,11 +16,9 @@ from pipeline.models.options import Name
 from weaves.errors import BadInput
 from weaves.validation import Frozen, read_toml, validated
 
-FORM: Final = "entry.toml"
-"""File of the form."""
+FORM: Final = "entry.toml"  # file of the form
 
-ANSWER_FILES: Final = ("answers.parquet", "answers.csv")
-"""Files of the answers, of which one lies beside the form."""
+ANSWER_FILES: Final = ("answers.parquet", "answers.csv")  # files of the answers, of which one lies beside the form
 
 
 def is_plain(text: str) -> bool:

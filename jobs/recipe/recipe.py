@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from pipeline.shards.manifest import Role, Split
 
 
-MOST_UNSEEN: Final = 1000
-"""Most fabrics of an unseen population: each is measured by every general model."""
+MOST_UNSEEN: Final = 1000  # most fabrics of an unseen population: each is measured by every general model
 
 
 def _not_too_many(population: Population) -> Population:
@@ -159,10 +158,8 @@ class RecipeFile(Frozen):
 class Recipe:
     """A whole piece of work, validated, with its fabrics loaded in their order."""
 
-    name: str
-    """Names the data set and the page."""
-    about: str
-    """A sentence for `twillight list`."""
+    name: str  # names the data set and the page
+    about: str  # a sentence for `twillight list`
     dataset: DatasetOptions
     models: tuple[ModelRecipe, ...]
     bench: BenchOptions
@@ -172,10 +169,8 @@ class Recipe:
     unseen_population: tuple[Fabric, ...]
     trained_by: Mapping[str, Recipe] = field(default_factory=dict)
     """From the names of models that another recipe trains to that recipe."""
-    metrics: tuple[AddedMetric, ...] = ()
-    """Metrics from outside (`jobs.recipe.added`)."""
-    entries: tuple[Entry, ...] = ()
-    """Answers that were computed elsewhere."""
+    metrics: tuple[AddedMetric, ...] = ()  # metrics from outside (`jobs.recipe.added`)
+    entries: tuple[Entry, ...] = ()  # answers that were computed elsewhere
 
     @property
     def by_role(self) -> dict[Role, tuple[Fabric, ...]]:

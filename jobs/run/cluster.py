@@ -24,8 +24,7 @@ from pipeline.own_process import ONE_THREAD, interrupts_held
 from weaves.errors import BadInput, WorkFailed
 from weaves.reading import MIB, read_json
 
-MOST_WORKERS: Final = 1024
-"""Worker processes of a cluster on this machine, at most."""
+MOST_WORKERS: Final = 1024  # worker processes of a cluster on this machine, at most
 
 _SECONDS: Final = 5  # for a scheduler to answer
 _TRIES_TO_START: Final = 3  # the cluster on this machine
@@ -49,8 +48,7 @@ class Scheduler:
     key: Annotated[str, Parameter(name="--tls-key", help="Its key, a PEM file.")] = ""
 
 
-HERE: Final = Scheduler()
-"""No scheduler: a cluster on this machine."""
+HERE: Final = Scheduler()  # no scheduler: a cluster on this machine
 
 
 @contextmanager

@@ -33,14 +33,10 @@ class Fault(NamedTuple):
     kind: Kind
     path: str
     """Relative to the output folder."""
-    why: str
-    """Reason, a sentence about the file."""
-    task: Task | None = None
-    """The task that makes it."""
-    never_run: bool = False
-    """True if neither receipt nor product of the task exists."""
-    tasks: int = 1
-    """Number of tasks that it stands for."""
+    why: str  # reason, a sentence about the file
+    task: Task | None = None  # the task that makes it
+    never_run: bool = False  # true if neither receipt nor product of the task exists
+    tasks: int = 1  # number of tasks that it stands for
 
 
 def faults(

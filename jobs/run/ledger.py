@@ -26,14 +26,12 @@ from weaves.reading import MIB, read_json
 
 State = Literal["done", "failed", "missing"]
 
-NEVER_MADE: Final = "never made"
-"""Reason of a task that has no predecessor."""
+NEVER_MADE: Final = "never made"  # reason of a task that has no predecessor
 
 ELSEWHERE: Final = "taken from another data set"
 """Reason of a task that need not run: its products are in another data set, and a run links them."""
 
-CHANGED: Final = "changed: "
-"""Beginning of the reason of a task that was made before with another identity."""
+CHANGED: Final = "changed: "  # beginning of the reason of a task that was made before with another identity
 
 _MOST_KEYS: Final = 3  # that a reason names
 _SECONDS_BETWEEN_SYNCS: Final = 1.0

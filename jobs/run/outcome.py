@@ -30,8 +30,7 @@ class Outcome(NamedTuple):
     """One line; empty if the task is done."""
     traceback: str = ""
     """That of an unexpected exception, which may not occur elsewhere; empty for bad input and for work that failed."""
-    worker: str = ""
-    """Address of the worker; empty if it is not known."""
+    worker: str = ""  # address of the worker; empty if it is not known
     refused: bool = False
     """True if nothing was computed: the worker's software is not the driver's, or the worker died before."""
     storage_failed: bool = False

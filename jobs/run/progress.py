@@ -31,8 +31,7 @@ class Event(NamedTuple):
     task: Task | None
     share: float | None
     """Finished share of the task."""
-    message: str | None
-    """Reason of a failure, or a sentence."""
+    message: str | None  # reason of a failure, or a sentence
 
 
 class Board:

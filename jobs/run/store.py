@@ -23,8 +23,7 @@ from pipeline import storage
 from pipeline.atomic import atomic_write, link
 from weaves.errors import BadInput, WorkFailed
 
-LEDGER: Final = "ledger"
-"""Folder of the receipts, relative to the output folder."""
+LEDGER: Final = "ledger"  # folder of the receipts, relative to the output folder
 
 LOCKS: Final = frozenset({f"{LEDGER}/lock", f"{LEDGER}/tasks.lock"})
 """Empty files by which processes keep out of each other's way; no task makes them."""

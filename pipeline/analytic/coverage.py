@@ -34,8 +34,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-RAYS: Final = 32
-"""Rays of a footprint, a power of two."""
+RAYS: Final = 32  # rays of a footprint, a power of two
 
 _KEY: Final = np.uint64(0x5EED)
 _DEPTHS: Final = 24

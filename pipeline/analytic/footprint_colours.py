@@ -46,12 +46,10 @@ Patch = tuple[float, float, np.float32, np.float32, np.float32]
 class Threads(NamedTuple):
     """The coloured ends, or picks, of a fabric."""
 
-    colours: Float64
-    """k_s, k_d and k_dt of each of the sequence, (n, 9)."""
+    colours: Float64  # k_s, k_d and k_dt of each of the sequence, (n, 9)
     seen: Float64
     """Share of each cell in which the yarn is seen from above, (threads of the weave's repeat, crossing threads)."""
-    repeat: int
-    """Repeat of weave and colours together."""
+    repeat: int  # repeat of weave and colours together
     even: Float64
     """Mean colour of those that fall on each of the weave's repeat, over their number,
     (threads of the weave's repeat, 9)."""

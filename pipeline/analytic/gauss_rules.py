@@ -18,8 +18,7 @@ class Rule(NamedTuple):
     places: Float64
     weights: Float64
     """Positions within the cell; weights that sum to the length, (n,)."""
-    borders: Float64
-    """Borders of the nodes' boxes, which are as long as the weights, (n + 1,)."""
+    borders: Float64  # borders of the nodes' boxes, which are as long as the weights, (n + 1,)
 
 
 @lru_cache(maxsize=256)

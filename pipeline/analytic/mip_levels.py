@@ -23,14 +23,10 @@ _1 = np.float32(1.0)
 class MipLevels(NamedTuple):
     """Maps at all levels, down to one texel."""
 
-    texels: Float32
-    """All levels, finest first, row by row, (T, channels)."""
-    levels: Index
-    """First texel, columns and rows of each level, (L, 3)."""
-    extent: Float64
-    """Ends and picks that the maps show, (2,)."""
-    finest: float
-    """Width of the finest texels, in yarn spacings (the root of width times height)."""
+    texels: Float32  # all levels, finest first, row by row, (T, channels)
+    levels: Index  # first texel, columns and rows of each level, (L, 3)
+    extent: Float64  # ends and picks that the maps show, (2,)
+    finest: float  # width of the finest texels, in yarn spacings (the root of width times height)
 
 
 def mip_levels(maps: Sequence[npt.NDArray[Any]], extent: tuple[int, int]) -> MipLevels:

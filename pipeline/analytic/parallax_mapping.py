@@ -20,8 +20,7 @@ from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.geometry.pieces import reference_plane
 from weaves.fabric import Fabric
 
-MOST_STEPS: Final = 64
-"""Most steps of a ray."""
+MOST_STEPS: Final = 64  # most steps of a ray
 
 _STEP = 0.1  # least yarn spacings that a ray runs in a step
 _FEWEST = 2

@@ -45,14 +45,10 @@ _INVERSE_PI, _FOURTH_PI = np.float32(1.0 / math.pi), np.float32(0.25 / math.pi)
 class PrefilteredMaps(NamedTuple):
     """Averaged maps of one repeat."""
 
-    maps: MipLevels
-    """Of 2 CHANNELS: warp, then weft."""
-    yarn: Float32
-    """Alpha and blend of both families, (2, 2)."""
-    thickness: np.float32
-    """Optical thickness."""
-    heights: HeightMaps
-    """Heights of the same texels; gaps have the lowest."""
+    maps: MipLevels  # of 2 CHANNELS: warp, then weft
+    yarn: Float32  # alpha and blend of both families, (2, 2)
+    thickness: np.float32  # optical thickness
+    heights: HeightMaps  # heights of the same texels; gaps have the lowest
 
 
 def tabulate(fabric: Fabric, texels_per_yarn: int, parallax: bool = True) -> PrefilteredMaps:

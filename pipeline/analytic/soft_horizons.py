@@ -26,8 +26,7 @@ _RAMP, _RAMP_SLOPE = np.float32(0.02), np.float32(0.4)  # width of a point's ram
 _TINY: Final = np.float32(1e-20)
 
 
-AZIMUTHS: Final = 32
-"""Azimuths for which horizons are known."""
+AZIMUTHS: Final = 32  # azimuths for which horizons are known
 
 
 @fast_kernel

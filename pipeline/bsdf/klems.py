@@ -17,22 +17,17 @@ from pipeline.compiled.arrays import Float64, Index
 from weaves.errors import BadInput
 
 SCATTERED: Final = ("reflection", "transmission")
-FACES: Final = ("front", "back")
-"""Faces of a layer; of a block, the face that the light meets."""
+FACES: Final = ("front", "back")  # faces of a layer; of a block, the face that the light meets
 
-LARGEST_SUM: Final = 1.005
-"""Largest reflectance and transmittance of a direction together that a layer may have."""
+LARGEST_SUM: Final = 1.005  # largest reflectance and transmittance of a direction together that a layer may have
 
 
 class Basis(NamedTuple):
     """Rings of patches."""
 
-    name: str
-    """As in files."""
-    bounds: tuple[float, ...]
-    """Angles to the normal between the rings, degrees, from 0 to 90."""
-    counts: tuple[int, ...]
-    """Patches of each ring."""
+    name: str  # as in files
+    bounds: tuple[float, ...]  # angles to the normal between the rings, degrees, from 0 to 90
+    counts: tuple[int, ...]  # patches of each ring
 
     @property
     def patches(self) -> int:
@@ -107,8 +102,7 @@ KLEMS_FULL: Final = BASES["LBNL/Klems Full"]
 class Scattering(NamedTuple):
     """The BSDF of a layer, in 1/sr and without the cosine, means over pairs of P patches."""
 
-    basis: Basis
-    """Patches of light and of what is scattered."""
+    basis: Basis  # patches of light and of what is scattered
     bands: Mapping[str, Float64]
     """By band, such as ``visible``: [kind, side, patch scattered to, patch of the light], in the order of `SCATTERED`
     and `FACES`; NaN where nothing is known, (2, 2, P, P)."""

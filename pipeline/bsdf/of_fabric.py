@@ -25,11 +25,9 @@ from weaves.colour import LUMINANCE
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-PAIR_POINTS: Final = 4
-"""Points of a pair of patches, a power of two."""
+PAIR_POINTS: Final = 4  # points of a pair of patches, a power of two
 
-EVEN_SIGMA: Final = 32.0
-"""Standard deviation of the footprint, in yarn spacings, at least: it covers the cloth evenly."""
+EVEN_SIGMA: Final = 32.0  # standard deviation of the footprint, in yarn spacings, at least: it covers the cloth evenly
 
 _TRUTH: Final = TruthOptions()
 _OF_DIRECT: Final = 64  # points of a patch for light that goes straight through; a quarter if patches are small
@@ -40,12 +38,9 @@ _LABELS = np.array([-1.0, -1.0, 1.0])  # from the label of light to the directio
 class FabricBsdf(NamedTuple):
     """The BSDF of a fabric, its bands, and how far the truth is from reciprocal."""
 
-    scattering: Scattering
-    """``visible``, and ``solar`` if another fabric gave its colours."""
-    direct: Float64
-    """Share of light of each patch that goes straight through, (P,)."""
-    asymmetry: float
-    """Largest of `Scattering.reciprocity` before both ways are averaged."""
+    scattering: Scattering  # ``visible``, and ``solar`` if another fabric gave its colours
+    direct: Float64  # share of light of each patch that goes straight through, (P,)
+    asymmetry: float  # largest of `Scattering.reciprocity` before both ways are averaged
 
 
 def fabric_bsdf(
@@ -96,8 +91,7 @@ def _places(basis: Basis, points: int) -> Float64:
     return np.asarray(np.where(later[..., None, None], other, place) % 1.0)
 
 
-PatchPoints = tuple[Index, Float64, Float64]
-"""Patches and where in them points lie, as `Basis.directions` takes them."""
+PatchPoints = tuple[Index, Float64, Float64]  # patches and where in them points lie, as `Basis.directions` takes them
 
 
 def pair_queries(

@@ -19,8 +19,7 @@ from pipeline.compiled.arrays import Float64, Index
 from weaves.errors import BadInput, one_line
 
 SHIRLEY_CHIU: Final = "LBNL/Shirley-Chiu"
-RANKS: Final = {"TensorTree3": 3, "TensorTree4": 4}
-"""Number of axes by the form that a file states."""
+RANKS: Final = {"TensorTree3": 3, "TensorTree4": 4}  # number of axes by the form that a file states
 
 _LOBE_LEVELS: Final = 2  # by which cells of light that goes straight through are finer
 _FINEST: Final = 5  # level to which a file is averaged

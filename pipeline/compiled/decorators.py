@@ -196,8 +196,7 @@ def _holds_array(type_: Any) -> bool:
 
 _REGROUPED = {"reassoc", "contract", "nsz", "arcp"}
 
-kernel = _decorator()
-"""Decorator of compiled functions that neither make nor return an array."""
+kernel = _decorator()  # decorator of compiled functions that neither make nor return an array
 
 allocating_kernel = _decorator(allocates=True)
 """Decorator of compiled functions that make or return arrays; `kernel` would not compile, or refuse.

@@ -32,10 +32,8 @@ from weaves.errors import BadInput, nearest
 from weaves.reading import MOST_TEXT, read_text
 from weaves.validation import Frozen, read_toml, validated
 
-VISIBLE_SHARE: Final = 0.45
-"""Share of the sun's energy that the visible band stands for; the rest is infrared."""
-SHEET_NOISE: Final = 0.005
-"""Error of a share that a sheet states."""
+VISIBLE_SHARE: Final = 0.45  # share of the sun's energy that the visible band stands for; the rest is infrared
+SHEET_NOISE: Final = 0.005  # error of a share that a sheet states
 
 _Share = Annotated[float, Strict(), Field(ge=0.0, le=1.0)]
 _Size = Annotated[float, Strict(), Field(gt=0.0)]

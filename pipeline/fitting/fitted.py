@@ -39,14 +39,10 @@ class Interval(NamedTuple):
 class Fitted(NamedTuple):
     """A fabric that was fitted."""
 
-    fabric: Fabric
-    """With grey colours."""
-    numbers: Mapping[str, Interval]
-    """By their keys in a fabric file."""
-    errors: Mapping[str, float]
-    """Of what was fitted, relative to its mean."""
-    drafts: Mapping[str, float]
-    """Error of each draft that was tried, in units of a laboratory's; the chosen one first."""
+    fabric: Fabric  # with grey colours
+    numbers: Mapping[str, Interval]  # by their keys in a fabric file
+    errors: Mapping[str, float]  # of what was fitted, relative to its mean
+    drafts: Mapping[str, float]  # error of each draft that was tried, in units of a laboratory's; the chosen one first
     assumed: Sequence[str]
     unknown: Sequence[str]
     """Sentences on what was assumed, and on what the data do not determine."""

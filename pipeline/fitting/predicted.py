@@ -12,8 +12,7 @@ from pipeline.fitting.scattered import COLOURS, Scatterer, YarnOptics, pairs_of
 from pipeline.fitting.straight import gap_rays, images, straight_of, straight_share
 from weaves.fabric import Fabric
 
-BRDF_ANGLE: Final = 65.0
-"""Angle to the normal, degrees, up to which patches count in the error of a BSDF."""
+BRDF_ANGLE: Final = 65.0  # angle to the normal, degrees, up to which patches count in the error of a BSDF
 
 _RAYS = 1024  # of a patch
 

@@ -34,11 +34,9 @@ from weaves.fabric import Fabric
 COLOURS: Final = ("specular", "diffuse", "diffuse_transmission")
 """Colours of a yarn; in vectors of six, of warp and weft each."""
 
-SCATTERED_NOISE: Final = 0.13
-"""Error of a measured BSDF below 65 degrees, RMS over the mean: two laboratories."""
+SCATTERED_NOISE: Final = 0.13  # error of a measured BSDF below 65 degrees, RMS over the mean: two laboratories
 
-FACE_NOISE: Final = 0.014
-"""Relative error of a measured reflectance: two laboratories."""
+FACE_NOISE: Final = 0.014  # relative error of a measured reflectance: two laboratories
 
 _LEVEL: Final = 2  # of detail of soft nodes
 _WALKS: Final = 1 << 13  # of a table of bounces

@@ -34,8 +34,7 @@ from weaves.fabric import Fabric
 STRAIGHT_NOISE: Final = 0.067
 """Error of measured light straight through, RMS over the mean: front against back of one shade."""
 
-SEARCHES: Final = 4
-"""Searches for a geometry: what one has tried does not tell how far other geometries fit as well."""
+SEARCHES: Final = 4  # searches for a geometry: what one has tried does not tell how far other geometries fit as well
 
 _LEAST = 1e-4  # share of light that goes straight through a cloth with gaps
 _RAYS = 256  # of a patch

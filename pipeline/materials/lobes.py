@@ -32,17 +32,14 @@ from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 from weaves.surface import surface_maps
 
-GRAZING_VIEW: Final = 75.0
-"""Angle of the grazing view to the normal, degrees."""
+GRAZING_VIEW: Final = 75.0  # angle of the grazing view to the normal, degrees
 
-SKY_DIRECTIONS: Final = 512
-"""Directions of light: the mean is good to about 1 %."""
+SKY_DIRECTIONS: Final = 512  # directions of light: the mean is good to about 1 %
 
 _OPTIONS: Final = TruthOptions(estimator="owen", relative_error=0.03)
 _AZIMUTHS: Final = (0.4, 1.2, 2.0, 2.8)
 
-SHEEN_ROUGHNESS: Final = 0.5
-"""Roughness of the sheen, fixed."""
+SHEEN_ROUGHNESS: Final = 0.5  # roughness of the sheen, fixed
 
 _LOBE_DIRECTIONS: Final = 4096
 _SKY_VIEWS: Final = tuple(math.radians(a) for a in (5.0, 35.0, 65.0, 95.0, 125.0, 155.0))
@@ -51,8 +48,7 @@ _SKY_VIEWS: Final = tuple(math.radians(a) for a in (5.0, 35.0, 65.0, 95.0, 125.0
 class Reflectance(NamedTuple):
     """Reflectance by family (warp, weft), unit colours, float64 (2,)."""
 
-    coverage: Float64
-    """Share of the area in which the family is seen from above, (2,)."""
+    coverage: Float64  # share of the area in which the family is seen from above, (2,)
     diffuse: Float64
     specular: Float64
     transmitted: Float64

@@ -30,8 +30,7 @@ from pipeline.materials.planes import Layout, Planes
 from pipeline.materials.textures import Constants, textures
 from pipeline.truth.query import Queries
 
-TAPS: Final = 16
-"""Most readings along a footprint's longer axis."""
+TAPS: Final = 16  # most readings along a footprint's longer axis
 
 TEXEL_CHANNELS: Final = 15
 """Numbers of a texel: opacity, base (2), F0 (2), through (2), normal (3), tangent (3), alpha along and across."""
@@ -46,18 +45,12 @@ _VIEWS: Final = 64
 class MaterialMaps(NamedTuple):
     """Maps of one cloth in unit colours, and the sheen."""
 
-    maps: MipLevels
-    """Of TEXEL_CHANNELS."""
-    sheen: Float32
-    """Share of the sheen of each component, in unit colours, (4,)."""
-    specular: np.float32
-    """Specular colour of the yarns; the F0 of the maps has it as a factor."""
-    white: Float32
-    """Reflectance of a white sheen, by the viewer's cosine from 0 to 1, (n,)."""
-    taps: Float64
-    """In row n the places of n readings along an axis: of mean 0 and variance 1, (TAPS + 1, TAPS)."""
-    heights: HeightMaps
-    """Heights of the same texels."""
+    maps: MipLevels  # of TEXEL_CHANNELS
+    sheen: Float32  # share of the sheen of each component, in unit colours, (4,)
+    specular: np.float32  # specular colour of the yarns; the F0 of the maps has it as a factor
+    white: Float32  # reflectance of a white sheen, by the viewer's cosine from 0 to 1, (n,)
+    taps: Float64  # in row n the places of n readings along an axis: of mean 0 and variance 1, (TAPS + 1, TAPS)
+    heights: HeightMaps  # heights of the same texels
 
 
 def tabulate(

@@ -38,8 +38,7 @@ _SLOTS: Final = 4  # pieces of a cell: the yarn on top, the one beneath on its l
 class _HorizonMap(NamedTuple):
     """Horizons of one repeat."""
 
-    blocks: npt.NDArray[np.int32]
-    """Index of the first horizon of each piece, int32 (picks * ends * _SLOTS,)."""
+    blocks: npt.NDArray[np.int32]  # index of the first horizon of each piece, int32 (picks * ends * _SLOTS,)
     horizon: Float32
     """Sine of the horizon's elevation: azimuth by azimuth, line by line along the yarn, across it,
     (blocks * azimuths * grid * grid,)."""

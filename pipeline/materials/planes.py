@@ -31,20 +31,15 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric
 from weaves.surface import GAP, WARP, ClothSurface, surface_at, surface_maps
 
-SMALLEST_MAP: Final = 64
-"""Shortest longer side, in texels."""
+SMALLEST_MAP: Final = 64  # shortest longer side, in texels
 
-LARGEST_MAP: Final = 4096
-"""Longest side, in texels: the sums of such a map take 1.5 GB."""
+LARGEST_MAP: Final = 4096  # longest side, in texels: the sums of such a map take 1.5 GB
 
-LEAST_TEXELS_PER_YARN: Final = 4
-"""Fewest texels along a yarn spacing."""
+LEAST_TEXELS_PER_YARN: Final = 4  # fewest texels along a yarn spacing
 
-SAMPLES_PER_YARN: Final = 16
-"""Fewest points along a yarn spacing: maps with fewer texels take several points a texel."""
+SAMPLES_PER_YARN: Final = 16  # fewest points along a yarn spacing: maps with fewer texels take several points a texel
 
-PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""Axes of the six stored entries of a symmetric matrix."""
+PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # axes of the six stored entries of a symmetric matrix
 
 _SQUARE: Final = 0.01  # difference of the sides of a texel that counts as none
 _COPIES: Final = 16  # most repeats along the shorter side
@@ -71,14 +66,10 @@ class Layout(NamedTuple):
 class Planes(NamedTuple):
     """Means over the texels of one level, float32 (H, W) and (H, W, n), pick 0 in row 0."""
 
-    coverage: Float32
-    """Share of the texel that is covered, (H, W)."""
-    height: Float32
-    """Height in yarn spacings; gaps count as the lowest point of the cloth, (H, W)."""
-    normal: Float32
-    """c n, (H, W, 3)."""
-    fibres: Float32
-    """c (1 - alpha^2) t t^T, entries in the order of `PAIRS`, (H, W, 6)."""
+    coverage: Float32  # share of the texel that is covered, (H, W)
+    height: Float32  # height in yarn spacings; gaps count as the lowest point of the cloth, (H, W)
+    normal: Float32  # c n, (H, W, 3)
+    fibres: Float32  # c (1 - alpha^2) t t^T, entries in the order of `PAIRS`, (H, W, 6)
     base: Float32
     specular: Float32
     through: Float32

@@ -38,17 +38,13 @@ _BAND: Final = 1 << 18  # texels that are worked on at once
 class Constants(NamedTuple):
     """Numbers of a material that no map holds."""
 
-    ior: float
-    """Index of refraction by which F0 is the largest of the fabric."""
-    largest_f0: float
-    """Its F0: specular colour 1 in a map."""
-    sheen: Float64
-    """Colour of the sheen, linear RGB, (3,)."""
+    ior: float  # index of refraction by which F0 is the largest of the fabric
+    largest_f0: float  # its F0: specular colour 1 in a map
+    sheen: Float64  # colour of the sheen, linear RGB, (3,)
     transmitted: float
     """Weight of the light that goes through: the largest transmitted colour, or less where the base colour would not
     fit beside it."""
-    open_cloth: bool
-    """True if there are gaps."""
+    open_cloth: bool  # true if there are gaps
 
 
 class Textures(NamedTuple):
@@ -58,20 +54,16 @@ class Textures(NamedTuple):
     specular_color: Float32
     transmission_color: Float32
     """Linear RGB, not multiplied by the opacity; specular colour as a share of `Constants.largest_f0`, (H, W, 3)."""
-    opacity: Float32
-    """Share of the texel that is covered, (H, W)."""
-    height: Float32
-    """In yarn spacings, (H, W)."""
-    normal: Float32
-    """Unit normal: x along the weft, y along the warp, z up, (H, W, 3)."""
+    opacity: Float32  # share of the texel that is covered, (H, W)
+    height: Float32  # in yarn spacings, (H, W)
+    normal: Float32  # unit normal: x along the weft, y along the warp, z up, (H, W, 3)
     tangent: Float32
     """Unit direction of the fibres, at right angles to the normal; along +y, or +x where it lies nearer to x,
     (H, W, 3)."""
     alpha_along: Float32
     alpha_across: Float32
     """GGX roughness along the fibres and across them, not its square root, (H, W)."""
-    occlusion: Float32
-    """Share of an even sky's light that reaches the yarns, 1 in gaps, (H, W)."""
+    occlusion: Float32  # share of an even sky's light that reaches the yarns, 1 in gaps, (H, W)
 
 
 def constants(fabric: Fabric, share: Reflectance) -> Constants:

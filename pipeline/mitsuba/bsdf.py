@@ -24,11 +24,9 @@ from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
 from weaves.errors import BadInput
 from weaves.validation import validated
 
-BSDF: Final = "twillight"
-"""Name of the plugin."""
+BSDF: Final = "twillight"  # name of the plugin
 
-REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)
-"""Components."""
+REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)  # components
 
 WITHOUT_CLOTH: Final = ContextVar("WITHOUT_CLOTH", default=False)
 """True while a scene without cloth is rendered: Dr.Jit records the BSDFs of other scenes in memory all the same."""

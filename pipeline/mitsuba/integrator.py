@@ -35,11 +35,9 @@ from pipeline.scenes.loading import faceted, has_uv
 from weaves.errors import BadInput
 from weaves.validation import Frozen, validated
 
-INTEGRATOR: Final = "twillight_path"
-"""Name of the plugin."""
+INTEGRATOR: Final = "twillight_path"  # name of the plugin
 
-MOST_RAYS: Final = 2**18
-"""Most rays that are traced at a time; a ray takes about a kilobyte."""
+MOST_RAYS: Final = 2**18  # most rays that are traced at a time; a ray takes about a kilobyte
 
 MOST_SCATTER: Final = 0.5
 """Largest square of `scatter`, in radians squared: that of a direction drawn evenly from a hemisphere."""

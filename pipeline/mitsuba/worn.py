@@ -44,11 +44,9 @@ from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric
 from weaves.validation import Frozen
 
-RUN: Final = 2**14
-"""Rows that a thread answers at a time."""
+RUN: Final = 2**14  # rows that a thread answers at a time
 
-PIXEL: Final = SceneOptions().pixel_sigma
-"""Standard deviation of a pixel's Gaussian, in pixels."""
+PIXEL: Final = SceneOptions().pixel_sigma  # standard deviation of a pixel's Gaussian, in pixels
 
 LARGEST_FOOTPRINT: Final = SceneOptions().largest_sigma
 """Both axes of a footprint are cut here, in yarn spacings; where derivatives are not finite, they are this long."""
@@ -123,22 +121,14 @@ def _cut(deviation: Float64) -> Float32:
 class RayHits(NamedTuple):
     """N places of a shape that rays meet, in its local frame."""
 
-    uv: Float64
-    """Texture coordinates, (N, 2)."""
-    viewer: Float64
-    """Unit vectors to where the ray comes from, (N, 3)."""
-    outward: Float64
-    """Geometric normal; 0 if it is not known, (N, 3)."""
-    handed: Float64
-    """-1 where u, v are left-handed about the shading normal, 1 elsewhere, (N,)."""
-    jacobian: Float64
-    """d(uv)/d(pixel); 0 where the ray has no differentials, (N, 2, 2)."""
-    spread: Float64
-    """Change of u with the angle of the ray, across it, 1/radian, (N,)."""
-    stride: Float64
-    """Change of u and v with the length along the surface towards the viewer, (N, 2)."""
-    bend: Float64
-    """Curvature of the surface that way, 1/length; 0 if it is flat or not known, (N,)."""
+    uv: Float64  # texture coordinates, (N, 2)
+    viewer: Float64  # unit vectors to where the ray comes from, (N, 3)
+    outward: Float64  # geometric normal; 0 if it is not known, (N, 3)
+    handed: Float64  # -1 where u, v are left-handed about the shading normal, 1 elsewhere, (N,)
+    jacobian: Float64  # d(uv)/d(pixel); 0 where the ray has no differentials, (N, 2, 2)
+    spread: Float64  # change of u with the angle of the ray, across it, 1/radian, (N,)
+    stride: Float64  # change of u and v with the length along the surface towards the viewer, (N, 2)
+    bend: Float64  # curvature of the surface that way, 1/length; 0 if it is flat or not known, (N,)
 
 
 class Worn:

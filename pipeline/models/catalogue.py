@@ -30,8 +30,7 @@ def _options() -> Iterator[tuple[str, type[Options]]]:
         yield from ((model, options) for options in own if (model := options.model_fields["model"].default))
 
 
-CLASSES: dict[str, type[Options]] = dict(_options())
-"""The options' class of every model of the package, by its name."""
+CLASSES: dict[str, type[Options]] = dict(_options())  # the options' class of every model of the package, by its name
 
 REPLACED_MODELS: Final = {"gauss_nodes": "soft_nodes", "summed_area": "soft_nodes"}
 """Models of earlier versions, and those to take in their place."""

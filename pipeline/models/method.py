@@ -15,8 +15,7 @@ from weaves.fabric import Fabric
 CHUNK_ROWS = 4096
 """Rows of one inference on a CPU: activations of 128 numbers stay in the cache (half the time of 16,384 rows)."""
 
-Read = Callable[[Queries], Float32]
-"""Answers queries, in rows."""
+Read = Callable[[Queries], Float32]  # answers queries, in rows
 
 _ROUND = 1e-3  # of sigma, by which the axes of a round footprint may differ
 

@@ -18,8 +18,7 @@ from pipeline.storage import place
 from weaves.errors import BadInput
 from weaves.validation import validated
 
-TRUTH = "truth"
-"""Name of the ground truth among methods."""
+TRUTH = "truth"  # name of the ground truth among methods
 
 
 def untrained_names() -> list[str]:

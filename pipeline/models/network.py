@@ -24,11 +24,9 @@ from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-Trained = Sequence[tuple[dict[str, Any], dict[str, Tensor]]]
-"""Cards and weights of trained models."""
+Trained = Sequence[tuple[dict[str, Any], dict[str, Tensor]]]  # cards and weights of trained models
 
-Columns = tuple[Float32, ...]
-"""Arrays of N rows."""
+Columns = tuple[Float32, ...]  # arrays of N rows
 
 _ANY: Final = ""  # key of a network that answers for any fabric
 
@@ -36,8 +34,7 @@ _ANY: Final = ""  # key of a network that answers for any fabric
 class Batch(NamedTuple):
     """Queries and targets of a training step: F fabrics, n queries each."""
 
-    fabric: Tensor
-    """Index into the fabrics the network was built for, int64 (F,)."""
+    fabric: Tensor  # index into the fabrics the network was built for, int64 (F,)
     u: Tensor
     v: Tensor
     sigma: Tensor
@@ -49,10 +46,8 @@ class Batch(NamedTuple):
     angle: Tensor
     curvature: Tensor
     """The rest of the query, as in `Queries`, float32 (F, n)."""
-    target: Tensor
-    """Components, float32 (F, n, 4)."""
-    transparency: Tensor
-    """Share of light from straight behind that passes unscattered, float32 (F, n)."""
+    target: Tensor  # components, float32 (F, n, 4)
+    transparency: Tensor  # share of light from straight behind that passes unscattered, float32 (F, n)
 
 
 class Trainable(nn.Module):
@@ -116,12 +111,9 @@ Learnt = TypeVar("Learnt", bound=Trainable)
 class PerQuery(NamedTuple):
     """Computation of a method for each query of one fabric."""
 
-    refuse: Callable[[Queries], None]
-    """Raises BadInput for queries outside the domain."""
-    inputs: Callable[[Queries], Columns]
-    """Returns the inputs of the module for N queries: float32 arrays of N rows."""
-    module: nn.Module
-    """Takes the inputs, as tensors, then the constants; returns the components (N, 4)."""
+    refuse: Callable[[Queries], None]  # raises BadInput for queries outside the domain
+    inputs: Callable[[Queries], Columns]  # returns the inputs of the module for N queries: float32 arrays of N rows
+    module: nn.Module  # takes the inputs, as tensors, then the constants; returns the components (N, 4)
     constants: tuple[Tensor, ...] = ()
     """Inputs of the module for the fabric. Fabrics whose constants have equal shapes may share the module."""
 

@@ -17,8 +17,7 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=6
 Gaussian = Annotated[Literal["gaussian"], Field(description="Kernel it knows; must be the kernel of the truth.")]
 """The footprint of a method that knows one kernel."""
 
-Weight = Annotated[float, Field(ge=0, le=1e4)]
-"""A factor of one term of a loss."""
+Weight = Annotated[float, Field(ge=0, le=1e4)]  # a factor of one term of a loss
 
 
 RoundFootprint = Literal["geometric_mean", "major"]

@@ -32,19 +32,15 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-USUAL_METHOD: Final = "soft_nodes:2"
-"""Method that answers unless another one is given."""
+USUAL_METHOD: Final = "soft_nodes:2"  # method that answers unless another one is given
 
 
 class Sample(NamedTuple):
     """N drawn directions."""
 
-    wi: Float32
-    """Unit vectors to the light, over the whole sphere, (N, 3)."""
-    pdf: Float32
-    """Their density, 1/sr; the probability of the delta lobe where light goes straight through, (N,)."""
-    straight: Mask
-    """Where light goes straight through, wi = -wo, (N,)."""
+    wi: Float32  # unit vectors to the light, over the whole sphere, (N, 3)
+    pdf: Float32  # their density, 1/sr; the probability of the delta lobe where light goes straight through, (N,)
+    straight: Mask  # where light goes straight through, wi = -wo, (N,)
     weight: Float64
     """Linear RGB: f_P / pdf, with the incident cosine inside; the transparency over its probability where straight,
     (N, 3)."""

@@ -50,17 +50,14 @@ _MODULES = 1024  # that torch may compile in one process; beyond 8 it would fall
 class _Program(NamedTuple):
     """A module, ready to run."""
 
-    run: Callable[..., Tensor]
-    """Function of inputs and constants that returns components (N, 4)."""
-    saved: int = 0
-    """Bytes saved by its weights, relative to single precision."""
+    run: Callable[..., Tensor]  # function of inputs and constants that returns components (N, 4)
+    saved: int = 0  # bytes saved by its weights, relative to single precision
 
 
 class Runtime(NamedTuple):
     """A way to run modules."""
 
-    missing: Callable[[], str]
-    """Returns why this machine cannot; empty if it can."""
+    missing: Callable[[], str]  # returns why this machine cannot; empty if it can
     load: Callable[[nn.Module, Sequence[Tensor], int], _Program]
     """Takes a module, its inputs, and the number of inputs (the first ones) that have a row per query."""
 

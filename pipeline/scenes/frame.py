@@ -34,23 +34,20 @@ from weaves.errors import BadInput
 
 _AOVS: Final = ("position", "uv", "geo_normal", "sh_normal", "dp_du", "dp_dv", "duv_dx", "duv_dy", "shape_index")
 _AOVS_BESIDE: Final = ("position", "geo_normal", "sh_normal", "albedo", "shape_index")
-LEAST_SIGMA: Final = 1e-6
-"""Least standard deviation of a footprint, in yarn spacings."""
+LEAST_SIGMA: Final = 1e-6  # least standard deviation of a footprint, in yarn spacings
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
 
 class SceneFrame(NamedTuple):
     """A frame: what it shows of every cloth, and what is no cloth."""
 
-    gbuffers: dict[str, GBuffer]
-    """By the cloth's key; a cloth out of sight has no places."""
+    gbuffers: dict[str, GBuffer]  # by the cloth's key; a cloth out of sight has no places
     backdrop: Float64
     """Linear RGB of what is seen beside the cloth and, where there is cloth, behind it, (H, W, 3): there without the
     cloth's shadows."""
     depth: Float64
     """Distance of what is seen along the camera's axis, in the world's lengths, (H, W); 0 where nothing is."""
-    normal: Float64
-    """Shading normal of what is seen, in the world, (H, W, 3); 0 where nothing is."""
+    normal: Float64  # shading normal of what is seen, in the world, (H, W, 3); 0 where nothing is
 
 
 def render(

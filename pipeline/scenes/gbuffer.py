@@ -21,28 +21,20 @@ from pipeline.truth.query import Queries
 class GBuffer:
     """N places of one fabric in a picture of H by W pixels, and M queries about them."""
 
-    mask: Mask
-    """Pixels that show the fabric; places are among them, bool (H, W)."""
-    pixel: Index
-    """Where each place is: row * W + column, int64 (N,)."""
+    mask: Mask  # pixels that show the fabric; places are among them, bool (H, W)
+    pixel: Index  # where each place is: row * W + column, int64 (N,)
     u: Float64
     v: Float64
     """Centre of the footprint, in yarn spacings, not reduced, float64 (N,)."""
     sigma: Float64
     sigma_minor: Float64
     """Standard deviations of the footprint along its two axes, in yarn spacings, float64 (N,)."""
-    angle: Float64
-    """Angle from x to the first axis, radians, float64 (N,)."""
-    curvature: Float64
-    """Of the cloth along the view ray, 1/yarn spacings, 0 to 1, float64 (N,)."""
-    wo: Float64
-    """Unit vectors to the viewer, in the local frame, float64 (N, 3)."""
-    place: Index
-    """Which place each query is about, int64 (M,)."""
-    wi: Float64
-    """Unit vectors to the light, in the place's local frame, float64 (M, 3)."""
-    irradiance: Float64
-    """Linear RGB irradiance that the light would bring to a surface facing it there, float64 (M, 3)."""
+    angle: Float64  # angle from x to the first axis, radians, float64 (N,)
+    curvature: Float64  # of the cloth along the view ray, 1/yarn spacings, 0 to 1, float64 (N,)
+    wo: Float64  # unit vectors to the viewer, in the local frame, float64 (N, 3)
+    place: Index  # which place each query is about, int64 (M,)
+    wi: Float64  # unit vectors to the light, in the place's local frame, float64 (M, 3)
+    irradiance: Float64  # linear RGB irradiance that the light would bring to a surface facing it there, float64 (M, 3)
     rim: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     """Places at a silhouette: curved cloth whose view rays may leave it again and show what is behind it, int64
     (R,)."""

@@ -28,14 +28,10 @@ _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 class Light(NamedTuple):
     """A light without extent."""
 
-    distant: bool
-    """True if it shines from one direction everywhere."""
-    place: Float64
-    """Unit vector to it if distant, else its position, (3,)."""
-    power: Float64
-    """Linear RGB irradiance on a surface that faces it, (3,); of a point light, at distance 1."""
-    parts: tuple[Light, ...] = ()
-    """Lights that it stands for, of which each may be in shadow; none: it is one itself."""
+    distant: bool  # true if it shines from one direction everywhere
+    place: Float64  # unit vector to it if distant, else its position, (3,)
+    power: Float64  # linear RGB irradiance on a surface that faces it, (3,); of a point light, at distance 1
+    parts: tuple[Light, ...] = ()  # lights that it stands for, of which each may be in shadow; none: it is one itself
 
     def reach(self, position: Float64) -> tuple[Float64, Float64, Float64]:
         """Return unit vectors to the light (N, 3), distances (N,), irradiances on facing surfaces (N, 3)."""

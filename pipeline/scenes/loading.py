@@ -20,8 +20,7 @@ from pipeline.scenes.variant import instantiate, mitsuba
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
 
-MOST_PIXELS: Final = 16_384
-"""Most pixels a side of a film."""
+MOST_PIXELS: Final = 16_384  # most pixels a side of a film
 
 
 class FilmWindow(NamedTuple):
@@ -37,14 +36,10 @@ class FilmWindow(NamedTuple):
 class Camera:
     """A pinhole, or parallel rays; it looks along the third column of `to_world`."""
 
-    to_world: Float64
-    """From the camera's axes, left, up and forward, to the world, (4, 4)."""
-    parallel: bool
-    """True if its rays are."""
-    settings: dict[str, Any]
-    """The rest, as Mitsuba reads it."""
-    size: tuple[int, int]
-    """Width and height of its film in pixels."""
+    to_world: Float64  # from the camera's axes, left, up and forward, to the world, (4, 4)
+    parallel: bool  # true if its rays are
+    settings: dict[str, Any]  # the rest, as Mitsuba reads it
+    size: tuple[int, int]  # width and height of its film in pixels
 
     def at(self, scene: Scene, frame: float) -> Camera:
         """Return the camera of a frame."""
@@ -93,14 +88,10 @@ class Loaded:
     options: SceneOptions
     mi: Any
     """The module mitsuba."""
-    world: Any
-    """Its scene."""
-    dressed: Any
-    """The scene's cloth alone."""
-    behind: Any
-    """The scene without its cloth."""
-    cloths: dict[str, tuple[Cloth, Fabric]]
-    """The cloth of each key, and its fabric."""
+    world: Any  # its scene
+    dressed: Any  # the scene's cloth alone
+    behind: Any  # the scene without its cloth
+    cloths: dict[str, tuple[Cloth, Fabric]]  # the cloth of each key, and its fabric
     worn: dict[str, list[int]]
     """For every key the numbers of the shapes that wear it (`pipeline.scenes.rays.shape_numbers`)."""
     lights: list[Light]

@@ -8,14 +8,11 @@ from pydantic import Field
 
 from weaves.validation import Frozen
 
-View = Literal["sphere", "plane"]
-"""The views of one fabric: cloth on a sphere, and on a plane running to the horizon."""
+View = Literal["sphere", "plane"]  # the views of one fabric: cloth on a sphere, and on a plane running to the horizon
 
-Bounces = Literal[1, "all"]
-"""Bounces of light: one, as the components have it, or all bounces between diffuse yarns."""
+Bounces = Literal[1, "all"]  # bounces of light: one, as the components have it, or all bounces between diffuse yarns
 
-BOUNCES: Final[Bounces] = "all"
-"""Bounces of light unless others are chosen."""
+BOUNCES: Final[Bounces] = "all"  # bounces of light unless others are chosen
 
 
 class PixelOptions(Frozen):

@@ -46,14 +46,10 @@ class Places(NamedTuple):
     position: Float64
     outward: Float64
     """Geometric normal on the shading normal's side, (N, 3)."""
-    frame: Float64
-    """Rows x, y, z, (N, 3, 3)."""
-    uv: Float64
-    """In yarn spacings, (N, 2)."""
-    jacobian: Float64
-    """d(uv)/d(pixel), (N, 2, 2)."""
-    tangents: Float64
-    """Columns: the world's length along u and along v of one yarn spacing, (N, 3, 2)."""
+    frame: Float64  # rows x, y, z, (N, 3, 3)
+    uv: Float64  # in yarn spacings, (N, 2)
+    jacobian: Float64  # d(uv)/d(pixel), (N, 2, 2)
+    tangents: Float64  # columns: the world's length along u and along v of one yarn spacing, (N, 3, 2)
 
 
 def places_of(loaded: Loaded, key: str, cloth: Cloth, found: dict[str, Float64]) -> Places:

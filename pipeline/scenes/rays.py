@@ -16,12 +16,9 @@ _CHANNELS: Final = {"uv": 2, "duv_dx": 2, "duv_dy": 2, "shape_index": 1}  # of A
 class FirstHits(NamedTuple):
     """Where N rays hit first; NaN where they miss."""
 
-    distance: Float64
-    """In lengths of the direction, (N,)."""
-    normal: Float64
-    """Shading normal, (N, 3)."""
-    dp_du: Float64
-    """Change of position with u, (N, 3)."""
+    distance: Float64  # in lengths of the direction, (N,)
+    normal: Float64  # shading normal, (N, 3)
+    dp_du: Float64  # change of position with u, (N, 3)
 
 
 def in_sight(mi: Any, world: Any, origin: Float64, direction: Float64, distance: Float64, among: Mask) -> Index:

@@ -18,8 +18,7 @@ from pydantic import Field
 
 from weaves.validation import Frozen
 
-PREFIX: Final = "fabric_"
-"""Beginning of the id of a BSDF that represents a cloth."""
+PREFIX: Final = "fabric_"  # beginning of the id of a BSDF that represents a cloth
 
 Yarns = Annotated[float, Field(gt=0, le=1e7)]
 Length = Annotated[float, Field(ge=-1e6, le=1e6)]

@@ -17,8 +17,7 @@ from pipeline.compiled.arrays import Float64
 from pipeline.scenes import swatch
 from pipeline.scenes.scene import Cloth, Scene
 
-DRAPE_YARNS: Final = 80.0
-"""Yarns along a unit of uv of the scene `drape`."""
+DRAPE_YARNS: Final = 80.0  # yarns along a unit of uv of the scene `drape`
 
 _SIZE: Final = (256, 192)
 _HEM_YARNS: Final = 100.0  # along a unit of uv of the scene `hem`
@@ -312,5 +311,4 @@ _SCENES: Final = (
     _scene(_swatch, (0.001, 0.0005, 0.0), swatch=Cloth(fabric="herringbone", yarns=(48.0, 48.0))),
 )
 
-SHIPPED: Final[dict[str, Scene]] = {scene.name: scene for scene in _SCENES}
-"""Every shipped scene by its name."""
+SHIPPED: Final[dict[str, Scene]] = {scene.name: scene for scene in _SCENES}  # every shipped scene by its name

@@ -20,18 +20,13 @@ from pipeline.scenes.loading import FilmWindow
 from pipeline.scenes.options import PixelOptions
 from pipeline.scenes.places import LEAST_CURVATURE, dot, tilted, unit
 
-EYE: Final = (0.0, -1.5, 1.6)
-"""Place of the camera."""
-LOOKED_AT: Final = (0.0, -0.02, 0.03)
-"""Place in the middle of the picture."""
-FIELD_OF_VIEW: Final = 34.0
-"""Angle of the picture's width, in degrees."""
+EYE: Final = (0.0, -1.5, 1.6)  # place of the camera
+LOOKED_AT: Final = (0.0, -0.02, 0.03)  # place in the middle of the picture
+FIELD_OF_VIEW: Final = 34.0  # angle of the picture's width, in degrees
 LIGHTS: Final = (((-0.55, 0.75, 0.75), 2.4), ((0.6, -0.5, 1.0), 0.5))
 """Direction to each light, of any length, and its irradiance on a surface that faces it."""
-BOARD: Final = 0.25
-"""Albedo of the board."""
-HALF_BOARD: Final = 20.0
-"""Half its side; that of the cloth is 1/2."""
+BOARD: Final = 0.25  # albedo of the board
+HALF_BOARD: Final = 20.0  # half its side; that of the cloth is 1/2
 
 _STEPS = 8  # of Newton's method: the slope is at most .32
 
@@ -48,10 +43,8 @@ def _slope(y: Float64) -> Float64:
 class Swatch(NamedTuple):
     """A square of cloth and its picture."""
 
-    yarns: float
-    """Yarn spacings along each side."""
-    size: tuple[int, int]
-    """Width and height in pixels."""
+    yarns: float  # yarn spacings along each side
+    size: tuple[int, int]  # width and height in pixels
     options: PixelOptions = PixelOptions()
 
     def frame(self, window: FilmWindow) -> SceneFrame:

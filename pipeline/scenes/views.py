@@ -24,8 +24,7 @@ from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import View, ViewOptions
 from pipeline.scenes.places import unit
 
-HEADING: Final = 37.0
-"""Direction in which the cloth slides from frame to frame, as an angle from the weft, in degrees."""
+HEADING: Final = 37.0  # direction in which the cloth slides from frame to frame, as an angle from the weft, in degrees
 
 _SPHERE_PIXELS = 6.0  # that a yarn spacing takes at the centre of the sphere
 _FIELD_OF_VIEW = 50.0  # angle that the plane's picture spans from left to right, in degrees
@@ -37,16 +36,11 @@ _SPHERE_FILL = 0.94  # share of the picture's shorter side that the sphere takes
 class _Surface(NamedTuple):
     """Where the rays of a view meet its surface; M rays."""
 
-    hit: Mask
-    """Rays that do, (H, W); M of them."""
-    distance: Float64
-    """Ray parameter of the hits, in lengths of the unnormalised ray, (M,)."""
-    uv: Float64
-    """Coordinates in yarn spacings, (M, 2)."""
-    frame: Float64
-    """Rows: unit vectors along the weft, along the warp, and the normal, (M, 3, 3)."""
-    spacing: Float64
-    """Length of a yarn spacing in the world, (M,)."""
+    hit: Mask  # rays that do, (H, W); M of them
+    distance: Float64  # ray parameter of the hits, in lengths of the unnormalised ray, (M,)
+    uv: Float64  # coordinates in yarn spacings, (M, 2)
+    frame: Float64  # rows: unit vectors along the weft, along the warp, and the normal, (M, 3, 3)
+    spacing: Float64  # length of a yarn spacing in the world, (M,)
 
 
 def view(scene: View, width: int, height: int, frame: float = 0.0, options: ViewOptions | None = None) -> GBuffer:

@@ -13,11 +13,9 @@ from typing import Final, NamedTuple
 from weaves.errors import BadInput, WorkFailed, one_line
 
 SOURCE: Final = "slang"
-ONNX: Final = "onnx"
-"""The language of the source, and the network of a model alone: they need no compiler."""
+ONNX: Final = "onnx"  # the language of the source, and the network of a model alone: they need no compiler
 
-ALL: Final = "all"
-"""Every language."""
+ALL: Final = "all"  # every language
 
 
 class Program(NamedTuple):

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-MOST_NODES: Final = 1024
-"""Most fixed nodes of a table, those that fill up blocks included."""
+MOST_NODES: Final = 1024  # most fixed nodes of a table, those that fill up blocks included
 
-MOST_REPEAT_CELLS: Final = 1024
-"""Most cells of a repeat, ends times picks."""
+MOST_REPEAT_CELLS: Final = 1024  # most cells of a repeat, ends times picks
 
 MOST_HEIGHT: Final = 8192
 """Most rows of a texture, of TEXTURE_WIDTH horizons in a grid. Every WebGL 2 allows 2048, which the front alone never

@@ -13,8 +13,7 @@ from pipeline.shader.tables import layout_slang, refuse_large_repeat, table_file
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-SOFT_NODES: Final = "soft_nodes"
-"""Name of the model."""
+SOFT_NODES: Final = "soft_nodes"  # name of the model
 
 SOFT_NODES_SOURCES: Final = (
     "soft_nodes.slang", "importance.slang", "buffers.slang", "arithmetic.slang", "horizons.slang", "query.slang",

@@ -44,8 +44,7 @@ CURVATURE: Final = "curvature"
 QUERY_KINDS: Final = (BEHIND, CURVATURE)
 """Kinds of queries beside light and viewer in front of flat cloth, as `pipeline.models` names them."""
 
-EVERY: Final = "all"
-"""All of QUERY_KINDS."""
+EVERY: Final = "all"  # all of QUERY_KINDS
 
 
 class Sides(NamedTuple):

@@ -29,8 +29,7 @@ from weaves.errors import BadInput, one_line
 from weaves.reading import refuse_irregular
 
 ID: Final = "id"
-RGB_COLUMNS: Final = ("red", "green", "blue")
-"""Columns of answers in colour."""
+RGB_COLUMNS: Final = ("red", "green", "blue")  # columns of answers in colour
 
 QUESTION_COLUMNS: Final = pa.schema(
     [

@@ -34,8 +34,7 @@ from pipeline.truth.query import Answers, Queries, faults
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-CHUNK: Final = 2048
-"""Rows that a thread answers at a time, at most; no row depends on it."""
+CHUNK: Final = 2048  # rows that a thread answers at a time, at most; no row depends on it
 
 
 class Answerer(NamedTuple):
@@ -43,14 +42,11 @@ class Answerer(NamedTuple):
 
     answer: Callable[[Queries, int], Answers]
     """Takes queries and the place of the first in the file. BadInput if it cannot answer."""
-    about: dict[str, Any]
-    """Facts of it for the result's metadata."""
-    faults: query_file.FindFaults = faults
-    """Faults of queries that it cannot answer."""
+    about: dict[str, Any]  # facts of it for the result's metadata
+    faults: query_file.FindFaults = faults  # faults of queries that it cannot answer
     prepare: Callable[[Queries], None] = lambda queries: None
     """Takes the queries of a block before threads begin with them."""
-    errors: bool = False
-    """True if it states errors; else their columns are null."""
+    errors: bool = False  # true if it states errors; else their columns are null
 
 
 def truth_answerer(fabric: Fabric, options: TruthOptions, seed: int) -> Answerer:

@@ -93,8 +93,7 @@ class DatasetRows(NamedTuple):
     fabrics: dict[str, Fabric]
     roles: dict[Role, list[str]]
     """Names of the fabrics in each role."""
-    pieces: list[RowPiece]
-    """All rows that every model may read, in their order."""
+    pieces: list[RowPiece]  # all rows that every model may read, in their order
 
     @classmethod
     def load(cls, folder: Path) -> DatasetRows:

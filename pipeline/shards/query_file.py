@@ -22,8 +22,7 @@ from weaves.reading import refuse_irregular
 
 OPTIONAL: Final = {"sigma_minor": "sigma", "angle": 0.0, "curvature": 0.0}
 """Columns that may be left out, and what is taken then: another column, or a number."""
-ANSWERS: Final = [field for field in SCHEMA if field.name not in ("fabric", *QUERY_COLUMNS)]
-"""The columns of an answer."""
+ANSWERS: Final = [field for field in SCHEMA if field.name not in ("fabric", *QUERY_COLUMNS)]  # the columns of an answer
 
 _REMEDIES = ("no such file", "the path of a Parquet file is needed"), "one that can be read is needed"
 _BUFFER = 1 << 20  # bytes of a column read at a time, so that one huge row group is not held whole
@@ -85,8 +84,7 @@ def check_columns(path: Path, schema: pa.Schema) -> None:
             raise BadInput(where, f"type of column {name}", str(kind), "must be float (32 bits) or double (64 bits)")
 
 
-Faults = dict[int, tuple[str, object, str]]
-"""Faults of queries: row -> (column, value, what is allowed)."""
+Faults = dict[int, tuple[str, object, str]]  # faults of queries: row -> (column, value, what is allowed)
 FindFaults = Callable[[Queries], Faults]
 
 

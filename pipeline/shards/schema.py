@@ -37,8 +37,7 @@ _THROUGH: Final = "share of light from straight behind that reaches the viewer u
 
 STANDARD_ERRORS: Final = tuple(f"{name}_standard_error" for name in COMPONENTS)
 BOUNDS: Final = tuple(f"{name}_bound" for name in COMPONENTS)
-QUERY_COLUMNS: Final = tuple(_QUERY)
-"""The columns of a query, as `twillight evaluate` reads them."""
+QUERY_COLUMNS: Final = tuple(_QUERY)  # the columns of a query, as `twillight evaluate` reads them
 
 
 def _field(name: str, meaning: str, kind: pa.DataType = pa.float32()) -> pa.Field:  # noqa: B008, types are fixed

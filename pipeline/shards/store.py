@@ -25,11 +25,9 @@ from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 from weaves.reading import refuse_irregular
 
-FACTS: Final = b"twillight"
-"""Key of a file's metadata: its facts, as JSON."""
+FACTS: Final = b"twillight"  # key of a file's metadata: its facts, as JSON
 
-ROW_GROUP: Final = 16_384
-"""Rows written at a time."""
+ROW_GROUP: Final = 16_384  # rows written at a time
 
 _REMEDIES: Final = (
     ("does not exist", "generate it again with `twillight generate`"),

@@ -35,11 +35,9 @@ from pipeline.shards.store import ROW_GROUP, read_groups, read_table
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from weaves.errors import BadInput
 
-COLUMNS = 17
-"""u, v, sigma, wi (3), wo (3), sigma_minor, angle, curvature, components (4), transparency."""
+COLUMNS = 17  # u, v, sigma, wi (3), wo (3), sigma_minor, angle, curvature, components (4), transparency
 
-TARGET = slice(12, 16)
-"""The columns of the components."""
+TARGET = slice(12, 16)  # the columns of the components
 
 _NAMES: Final = (*QUERY_COLUMNS, *COMPONENTS, TRANSPARENCY)
 
@@ -111,8 +109,7 @@ class _Piece(NamedTuple):
     path: Path
     first: int
     """Number of the first group."""
-    rows: int
-    """Of all groups."""
+    rows: int  # of all groups
 
     def read(self, groups: int = 0) -> Float32:
         """Return the rows of the first groups, 0: of all."""

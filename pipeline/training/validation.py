@@ -22,8 +22,7 @@ from pipeline.shards.manifest import Manifest
 from pipeline.truth.conventions import COMPONENTS
 from pipeline.truth.query import Answers, Queries
 
-FOOTPRINTS = (0.1, 0.3, 1.0, 4.0)
-"""Edges between the bins of footprints, in yarn spacings."""
+FOOTPRINTS = (0.1, 0.3, 1.0, 4.0)  # edges between the bins of footprints, in yarn spacings
 
 _LOOK_ROWS = 2048  # most queries of a look during the training
 

@@ -31,14 +31,10 @@ COARSE_TABLE, FINE_TABLE, REFINED, SAMPLED, QUADRATURE, QUADRATURE_CURVED = rang
 class Factors(NamedTuple):
     """Factors of a stage."""
 
-    reported: float
-    """a, times the reported error."""
-    largest: float
-    """c, the limit of reported errors, times the norm of the components."""
-    missed: float
-    """b, times the norm of the components."""
-    cover: float
-    """k, bound over standard error."""
+    reported: float  # a, times the reported error
+    largest: float  # c, the limit of reported errors, times the norm of the components
+    missed: float  # b, times the norm of the components
+    cover: float  # k, bound over standard error
 
 
 FRONT_FACTORS: Final = {

@@ -17,11 +17,9 @@ from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices
 from weaves.fabric import Fabric
 
-AREA_SUM: Final = 5
-"""Column of the denominator in every array of sums, after the four components and the transparency."""
+AREA_SUM: Final = 5  # column of the denominator in every array of sums, after the four components and the transparency
 
-POINT_SUMS: Final = 6
-"""Columns of every array of sums."""
+POINT_SUMS: Final = 6  # columns of every array of sums
 
 
 class ClothSide(NamedTuple):
@@ -30,16 +28,11 @@ class ClothSide(NamedTuple):
     front: HeightField
     back: HeightField
     """The side that the viewer sees, and the other, reflected in the fabric plane."""
-    choices: Choices
-    """Options of the point's share."""
-    shape: int
-    """GAUSSIAN or BOX."""
-    projected: bool
-    """True if the denominator is the footprint's projected area."""
-    parallax: bool
-    """True if points of the footprint are view rays through the reference plane."""
-    plane: float
-    """Height of that plane."""
+    choices: Choices  # options of the point's share
+    shape: int  # GAUSSIAN or BOX
+    projected: bool  # true if the denominator is the footprint's projected area
+    parallax: bool  # true if points of the footprint are view rays through the reference plane
+    plane: float  # height of that plane
 
 
 class WideQueries(NamedTuple):
@@ -67,8 +60,7 @@ class Raw(NamedTuple):
     """Components and transparency, and the error that the estimator reports of each, (N, 5)."""
     count: Index  # type: ignore[assignment]  # the field's word, though tuples have a count too
     """Points or nodes evaluated, (N,)."""
-    stage: Index
-    """The computation that gave the answer: a stage of pipeline.truth.calibration, (N,)."""
+    stage: Index  # the computation that gave the answer: a stage of pipeline.truth.calibration, (N,)
 
     @classmethod
     def empty(cls, rows: int) -> Raw:

@@ -33,11 +33,9 @@ from weaves.fabric import Fabric
 from weaves.surface import GAP as NO_YARN
 from weaves.surface import surface_at
 
-SIGNIFICANCE: Final = 1e-4
-"""Probability that a check fails although the invariant holds."""
+SIGNIFICANCE: Final = 1e-4  # probability that a check fails although the invariant holds
 
-ROUNDING: Final = 2e-6
-"""Relative error of a few operations on answers in single precision."""
+ROUNDING: Final = 2e-6  # relative error of a few operations on answers in single precision
 
 
 _Relation = Literal["=", "<="]
@@ -46,8 +44,7 @@ _Relation = Literal["=", "<="]
 class CheckResult(NamedTuple):
     """A measured number, its expected value, and whether both agree."""
 
-    name: str
-    """Measured quantity."""
+    name: str  # measured quantity
     measured: float
     expected: float
     standard_error: float
@@ -56,8 +53,7 @@ class CheckResult(NamedTuple):
     """Expected relation of the number to the expected value; ``reported``: there is no expected value."""
     status: Literal["exact", "statistics", "broken", "reported"]
     """``exact``, ``statistics`` (holds within its uncertainty), ``broken`` or ``reported``."""
-    note: str
-    """Remark, shown in the table."""
+    note: str  # remark, shown in the table
 
     @property
     def sigmas(self) -> float:

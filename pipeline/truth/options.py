@@ -14,8 +14,7 @@ from weaves.validation import Frozen
 EstimatorName = Literal["mc", "r2", "owen", "quadrature", "node_table", "auto"]
 Walls = Literal["left_out", "rim"]
 
-REPLACED_ESTIMATORS: Final = {"jittered": "r2"}
-"""Estimators of earlier versions, and those to take in their place."""
+REPLACED_ESTIMATORS: Final = {"jittered": "r2"}  # estimators of earlier versions, and those to take in their place
 
 TABLE_CELLS: Final = 96
 """Most different cells of a cloth that the estimator `node_table` knows; larger tables take too long to build."""
@@ -23,11 +22,9 @@ TABLE_CELLS: Final = 96
 TABLE_SIGMA: Final = 1.25 / 32
 """Smallest standard deviation of a footprint, in yarn spacings, that the estimator `node_table` resolves."""
 
-FEWEST_NODES: Final = 24
-"""Nodes on a yarn spacing of the truth's fine table, at least."""
+FEWEST_NODES: Final = 24  # nodes on a yarn spacing of the truth's fine table, at least
 
-WALLS_OF_PLANE: Final[Walls] = "left_out"
-"""The meaning of `walls` without parallax."""
+WALLS_OF_PLANE: Final[Walls] = "left_out"  # the meaning of `walls` without parallax
 
 RAYS_RESOLVED: Final[dict[Walls, float]] = {"left_out": 0.7, "rim": 2.5}
 """Smallest standard deviation of a footprint of view rays that `node_table` resolves, over `seen_distance`."""

@@ -131,8 +131,7 @@ HIDDEN_SHARE = 1e-3
 LOWEST_VIEWER = math.cos(math.radians(89.0))
 """Least cosine of a viewer with parallax: a lower one sees a footprint through many yarns."""
 
-STEEPEST_CURVATURE = 1.0
-"""Largest curvature: a cylinder as thick as two yarn spacings."""
+STEEPEST_CURVATURE = 1.0  # largest curvature: a cylinder as thick as two yarn spacings
 
 
 def faults(queries: Queries, parallax: bool = False) -> dict[int, tuple[str, object, str]]:

@@ -13,11 +13,9 @@ from pipeline.bsdf.tensor_tree import Square
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric
 
-EMISSIVITY_ASSUMED: Final = 0.9
-"""Emissivity of yarns, which no fabric states: that of textiles."""
+EMISSIVITY_ASSUMED: Final = 0.9  # emissivity of yarns, which no fabric states: that of textiles
 
-THICKNESS_ASSUMED: Final = 5e-4
-"""Thickness in metres of a fabric without `yarns_per_cm`."""
+THICKNESS_ASSUMED: Final = 5e-4  # thickness in metres of a fabric without `yarns_per_cm`
 
 MOST_PAIR_POINTS: Final = 256
 BSDF_BASES: Final = {"klems": KLEMS_FULL, "tensor_tree": Square.of(4)}  # by their names on the command line

@@ -34,14 +34,11 @@ SAMPLE: Final = "sample.glb"
 OPENPBR: Final = "1.1.2"
 """Version of OpenPBR for which a document is made; 1.1.1 in MaterialX up to 1.39.5 squares `subsurface_color`."""
 
-DEFAULT_YARNS_PER_CM: Final = (20.0, 20.0)
-"""Ends and picks per centimetre of a fabric that does not state them."""
+DEFAULT_YARNS_PER_CM: Final = (20.0, 20.0)  # ends and picks per centimetre of a fabric that does not state them
 
-LINEAR: Final = "lin_rec709"
-"""Colour space of the EXR files."""
+LINEAR: Final = "lin_rec709"  # colour space of the EXR files
 
-LARGEST_TEXTURE: Final = 1024
-"""Longest side of the textures in the file."""
+LARGEST_TEXTURE: Final = 1024  # longest side of the textures in the file
 
 
 def yarns_per_cm(fabric: Fabric) -> tuple[float, float]:

@@ -19,8 +19,7 @@ from weaves.fabric import Fabric
 from weaves.mesh import repeat_mesh
 
 WALL: Final = (32, 32, 32)
-MOST_TRIANGLES: Final = 50_000_000
-"""More are refused: the file would have a gigabyte, and the work in memory ten."""
+MOST_TRIANGLES: Final = 50_000_000  # more are refused: the file would have a gigabyte, and the work in memory ten
 
 
 def write_mesh(fabric: Fabric, path: Path, vertices: int = 64, repeats: int = 1) -> str:

@@ -16,17 +16,13 @@ from reports.images.tiles import Bytes8, encoded, opaque, png
 from weaves.draft import Bools
 from weaves.fabric import Fabric
 
-LEAST_SHOWN: Final = 16
-"""Least ends, and picks, that are shown: smaller repeats stand several times."""
+LEAST_SHOWN: Final = 16  # least ends, and picks, that are shown: smaller repeats stand several times
 
-MOST_SHOWN: Final = 512
-"""Most ends, and picks, that are shown: of structures up to 256 threads, all."""
+MOST_SHOWN: Final = 512  # most ends, and picks, that are shown: of structures up to 256 threads, all
 
-LARGEST_CELL: Final = 24
-"""Pixels of a side of a cell, at most."""
+LARGEST_CELL: Final = 24  # pixels of a side of a cell, at most
 
-LONGEST_SIDE: Final = 1600
-"""Pixels of a draft, at most, unless its cells would have no pixel."""
+LONGEST_SIDE: Final = 1600  # pixels of a draft, at most, unless its cells would have no pixel
 
 _LEAST_LINED = 4  # pixels of cells with lines
 _PALE, _DARK = 0.2, 0.45  # weights of lines, of a grid and of floats
@@ -35,14 +31,10 @@ _PALE, _DARK = 0.2, 0.45  # weights of lines, of a grid and of floats
 class _Cells(NamedTuple):
     """A rectangle of cells, the top row first."""
 
-    colour: Bytes8
-    """(rows, columns, 3)."""
-    upright: Bools
-    """Lines on the left of each cell, and on the right of the last, (rows, columns + 1)."""
-    level: Bools
-    """Lines above each cell, and below the last, (rows + 1, columns)."""
-    weight: float
-    """Of the lines."""
+    colour: Bytes8  # (rows, columns, 3)
+    upright: Bools  # lines on the left of each cell, and on the right of the last, (rows, columns + 1)
+    level: Bools  # lines above each cell, and below the last, (rows + 1, columns)
+    weight: float  # of the lines
 
     def drawn(self, side: int) -> Bytes8:
         """Return the cells as squares of `side` pixels and a last line, (H, W, 3)."""

@@ -23,17 +23,14 @@ from weaves.errors import BadInput
 
 Picture = npt.NDArray[np.float32]
 
-RGB: Final = ("R", "G", "B")
-"""Channels of the colour."""
+RGB: Final = ("R", "G", "B")  # channels of the colour
 
 
 class Exr(NamedTuple):
     """Contents of an OpenEXR file."""
 
-    channels: dict[str, Picture]
-    """Each (H, W)."""
-    attributes: dict[str, str | int | float]
-    """Metadata that `write_exr` was given."""
+    channels: dict[str, Picture]  # each (H, W)
+    attributes: dict[str, str | int | float]  # metadata that `write_exr` was given
 
     def stack(self, *names: str) -> Picture:
         """Return channels as one array, (H, W, len(names))."""

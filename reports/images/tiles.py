@@ -27,16 +27,12 @@ from weaves.colour import LUMINANCE, linear_rgb
 from weaves.fabric import Fabric
 from weaves.surface import GAP, ClothSurface, surface_at
 
-EXPOSURE: Final = 1.6
-"""Factor on linear values before they are shown."""
-RELATIVE_RANGE: Final = 0.5
-"""Relative difference that is shown in full colour."""
+EXPOSURE: Final = 1.6  # factor on linear values before they are shown
+RELATIVE_RANGE: Final = 0.5  # relative difference that is shown in full colour
 
-DIFFERENCE_RANGE: Final = 0.5
-"""Difference, as a share of the truth's mean luminance, that is shown in full colour."""
+DIFFERENCE_RANGE: Final = 0.5  # difference, as a share of the truth's mean luminance, that is shown in full colour
 SCALE: Final = 2
-CELLS: Final = 16
-"""Yarns shown in each direction by the maps of the repeat."""
+CELLS: Final = 16  # yarns shown in each direction by the maps of the repeat
 CELL_PIXELS: Final = 12
 
 Bytes8 = npt.NDArray[np.uint8]
@@ -133,11 +129,9 @@ def size_of(png: bytes) -> tuple[int, int]:
     return Image.open(io.BytesIO(png)).size
 
 
-Tone = Literal["srgb", "reinhard"]
-"""Name of a tone curve."""
+Tone = Literal["srgb", "reinhard"]  # name of a tone curve
 
-STOPS: Final = 20.0
-"""Largest exposure in either direction, in stops."""
+STOPS: Final = 20.0  # largest exposure in either direction, in stops
 
 
 def displayed(linear: npt.NDArray[np.floating], tone: Tone = "srgb", exposure: float = 0.0) -> Bytes8:

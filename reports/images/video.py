@@ -11,8 +11,7 @@ from pipeline.atomic import atomic_path
 from reports.images.tiles import Bytes8
 from weaves.errors import BadInput
 
-QUALITY: Final = "16"
-"""Constant rate factor of H.264: a person sees no loss."""
+QUALITY: Final = "16"  # constant rate factor of H.264: a person sees no loss
 
 
 def refuse_missing(where: str, key: str, path: Path) -> None:

@@ -10,8 +10,7 @@ from reports.over_seeds import LEAST, MOST
 from reports.record import TRUTH
 from reports.tables.summary import front, rows
 
-Fault = Literal["error", "flicker"]
-"""Relative RMSE of the colour, and distance of the flicker from the truth's."""
+Fault = Literal["error", "flicker"]  # relative RMSE of the colour, and distance of the flicker from the truth's
 
 LIMITS: Final = (0.10, 0.05, 0.02, 0.01)
 FAULTS: Final[dict[Fault, tuple[float, ...]]] = {"error": LIMITS, "flicker": (0.1, 0.01, 0.001)}

@@ -25,8 +25,7 @@ _SOURCES: Final = Path(languages.__file__).parent
 KINDS: Final = {"points": "#define ONE_POINT\n", "nodes": ""}
 """Programs by what they draw, and how their source begins."""
 
-THREADS: Final = "_threads"
-"""End of the names of programs for cloth whose threads differ in colour."""
+THREADS: Final = "_threads"  # end of the names of programs for cloth whose threads differ in colour
 
 SHADERS: Final = {name + end: HOME / f"{name}{end}.frag.gz" for name in KINDS for end in ("", THREADS)}
 """Files of the shaders."""

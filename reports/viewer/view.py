@@ -57,26 +57,21 @@ VIEWS: Final = {
 }
 """Views of the page, each with a picture of the truth."""
 
-TILES: Final = ("map_material",)
-"""Methods that the page has as pictures at its views, beside the truth."""
+TILES: Final = ("map_material",)  # methods that the page has as pictures at its views, beside the truth
 
 AGAINST_LIGHT: Final = {"Against the light": Viewpoint("drape", -20.0, 6.0, 330.0, 165.0, 20.0)}
 """One more view of cloth that light comes through."""
 
-STILL: Final = "Drape"
-"""View of the still picture, with which the page opens."""
+STILL: Final = "Drape"  # view of the still picture, with which the page opens
 
 STILL_SIZE: Final = 384
 
-BEND_FACTORS: Final = (0.6, 1.0, 1.4)
-"""Factors of the bends of both yarns."""
+BEND_FACTORS: Final = (0.6, 1.0, 1.4)  # factors of the bends of both yarns
 
 WIDTHS: Final = (0.8, 1.0, 1.25)
-NARROWER: Final = (0.65, 0.8, 1.0)
-"""Factors of the widths of both yarns: the second ones if yarns would overlap."""
+NARROWER: Final = (0.65, 0.8, 1.0)  # factors of the widths of both yarns: the second ones if yarns would overlap
 
-STEEPEST_BEND: Final = 85.0
-"""Largest bend of a yarn, degrees."""
+STEEPEST_BEND: Final = 85.0  # largest bend of a yarn, degrees
 
 TWISTED: Final = 30.0
 """Twist of the nodes of yarns without twist, in degrees: the page turns all nodes to the twist that it shows, and finds

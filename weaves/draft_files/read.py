@@ -26,8 +26,7 @@ from weaves.reading import read_bytes
 
 Result = TypeVar("Result")
 
-CENTIMETRES: Final = {"decipoints": 2.54 / 720, "inches": 2.54, "centimeters": 1.0}
-"""Units of lengths in draft files."""
+CENTIMETRES: Final = {"decipoints": 2.54 / 720, "inches": 2.54, "centimeters": 1.0}  # units of lengths in draft files
 
 _EPI, _PPI = 9, 10  # bytes of a WeavePoint file: ends and picks per inch
 
@@ -35,29 +34,20 @@ _EPI, _PPI = 9, 10  # bytes of a WeavePoint file: ends and picks per inch
 class DraftThreads(NamedTuple):
     """The ends, or the picks, of a draft file."""
 
-    colours: tuple[str, ...]
-    """sRGB colour of each thread, ``"#rrggbb"``, the first thread first."""
-    width: float | None
-    """Mean thickness over mean spacing; None if the file does not state both."""
-    per_cm: float | None
-    """Threads per centimetre; None if the file states no spacing or no known unit."""
+    colours: tuple[str, ...]  # sRGB colour of each thread, ``"#rrggbb"``, the first thread first
+    width: float | None  # mean thickness over mean spacing; None if the file does not state both
+    per_cm: float | None  # threads per centimetre; None if the file states no spacing or no known unit
 
 
 class DraftFile(NamedTuple):
     """A draft as its file has it."""
 
-    title: str
-    """Title, as the file or its name says."""
-    program: str
-    """Program that wrote it, with its version."""
-    warp_over: Bools
-    """True where the warp is on top, (picks, ends), the first pick and the first end first."""
-    ends: DraftThreads
-    """The warp yarns."""
-    picks: DraftThreads
-    """The weft yarns."""
-    remarks: tuple[str, ...]
-    """Sentences on what could not be used."""
+    title: str  # title, as the file or its name says
+    program: str  # program that wrote it, with its version
+    warp_over: Bools  # true where the warp is on top, (picks, ends), the first pick and the first end first
+    ends: DraftThreads  # the warp yarns
+    picks: DraftThreads  # the weft yarns
+    remarks: tuple[str, ...]  # sentences on what could not be used
 
 
 def cut_out(draft: DraftFile, ends: tuple[int, int] | None, picks: tuple[int, int] | None) -> DraftFile:

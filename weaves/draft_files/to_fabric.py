@@ -22,11 +22,9 @@ from weaves.fabric import Fabric
 from weaves.validation import validated
 from weaves.yarn import NARROWEST_YARN
 
-LONG_REPEAT: Final = 128
-"""Threads of a longer repeat are searched for a shorter one, of which the last is not whole."""
+LONG_REPEAT: Final = 128  # threads of a longer repeat are searched for a shorter one, of which the last is not whole
 
-MOST_SOURCE: Final = 2000
-"""Most letters of a fabric's `source`."""
+MOST_SOURCE: Final = 2000  # most letters of a fabric's `source`
 
 
 class Imported(NamedTuple):
@@ -35,8 +33,7 @@ class Imported(NamedTuple):
     fabric: Fabric
     read: tuple[str, ...]
     """Sentences on what the file states."""
-    assumed: tuple[str, ...]
-    """Sentences on what it does not state, or what could not be used."""
+    assumed: tuple[str, ...]  # sentences on what it does not state, or what could not be used
 
 
 def fabric_of(draft: DraftFile, like: Fabric, name: str, where: str, given: dict[str, dict[str, float]]) -> Imported:

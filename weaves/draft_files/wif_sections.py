@@ -18,17 +18,14 @@ from weaves.colour_order import MOST_THREADS
 from weaves.errors import BadInput
 from weaves.reading import MIB
 
-MOST_WIF_BYTES: Final = 4 * MIB
-"""Most bytes of a draft file."""
+MOST_WIF_BYTES: Final = 4 * MIB  # most bytes of a draft file
 
 MOST_USED: Final = MIB
 """Most letters of the sections that are read; others, such as pictures of single programs, are left out before."""
 
-MOST_LINE_LETTERS: Final = 8192
-"""Most letters of a line."""
+MOST_LINE_LETTERS: Final = 8192  # most letters of a line
 
-MOST_ENTRIES: Final = 16 * MOST_THREADS
-"""Most lines of the sections that are read."""
+MOST_ENTRIES: Final = 16 * MOST_THREADS  # most lines of the sections that are read
 
 Thread = Annotated[int, Field(ge=1, le=MOST_THREADS)]
 Count = Annotated[int, Field(ge=0, le=MOST_THREADS)]

@@ -113,12 +113,9 @@ class Trained(TaskPart):
 class ModelSubject:
     """A model of the recipe, trained with one seed."""
 
-    recipe: ModelRecipe
-    """The model with this training alone."""
-    trainings: Mapping[str, Training]
-    """Trainings by fabric; a general model has one, with an empty key."""
-    is_first: bool = True
-    """True for the first seed, which pictures are made of and times are taken of."""
+    recipe: ModelRecipe  # the model with this training alone
+    trainings: Mapping[str, Training]  # trainings by fabric; a general model has one, with an empty key
+    is_first: bool = True  # true for the first seed, which pictures are made of and times are taken of
 
     def on(self, fabrics: Sequence[str]) -> Trained | None:
         """Return the model with the networks that answer for fabrics; None where it was not trained on one of them."""

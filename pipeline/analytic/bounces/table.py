@@ -28,12 +28,9 @@ from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import height_field
 from weaves.fabric import Fabric
 
-RANK: Final = 10
-"""Products that make up the light of second bounces: more are its noise."""
-RANK_OF_THIRD: Final = 4
-"""Products that make up the factor of third bounces."""
-WALKS: Final = 1 << 16
-"""Walks of a table."""
+RANK: Final = 10  # products that make up the light of second bounces: more are its noise
+RANK_OF_THIRD: Final = 4  # products that make up the factor of third bounces
+WALKS: Final = 1 << 16  # walks of a table
 _ANGLES: Final = 16
 _AZIMUTHS: Final = 24
 _STEEPEST: Final = math.radians(89.0)  # angle of the last directions of the grid, whose functions hold beyond

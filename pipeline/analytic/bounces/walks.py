@@ -54,8 +54,7 @@ class Start(NamedTuple):
     x: Float64
     y: Float64
     """Places in the first cell of each kind, (P,)."""
-    area: Float64
-    """The area of the fabric plane that each stands for, (P,)."""
+    area: Float64  # the area of the fabric plane that each stands for, (P,)
     first: Float64
     second: Float64
     """Random numbers of the first direction, (P,)."""
@@ -68,16 +67,12 @@ class Transport(NamedTuple):
     colours, a and b, are 2 way + f; c and d are P way + place, Q = W P of them. Lights behind follow those in front.
     """
 
-    seen: Float64
-    """Visible area towards each viewer, gaps included, (O,)."""
+    seen: Float64  # visible area towards each viewer, gaps included, (O,)
     reached: Float64
     """Of it, what has its light from two yarns and more: seen as a, from b, which has it from a place, (O, P, P, P)."""
-    second: Float32
-    """The sun's light of each direction that is seen as a and comes from b, (O, P, P, W I)."""
-    third: Float32
-    """The sun's light of each direction that comes from c, by the way of a, (O, W, W I)."""
-    further: Float64
-    """Of the visible area, what has its light from three yarns and more, by the way of a, (O, W)."""
+    second: Float32  # the sun's light of each direction that is seen as a and comes from b, (O, P, P, W I)
+    third: Float32  # the sun's light of each direction that comes from c, by the way of a, (O, W, W I)
+    further: Float64  # of the visible area, what has its light from three yarns and more, by the way of a, (O, W)
     transfers: Float64
     """Of walks that have met b and then c, in P Q rows, those that go on to each place; of walks that meet d later, in
     Q rows, the same, (P Q + Q, P)."""

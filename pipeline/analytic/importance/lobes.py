@@ -43,8 +43,7 @@ from pipeline.truth.scattering.slab_float32 import unscattered
 from weaves.colour import luminance
 from weaves.fabric import Fabric
 
-FLAKE_ROWS: Final = 6
-"""Rows of `Lobes.flakes`."""
+FLAKE_ROWS: Final = 6  # rows of `Lobes.flakes`
 
 TX, TY, TZ, SQUARE, SHARE, HEIGHT = range(FLAKE_ROWS)
 """Tangent; alpha^2, widened; probability; that times alpha^3 / (4 pi sigma(wo)), the density at q = 1."""
@@ -52,14 +51,12 @@ TX, TY, TZ, SQUARE, SHARE, HEIGHT = range(FLAKE_ROWS)
 NEAR, FAR, STRAIGHT = range(3)
 """Columns of `Lobes.rest`: the cosine on the viewer's side, that on the other, light straight through."""
 
-SPECULAR, DIFFUSE, THROUGH = range(3)
-"""Rows of `LobeSurface.luminance`: k_s, k_d and k_dt."""
+SPECULAR, DIFFUSE, THROUGH = range(3)  # rows of `LobeSurface.luminance`: k_s, k_d and k_dt
 
 SCATTERED: Final = 0.2
 """Light that leaves after one flake and meets no other yarn, as a share of what meets a flake, roughly."""
 
-BROAD: Final = 0.2
-"""Share of a family's lobes that its broad one has."""
+BROAD: Final = 0.2  # share of a family's lobes that its broad one has
 
 _GRID = 12  # cells of a grid along each axis: some tens of kilobytes, which stay in the cache
 _POINT_ROWS = 7  # of the scratch
@@ -80,23 +77,17 @@ _LEVELS = np.float32(LEVELS)
 class LobeSurface(NamedTuple):
     """One side of a cloth as lobes need it."""
 
-    repeat: Index
-    """Ends and picks, (2,)."""
-    yarn: Float32
-    """`HeightField.yarn`, (2, 8)."""
-    thickness: np.float32
-    """Optical thickness T."""
-    uniform: float
-    """Deviation from which on a Gaussian covers the cloth evenly."""
+    repeat: Index  # ends and picks, (2,)
+    yarn: Float32  # `HeightField.yarn`, (2, 8)
+    thickness: np.float32  # optical thickness T
+    uniform: float  # deviation from which on a Gaussian covers the cloth evenly
     piece_starts: Index
     pieces: Index
     bounds: Float32
     grid: npt.NDArray[np.uint8]
     """As in `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, the grid flat."""
-    size: int
-    """Cells of a grid along each axis."""
-    luminance: Float32
-    """Luminances of the mean colours of warp and weft: SPECULAR, DIFFUSE, THROUGH, (3, 2)."""
+    size: int  # cells of a grid along each axis
+    luminance: Float32  # luminances of the mean colours of warp and weft: SPECULAR, DIFFUSE, THROUGH, (3, 2)
 
 
 def tabulate_surface(fabric: Fabric) -> LobeSurface:
@@ -118,10 +109,8 @@ def tabulate_surface(fabric: Fabric) -> LobeSurface:
 class Lobes(NamedTuple):
     """Mixtures for N looks; all probabilities of a look sum to 1."""
 
-    flakes: Float32
-    """Lobes of flakes; the last two are the broad ones of warp and weft, (N, FLAKE_ROWS, K)."""
-    rest: Float32
-    """Probabilities of NEAR, FAR and STRAIGHT, (N, 3)."""
+    flakes: Float32  # lobes of flakes; the last two are the broad ones of warp and weft, (N, FLAKE_ROWS, K)
+    rest: Float32  # probabilities of NEAR, FAR and STRAIGHT, (N, 3)
 
 
 class Viewing(NamedTuple):
@@ -134,8 +123,7 @@ class Viewing(NamedTuple):
     dy: np.float32
     rho: np.float32
     """Deviations along x and y, and correlation of the axes."""
-    even: bool
-    """True if it covers the cloth evenly."""
+    even: bool  # true if it covers the cloth evenly
     ox: np.float32
     oy: np.float32
     oz: np.float32

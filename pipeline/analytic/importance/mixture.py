@@ -76,11 +76,9 @@ def sample_flake_scatter(
     return x * scale, y * scale, z * scale
 
 
-STRAIGHT_ON: Final = 0.3
-"""Share of the flakes' light to the far side that is left there."""
+STRAIGHT_ON: Final = 0.3  # share of the flakes' light to the far side that is left there
 
-LEAST_COSINE: Final = 1e-6
-"""Least |wi.n_s| of a sample: none lies in the fabric plane."""
+LEAST_COSINE: Final = 1e-6  # least |wi.n_s| of a sample: none lies in the fabric plane
 
 _0, _1, _INVERSE_PI = np.float32(0.0), np.float32(1.0), np.float32(1.0 / math.pi)
 _MIRRORED = np.float32(1.0 - STRAIGHT_ON)

@@ -30,16 +30,11 @@ from pipeline.truth.geometry.pieces import CellPiece
 class Detail(NamedTuple):
     """How fine the nodes of a table are."""
 
-    most: int
-    """Nodes of all groups of pieces on top above which groups are merged; half as many beneath."""
-    along: float
-    """Nodes along a yarn, as a multiple of those at level 2."""
-    parts: int
-    """Parts of a yarn across, each with nodes of its own."""
-    lines: float
-    """Deviation, in yarn spacings, below which a footprint places its nodes, on lines."""
-    spacing: float
-    """Distance of these lines and of their nodes, as a multiple of that at level 2."""
+    most: int  # nodes of all groups of pieces on top above which groups are merged; half as many beneath
+    along: float  # nodes along a yarn, as a multiple of those at level 2
+    parts: int  # parts of a yarn across, each with nodes of its own
+    lines: float  # deviation, in yarn spacings, below which a footprint places its nodes, on lines
+    spacing: float  # distance of these lines and of their nodes, as a multiple of that at level 2
 
 
 DETAILS: Final = {
@@ -50,12 +45,10 @@ DETAILS: Final = {
 }
 """The details of every level k."""
 
-USUAL: Final = 2
-"""The level unless another one is named."""
+USUAL: Final = 2  # the level unless another one is named
 
 
-COLUMNS: Final = 8
-"""Nodes across a yarn: half the width of the vector units."""
+COLUMNS: Final = 8  # nodes across a yarn: half the width of the vector units
 
 _ALONG = ((1.5, 4), (2.5, 3))  # nodes along a cell of a float shorter than
 _LONG = 2  # and of any longer one
@@ -67,16 +60,11 @@ Cell = tuple[int, int]
 class PieceGroup(NamedTuple):
     """Pieces that share nodes."""
 
-    piece: CellPiece
-    """The mean of them."""
-    cells: list[Cell]
-    """Cells of the pieces, (end, pick)."""
-    blocks: list[int]
-    """Numbers of their horizons, one for each cell."""
-    thread: int = 0
-    """The end or pick that they belong to; 0 if groups hold pieces of all threads."""
-    dense: float = 1.0
-    """Nodes along it, as a multiple of those at level 2."""
+    piece: CellPiece  # the mean of them
+    cells: list[Cell]  # cells of the pieces, (end, pick)
+    blocks: list[int]  # numbers of their horizons, one for each cell
+    thread: int = 0  # the end or pick that they belong to; 0 if groups hold pieces of all threads
+    dense: float = 1.0  # nodes along it, as a multiple of those at level 2
 
     @property
     def lines(self) -> int:
@@ -180,11 +168,9 @@ def _together(first: PieceGroup, second: PieceGroup) -> PieceGroup:
     return PieceGroup(piece, cells, first.blocks + second.blocks, first.thread, first.dense)
 
 
-SURFACE_ROWS: Final = 13
-"""Normal (3), 1 / n_z, tangent (3), its change along (3) and across (3)."""
+SURFACE_ROWS: Final = 13  # normal (3), 1 / n_z, tangent (3), its change along (3) and across (3)
 
-FLAT: Final = np.array([0.0, 0.0, 1.0, 1.0] + [0.0] * 9)
-"""The rows of a gap, and of the nodes that fill up a block."""
+FLAT: Final = np.array([0.0, 0.0, 1.0, 1.0] + [0.0] * 9)  # the rows of a gap, and of the nodes that fill up a block
 
 _AXES = np.eye(3)
 _GAUSS = 1.0 / math.sqrt(3.0)

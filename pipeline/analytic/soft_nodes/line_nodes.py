@@ -49,14 +49,10 @@ _INVERSE_PI = np.float32(1.0 / math.pi)
 class LineRays(NamedTuple):
     """How the rays of a footprint sink, and its deviation along lines."""
 
-    run: np.float32
-    """Distance in the plane for each unit of height, T."""
-    plane: np.float32
-    """Height of the reference plane."""
-    bent: np.float32
-    """2 kappa T^2."""
-    inverse: np.float32
-    """1 / deviation of the footprint along the lines."""
+    run: np.float32  # distance in the plane for each unit of height, T
+    plane: np.float32  # height of the reference plane
+    bent: np.float32  # 2 kappa T^2
+    inverse: np.float32  # 1 / deviation of the footprint along the lines
 
 
 class LineNode(NamedTuple):

@@ -30,11 +30,9 @@ from pipeline.truth.geometry.pieces import CellPiece, cell_pieces, longest_perio
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric
 
-BLOCK_NODES: Final = 16
-"""Numbers in single precision that the widest vector units take at a time."""
+BLOCK_NODES: Final = 16  # numbers in single precision that the widest vector units take at a time
 
-LEVELS: Final = 255.0
-"""Largest value of a grid, for a horizon straight above."""
+LEVELS: Final = 255.0  # largest value of a grid, for a horizon straight above
 
 UPPER: Final = np.float32(4e-3)
 """Cells of a grid: a place so near below the border of two belongs to the upper one. The middle of a piece is such a
@@ -42,8 +40,7 @@ border and often a node; how a processor rounds must not decide."""
 
 _GRID_BYTES = 1 << 20
 _GRIDS = (48, 32, 24, 16, 12, 8, 6, 4)  # cells of a grid, along each axis
-EVEN: Final = 0.42
-"""Of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %."""
+EVEN: Final = 0.42  # of the longest period: deviation from which on a Gaussian covers the cloth evenly, to 3 %
 
 _SHARPEST, _FLATTEST = 0.02, 0.5  # least spread of a horizon, least sharpness of a ramp
 _LEAST_AREA = 1e-9  # of a node's box, of which walls are a share
@@ -59,43 +56,31 @@ X_LOW, X_HIGH, Y_LOW, Y_HIGH, SHIFT, CURVE, BOUND = range(7)
 class SoftNodeTable(NamedTuple):
     """A cloth's nodes and grids."""
 
-    repeat: Index
-    """Ends and picks, (2,)."""
-    yarn: Float32
-    """`HeightField.yarn`, (2, 8)."""
-    thickness: np.float32
-    """Optical thickness T."""
-    uniform: float
-    """Deviation from which on a Gaussian covers the cloth evenly."""
+    repeat: Index  # ends and picks, (2,)
+    yarn: Float32  # `HeightField.yarn`, (2, 8)
+    thickness: np.float32  # optical thickness T
+    uniform: float  # deviation from which on a Gaussian covers the cloth evenly
     starts: Index
     """First block of the nodes of each kind of yarn, and of gaps; their end, (K + 2,). Kinds are warps and wefts,
     K = 2, or all ends, then all picks."""
-    kinds: Index
-    """Kinds of warps, kinds of wefts: 1 and 1, or ends and picks, (2,)."""
-    nodes: Float32
-    """See `surface`, (B, ROWS, BLOCK_NODES)."""
-    evenly: Float32
-    """Share of the cloth's area that a node represents, (B, BLOCK_NODES)."""
+    kinds: Index  # kinds of warps, kinds of wefts: 1 and 1, or ends and picks, (2,)
+    nodes: Float32  # see `surface`, (B, ROWS, BLOCK_NODES)
+    evenly: Float32  # share of the cloth's area that a node represents, (B, BLOCK_NODES)
     mean: Float32
     sharpness: Float32
     """Mean of the horizon, and 1 over the width of its ramp, sqrt 12 standard deviations,
     (AZIMUTHS, B, BLOCK_NODES)."""
-    groups: npt.NDArray[np.uint32]
-    """First node, lines of nodes, family, uint32 (K, 3)."""
+    groups: npt.NDArray[np.uint32]  # first node, lines of nodes, family, uint32 (K, 3)
     group_starts: npt.NDArray[np.uint32]
     cell_groups: npt.NDArray[np.uint32]
     """The groups in cell c = pick ends + end are cell_groups[group_starts[c] : group_starts[c + 1]], uint32."""
-    piece_starts: Index
-    """The pieces of cell c are those from piece_starts[c] to piece_starts[c + 1]."""
-    pieces: Index
-    """Family, grid, (P, 2)."""
+    piece_starts: Index  # the pieces of cell c are those from piece_starts[c] to piece_starts[c + 1]
+    pieces: Index  # family, grid, (P, 2)
     bounds: Float32
     """Extent in x and y within the cell; offset, curve (negative beneath) and largest sine of the inclination,
     (P, 7)."""
-    floats: Float64
-    """Row of `HeightField.floats`, (P, 4)."""
-    crowns: Float64
-    """Greatest height of its cell, (P,)."""
+    floats: Float64  # row of `HeightField.floats`, (P, 4)
+    crowns: Float64  # greatest height of its cell, (P,)
     grid: npt.NDArray[np.uint8]
     """Horizons; cells are even in v across a yarn, uint8 (grids, AZIMUTHS, cells along y, cells along x)."""
     behind_mean: Float32
@@ -107,8 +92,7 @@ class SoftNodeTable(NamedTuple):
     grid_falls: npt.NDArray[np.uint8]
     """Falls of `mean` and `grid` over curved cloth, as shares (curved_horizons); of no curvatures if the table was
     built without, float32 (curvatures, AZIMUTHS, B, BLOCK_NODES), uint8 (curvatures, …)."""
-    heights: Float64
-    """`HeightField.yarn` in double precision, in which heights are found, (2, 8)."""
+    heights: Float64  # `HeightField.yarn` in double precision, in which heights are found, (2, 8)
     highest: float
     lowest: float
     plane: float
@@ -116,19 +100,14 @@ class SoftNodeTable(NamedTuple):
     spots: Float32
     """Of every line of nodes: places in x and y from the corner of the cell, shares of the cell, heights,
     (lines, 4, COLUMNS)."""
-    shown: Float32
-    """Least and greatest of these heights, (2,)."""
-    areas: Float32
-    """Area that a viewer sees of each node's box (seen_areas), (AZIMUTHS, SEEN_ANGLES, B, BLOCK_NODES)."""
+    shown: Float32  # least and greatest of these heights, (2,)
+    areas: Float32  # area that a viewer sees of each node's box (seen_areas), (AZIMUTHS, SEEN_ANGLES, B, BLOCK_NODES)
     end_walls: npt.NDArray[np.uint8]
     """Share of that area which is a wall that no light from behind reaches, of LEVELS; of no azimuths without light
     from behind or without rims, uint8 (AZIMUTHS, …)."""
-    view_lines: float
-    """Deviation below which a footprint places its nodes on lines."""
-    spacing: float
-    """Distance of lines and of their nodes, as a multiple of that at level 2."""
-    rims: bool
-    """True if view rays that meet a wall see the yarn's rim above it."""
+    view_lines: float  # deviation below which a footprint places its nodes on lines
+    spacing: float  # distance of lines and of their nodes, as a multiple of that at level 2
+    rims: bool  # true if view rays that meet a wall see the yarn's rim above it
 
 
 def tabulate(

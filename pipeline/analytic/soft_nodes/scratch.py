@@ -43,11 +43,9 @@ class SoftQuery(NamedTuple):
     """Curvatures of the cloth towards wi and wo, 1/yarn spacings."""
 
 
-DRAFT_ROWS: Final = 15
-"""Rows of `Scratch.drafts`, see `line_nodes`."""
+DRAFT_ROWS: Final = 15  # rows of `Scratch.drafts`, see `line_nodes`
 
-MOST_ON_LINES: Final = 2048
-"""Most nodes of a kind of yarn on view lines."""
+MOST_ON_LINES: Final = 2048  # most nodes of a kind of yarn on view lines
 
 
 class Scratch(NamedTuple):
@@ -56,24 +54,20 @@ class Scratch(NamedTuple):
     weight: Float32
     lines: Float32
     """Weights of the fixed nodes, as blocks and as lines of one array, (B, BLOCK_NODES), (lines, COLUMNS)."""
-    stops: Index
-    """Number of nodes on view lines of each kind of yarn, (K,)."""
-    line: Float32
-    """Places and lengths of the nodes of an interval, (2, 8)."""
+    stops: Index  # number of nodes on view lines of each kind of yarn, (K,)
+    line: Float32  # places and lengths of the nodes of an interval, (2, 8)
     grid: npt.NDArray[np.uint8]
     behind_grid: npt.NDArray[np.uint8]
     grid_falls: npt.NDArray[np.uint8]
     """Those of the table, flat, uint8."""
-    curved: Float32
-    """Horizons of the fixed nodes towards light and viewer, over curved cloth, (2, B, BLOCK_NODES)."""
+    curved: Float32  # horizons of the fixed nodes towards light and viewer, over curved cloth, (2, B, BLOCK_NODES)
     view_lines: Float64
     """Places of view lines across the viewer's azimuth, and the widths that they stand for, (2, lines)."""
     drafts: Float32
     firsts: npt.NDArray[np.uint32]
     """Nodes on view lines, and the first cells of their grids, float32 (K, DRAFT_ROWS, MOST_ON_LINES), uint32
     (K, MOST_ON_LINES)."""
-    seen: Float32
-    """Where the viewer sees the fixed nodes, in x and in y, (lines, 2, COLUMNS)."""
+    seen: Float32  # where the viewer sees the fixed nodes, in x and in y, (lines, 2, COLUMNS)
     areas: Float32
     freed: Float32
     walls: Float32

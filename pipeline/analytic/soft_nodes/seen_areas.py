@@ -31,8 +31,7 @@ from pipeline.truth.geometry.pieces import CellPiece
 SEEN_ANGLES: Final = 18
 """Angles of the viewer to the normal, 0 to 90 degrees, even in their power 3/2: finer where less is seen."""
 
-Sample = tuple[int, int, CellPiece]
-"""A piece that has a grid of horizons, with its pick and end."""
+Sample = tuple[int, int, CellPiece]  # a piece that has a grid of horizons, with its pick and end
 
 _WALL_HEIGHTS, _WALL_PLACES = 3, 8  # points of a wall, upwards and along
 _RAMP = 0.02  # of the sine of a cell's horizon

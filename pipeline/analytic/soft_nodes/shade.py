@@ -29,21 +29,17 @@ from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlin
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, WEFT
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
-NODE_SUMS: Final = 6
-"""Sums of a family."""
+NODE_SUMS: Final = 6  # sums of a family
 
 AREA, DIFFUSE, SPECULAR, BARE_AREA, OPEN_DIFFUSE, OPEN_SPECULAR = range(NODE_SUMS)
-THROUGH: Final = 4
-"""Place of the fifth sum with the light behind."""
+THROUGH: Final = 4  # place of the fifth sum with the light behind
 
-LEAST_SEEN: Final = np.float32(1e-8)
-"""Least seen area by which sums are divided, as a share of the bare area."""
+LEAST_SEEN: Final = np.float32(1e-8)  # least seen area by which sums are divided, as a share of the bare area
 
 FADED: Final = np.float32(1e-4)
 """Seen share of the bare area at which components have faded to a half: most such patches are hidden, and answer 0."""
 
-TINY: Final = np.float32(1e-18)
-"""Keeps a quotient of sums finite."""
+TINY: Final = np.float32(1e-18)  # keeps a quotient of sums finite
 
 Six = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
 Behind = Literal[True] | None
@@ -68,8 +64,7 @@ class YarnDirections(NamedTuple):
     oy: np.float32
     oz: np.float32
     """wi and wo."""
-    size: np.float32
-    """1 / |wi + wo|^2."""
+    size: np.float32  # 1 / |wi + wo|^2
     alike: np.float32
     right: np.float32
     opposite: np.float32

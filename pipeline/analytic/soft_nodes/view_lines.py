@@ -26,8 +26,7 @@ from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlin
 from pipeline.compiled.float32 import arcsine
 from pipeline.truth.geometry.heightfield import GAP, RADIUS, WARP, WEFT
 
-MOST_GAUSS: Final = 6
-"""Most nodes of an interval."""
+MOST_GAUSS: Final = 6  # most nodes of an interval
 
 GAUSS_PLACES = np.zeros((MOST_GAUSS + 1, 8), np.float32)
 GAUSS_WEIGHTS = np.zeros((MOST_GAUSS + 1, 8), np.float32)
@@ -96,8 +95,7 @@ class ViewLine(NamedTuple):
     density: float
     sigma: float
     """Density there times the width that the line stands for, and deviation along the line."""
-    apart: float
-    """That width."""
+    apart: float  # that width
 
 
 class Piece(NamedTuple):

@@ -27,14 +27,11 @@ from pipeline.compiled.float32 import arcsine
 from pipeline.truth.geometry import heightfield
 from pipeline.truth.geometry.heightfield import BETA, INVERSE_RADIUS, RADIUS, WARP, WEFT
 
-FOOTPRINT_ENDS: Final = 2.4
-"""Deviations at which a footprint of rays ends."""
+FOOTPRINT_ENDS: Final = 2.4  # deviations at which a footprint of rays ends
 
-NEVER: Final = 1e9
-"""Place that no ray reaches."""
+NEVER: Final = 1e9  # place that no ray reaches
 
-NEAREST: Final = 1e-5
-"""Least length between cuts, in yarn spacings."""
+NEAREST: Final = 1e-5  # least length between cuts, in yarn spacings
 
 _CREST_STEPS: Final = 8
 _CREST_CLOSE: Final = 1e-2
@@ -92,14 +89,10 @@ class ViewRay(NamedTuple):
     dx: float
     dy: float
     """The viewer's azimuth."""
-    run: float
-    """Distance in the plane for each unit of height, T."""
-    bend: float
-    """Curvature of the cloth in this azimuth, 1/yarn spacings."""
-    plane: float
-    """Height of the reference plane."""
-    least: float
-    """Height at which the rays rise again; that of the lowest yarn if they do not before."""
+    run: float  # distance in the plane for each unit of height, T
+    bend: float  # curvature of the cloth in this azimuth, 1/yarn spacings
+    plane: float  # height of the reference plane
+    least: float  # height at which the rays rise again; that of the lowest yarn if they do not before
 
 
 class YarnCurve(NamedTuple):

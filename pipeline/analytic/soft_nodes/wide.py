@@ -17,8 +17,7 @@ from pipeline.compiled.arrays import Float32
 from pipeline.compiled.decorators import inlined_fast_kernel, inlined_kernel
 from pipeline.compiled.float32 import remaining
 
-RESOLVED: Final = 0.12
-"""Least deviation whose density fixed nodes resolve; narrower footprints are widened to it."""
+RESOLVED: Final = 0.12  # least deviation whose density fixed nodes resolve; narrower footprints are widened to it
 
 _REACH = np.float32(2.6)  # deviations at which a footprint is cut off; 1 % of it lies beyond
 _SHORTEST_RUN = np.float32(1e-6)

@@ -15,11 +15,9 @@ from pipeline.fingerprint import IDENTITY
 from pipeline.models.options import Name, Options
 from weaves.validation import Frozen
 
-ADDED_MODEL: Final = "added"
-"""The value of `model` of all methods from outside."""
+ADDED_MODEL: Final = "added"  # the value of `model` of all methods from outside
 
-GROUP: Final = "twillight.methods"
-"""Group of the entry points by which an installed package offers methods."""
+GROUP: Final = "twillight.methods"  # group of the entry points by which an installed package offers methods
 
 Kind = Literal["behind", "stretch", "curvature"]
 """Kind of queries beyond flat cloth, round footprints and light from the front."""

@@ -32,13 +32,11 @@ if TYPE_CHECKING:
 
 _STATE: Final = struct.Struct("<ddi64s16s")
 
-GIB: Final = 2**30
-"""Bytes."""
+GIB: Final = 2**30  # bytes
 
 _NO_MEMORY: Final = "can't allocate memory"  # in a RuntimeError of PyTorch
 
-STATE_BYTES: Final = _STATE.size
-"""Size of the shared bytes."""
+STATE_BYTES: Final = _STATE.size  # size of the shared bytes
 
 
 class MethodFailed(WorkFailed):
@@ -55,12 +53,9 @@ class MethodFailed(WorkFailed):
 class Call(NamedTuple):
     """Calls of a method that are under way."""
 
-    since: float
-    """Time of the last call's begin or end, by the monotonic clock."""
-    limit: float
-    """Seconds that a call may take."""
-    running: int
-    """Number of calls, one a thread at most."""
+    since: float  # time of the last call's begin or end, by the monotonic clock
+    limit: float  # seconds that a call may take
+    running: int  # number of calls, one a thread at most
     name: str
     function: str
     """The method, and its function."""
@@ -96,8 +91,7 @@ class Watch:
                 _STATE.pack_into(self._shared, 0, time.monotonic(), limit, self._running, name, function)
 
 
-WATCH: Final = Watch()
-"""The calls of this process."""
+WATCH: Final = Watch()  # the calls of this process
 
 
 @contextmanager

@@ -29,14 +29,10 @@ _OURS: Final = ("weaves", "pipeline", "reports", "jobs", "twillight")
 class CodeSource(NamedTuple):
     """Code that was found."""
 
-    place: str
-    """Name of a module, or absolute path of a file."""
-    name: str
-    """Name of the class in it."""
-    folder: str
-    """Folder that holds the module; empty if it is installed, or a file."""
-    root: Path
-    """The file, or the folder of the package."""
+    place: str  # name of a module, or absolute path of a file
+    name: str  # name of the class in it
+    folder: str  # folder that holds the module; empty if it is installed, or a file
+    root: Path  # the file, or the folder of the package
 
     @property
     def text(self) -> str:

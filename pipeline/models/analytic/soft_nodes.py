@@ -25,8 +25,7 @@ from weaves.fabric import Fabric
 if TYPE_CHECKING:
     from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 
-Level = Literal[1, 2, 4, 8]
-"""A level of detail."""
+Level = Literal[1, 2, 4, 8]  # a level of detail
 
 _SHARED: Final[WeakValueDictionary[tuple[object, ...], PerFabric[SoftNodeTable]]] = WeakValueDictionary()
 

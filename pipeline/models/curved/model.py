@@ -52,12 +52,9 @@ class View(NamedTuple):
     u: Tensor
     v: Tensor
     """Centres, in repeats, (n,)."""
-    sigma: Tensor
-    """Footprints, in yarn spacings, (n,)."""
-    wo: Tensor
-    """To the viewer, (n, 3)."""
-    curvature: Tensor
-    """In the viewer's plane, 1/yarn spacings, (n,)."""
+    sigma: Tensor  # footprints, in yarn spacings, (n,)
+    wo: Tensor  # to the viewer, (n, 3)
+    curvature: Tensor  # in the viewer's plane, 1/yarn spacings, (n,)
 
 
 class SilhouetteData(nn.Module):

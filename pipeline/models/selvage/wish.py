@@ -7,8 +7,7 @@ from typing import Final
 
 from weaves.errors import BadInput
 
-USUAL_ERROR: Final = 0.02
-"""Wished error of a method that is named without one."""
+USUAL_ERROR: Final = 0.02  # wished error of a method that is named without one
 
 
 def text_of(error: float) -> str:

@@ -53,12 +53,9 @@ _ENCODER_LAYERS, _DECODER_LAYERS = 2, 4  # hidden ones; those of the encoder com
 class Texels:
     """T texels of one repeat, each seen under the same n pairs of directions: inputs of the encoder."""
 
-    shape: tuple[int, int]
-    """Rows and columns of texels; texel t lies in row t // columns, column t % columns."""
-    angles: Tensor
-    """Directions (`angles_of`), float32 Tensor (n, 4)."""
-    values: Tensor
-    """Components; their own noise is far above the rounding, float16 Tensor (n, T, 4)."""
+    shape: tuple[int, int]  # rows and columns of texels; texel t lies in row t // columns, column t % columns
+    angles: Tensor  # directions (`angles_of`), float32 Tensor (n, 4)
+    values: Tensor  # components; their own noise is far above the rounding, float16 Tensor (n, T, 4)
 
     def to(self, device: torch.device) -> Texels:
         """Return the same on a device."""

@@ -35,8 +35,7 @@ class WovenInputs(NamedTuple):
     parameters: Tensor
     """alpha_warp, alpha_weft, beta_warp, beta_weft; with `transmission` both widths and the optical thickness,
     (F, 4 or 7)."""
-    placement: Placement
-    """Transformation of queries into standard position."""
+    placement: Placement  # transformation of queries into standard position
 
     def take(self, index: Tensor) -> WovenInputs:
         """Return the fabrics at `index`."""

@@ -27,12 +27,9 @@ from weaves.yarn import Yarn
 class Symmetry(NamedTuple):
     """Mirrors applied one after the other."""
 
-    mirror_x: bool
-    """x becomes -x."""
-    mirror_y: bool
-    """y becomes -y."""
-    exchange: bool
-    """x and y change places, and with them warp and weft; after the other two."""
+    mirror_x: bool  # x becomes -x
+    mirror_y: bool  # y becomes -y
+    exchange: bool  # x and y change places, and with them warp and weft; after the other two
 
 
 SYMMETRIES: Final = tuple(Symmetry(bool(i & 1), bool(i & 2), bool(i & 4)) for i in range(8))
@@ -42,14 +39,10 @@ SYMMETRIES: Final = tuple(Symmetry(bool(i & 1), bool(i & 2), bool(i & 4)) for i 
 class Placement(NamedTuple):
     """Transformations that bring F fabrics into standard position."""
 
-    mirror: Tensor
-    """Mirrors of x and of y, bool (F, 2)."""
-    exchange: Tensor
-    """True if x and y change places afterwards, bool (F, 1)."""
-    start: Tensor
-    """Start of the standard repeat after that, as shares of it, float (F, 2)."""
-    repeat: Tensor
-    """Extent of the standard repeat in x and y, in yarn spacings, float (F, 2)."""
+    mirror: Tensor  # mirrors of x and of y, bool (F, 2)
+    exchange: Tensor  # true if x and y change places afterwards, bool (F, 1)
+    start: Tensor  # start of the standard repeat after that, as shares of it, float (F, 2)
+    repeat: Tensor  # extent of the standard repeat in x and y, in yarn spacings, float (F, 2)
 
     def move(self, u: Tensor, v: Tensor, wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return the queries about the fabrics in standard position.

@@ -26,15 +26,12 @@ from pipeline.truth.query import Queries
 class Line(NamedTuple):
     """Positions of the points on the line."""
 
-    step: float
-    """Distance between points, in deviations of the line; for correlation r times sqrt((1 - r) / (1 + r))."""
-    reach: float
-    """Largest distance of the points from the centre, in deviations of the line."""
+    step: float  # distance between points, in deviations of the line; for correlation r times sqrt((1 - r) / (1 + r))
+    reach: float  # largest distance of the points from the centre, in deviations of the line
     three: float
     two: float
     """Largest correlations of three and of two points."""
-    half: int
-    """Most points on either side of the middle."""
+    half: int  # most points on either side of the middle
 
     @property
     def points(self) -> int:

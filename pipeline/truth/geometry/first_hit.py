@@ -18,8 +18,7 @@ from pipeline.truth.geometry.heightfield import GAP, TOP, UNDER, HeightField, su
 from pipeline.truth.geometry.march import Cell, Ray, first_cell, float_on_top, next_cell, span_on_top, span_over, wrap
 from pipeline.truth.geometry.visibility import above, over_strip
 
-ON_YARN, ON_WALL, MISSED = 0, 1, 2
-"""Ends of a ray."""
+ON_YARN, ON_WALL, MISSED = 0, 1, 2  # ends of a ray
 
 _MAX_CELLS = 100_000
 _NEWTON_STEPS = 60
@@ -33,16 +32,14 @@ _BEHIND = 1e-9  # distance of a point of a wall from the border that the ray cro
 class Hit(NamedTuple):
     """Where a ray ends."""
 
-    what: int
-    """ON_YARN, ON_WALL or MISSED."""
+    what: int  # ON_YARN, ON_WALL or MISSED
     x: float
     y: float
     """The point, in the cell (pick, end) of the repeat; the start of the ray if it meets nothing."""
     end: int
     pick: int
     """The cell."""
-    distance: float
-    """Distance from the start of the ray, in the fabric plane."""
+    distance: float  # distance from the start of the ray, in the fabric plane
 
 
 @kernel

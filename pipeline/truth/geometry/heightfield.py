@@ -32,20 +32,17 @@ _EDGE = 1e-9  # cosine across a yarn below which the slope counts as vertical
 class HeightField(NamedTuple):
     """Geometry and optics of one repeat; all arrays float64 except `top` (int8)."""
 
-    top: npt.NDArray[np.int8]
-    """Family on top: WARP or WEFT, (picks, ends)."""
+    top: npt.NDArray[np.int8]  # family on top: WARP or WEFT, (picks, ends)
     floats: Float64
     """For the yarn on top and the one beneath: cell centre minus float centre along the yarn, bend radius R, half
     length L/2, R cos(u_max), (picks, ends, 2, 4)."""
-    crown: Float64
-    """Greatest height that any surface of the cell reaches, (picks, ends)."""
+    crown: Float64  # greatest height that any surface of the cell reaches, (picks, ends)
     highest: float
     lowest: float
     """Greatest height of the fabric, and a bound that no yarn lies below."""
     yarn: Float64
     """Radius r, 1/r, sine and cosine of the twist, alpha, relief beta, blend w_d, u_max in radians, (2, 8)."""
-    thickness: float
-    """Optical thickness T."""
+    thickness: float  # optical thickness T
 
 
 def height_field(fabric: Fabric) -> HeightField:

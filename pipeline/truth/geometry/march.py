@@ -27,10 +27,8 @@ class Ray(NamedTuple):
     dx: float
     dy: float
     """Unit direction in the fabric plane."""
-    rise: float
-    """Height gained per unit of distance in the plane; infinite for the normal itself."""
-    bend: float
-    """Curvature of the base along the ray, >= 0: it falls away by bend s^2 / 2."""
+    rise: float  # height gained per unit of distance in the plane; infinite for the normal itself
+    bend: float  # curvature of the base along the ray, >= 0: it falls away by bend s^2 / 2
     stride_x: float
     stride_y: float
     """Distance between two cell borders in x and in y."""

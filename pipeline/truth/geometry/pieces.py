@@ -35,8 +35,7 @@ class CellPiece(NamedTuple):
     across: Extent
     along: Extent
     """Extent within the cell."""
-    radius: float
-    """Radius of its yarn; 0 for a gap."""
+    radius: float  # radius of its yarn; 0 for a gap
     offset: float
     curve: float
     half: float
@@ -90,8 +89,7 @@ def _margins(radius: float) -> list[Extent]:
     return [(0.0, width), (1.0 - width, 1.0)] if width > _NONE else []
 
 
-Cell = tuple[int, int]
-"""A cell of the repeat, (pick, end)."""
+Cell = tuple[int, int]  # a cell of the repeat, (pick, end)
 
 
 def translations(field: HeightField) -> tuple[Cell, ...]:

@@ -33,33 +33,22 @@ FIRST_NODE, NODES_X, NODES_Y, EDGES_X, EDGES_Y, PIECE_FAMILY, FIRST_FINE, FINE_C
 class ExactNodes(NamedTuple):
     """Nodes of one side of a cloth."""
 
-    repeat: Index
-    """Ends and picks, (2,)."""
+    repeat: Index  # ends and picks, (2,)
     pieces: Index
     """First node, nodes along x and along y, which edges along x and along y, family (or GAP), first fine node, fine
     nodes a node, (P, 8)."""
-    copies: Index
-    """End and pick of the cells in which a piece lies, (P, C, 2)."""
-    edges: Float32
-    """Borders of nodes within their cell; shorter rows repeat their last value, (E, n + 1)."""
-    evenly: Float32
-    """Share of a node and its copies in the cloth's area, (N,)."""
-    normal: Float32
-    """Normal of each node, and 1 / n_z; rows x, y, z, 1 / z, (4, N)."""
+    copies: Index  # end and pick of the cells in which a piece lies, (P, C, 2)
+    edges: Float32  # borders of nodes within their cell; shorter rows repeat their last value, (E, n + 1)
+    evenly: Float32  # share of a node and its copies in the cloth's area, (N,)
+    normal: Float32  # normal of each node, and 1 / n_z; rows x, y, z, 1 / z, (4, N)
     fine: Float32
     """The same for the finer nodes, then the tangent, (7, F). Within a piece, first all nodes' first ones."""
-    slope: Float32
-    """Slope of the horizon, (A, N)."""
-    slope_behind: Float32
-    """The same at the back of the cloth; no rows if there is no need for them, (A, N)."""
-    uniform: float
-    """Standard deviation from which on a Gaussian covers the cloth evenly."""
-    lattice: tuple[int, int, int]
-    """Translations of the cloth (`pipeline.truth.geometry.pieces.lattice`)."""
-    places: Float32
-    """Where each node is in the repeat, and its height; that of a gap is 0, (3, N)."""
-    walls: WallNodes
-    """Walls below the borders of yarns, if view rays see rims."""
+    slope: Float32  # slope of the horizon, (A, N)
+    slope_behind: Float32  # the same at the back of the cloth; no rows if there is no need for them, (A, N)
+    uniform: float  # standard deviation from which on a Gaussian covers the cloth evenly
+    lattice: tuple[int, int, int]  # translations of the cloth (`pipeline.truth.geometry.pieces.lattice`)
+    places: Float32  # where each node is in the repeat, and its height; that of a gap is 0, (3, N)
+    walls: WallNodes  # walls below the borders of yarns, if view rays see rims
 
 
 def tabulate(

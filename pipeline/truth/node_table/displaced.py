@@ -24,8 +24,7 @@ from pipeline.truth.cloth import WideQueries
 from pipeline.truth.footprint.mixture import Line, along_axes, line_points
 from pipeline.truth.node_table.build import ExactNodes
 
-MOST_POINTS: Final = 32
-"""Most points of the grid on a yarn spacing."""
+MOST_POINTS: Final = 32  # most points of the grid on a yarn spacing
 
 _POINTS = 3.0  # of the grid on a deviation of the footprint: the mean error of reading between them is 3e-4 of the peak
 _REACH = 5.5  # in standard deviations; what lies beyond is 4e-8
@@ -35,8 +34,7 @@ _0, _1 = np.float32(0.0), np.float32(1.0)
 _NEXT = np.uint32(1)
 
 
-Squares = npt.NDArray[np.uint32]
-"""Numbers of squares of the grid, (N,)."""
+Squares = npt.NDArray[np.uint32]  # numbers of squares of the grid, (N,)
 
 
 class GridSize(NamedTuple):
@@ -57,15 +55,12 @@ class GridSize(NamedTuple):
 class DensityRoom(NamedTuple):
     """Room for the density of one footprint."""
 
-    grid: Float32
-    """Density at the points of the grid, row by row, (G,)."""
+    grid: Float32  # density at the points of the grid, row by row, (G,)
     along_x: Float32
     along_y: Float32
     """Density along both axes, the first over two periods."""
-    points: Float32
-    """Places and shares of the points of a mixture, (2, P)."""
-    squares: Squares
-    """Square of the grid in which each node is seen, uint32 (N,)."""
+    points: Float32  # places and shares of the points of a mixture, (2, P)
+    squares: Squares  # square of the grid in which each node is seen, uint32 (N,)
     part_x: Float32
     part_y: Float32
     """Where in it, 0 to 1, (N,)."""

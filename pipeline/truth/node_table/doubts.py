@@ -41,17 +41,14 @@ class Doubts(NamedTuple):
     right: Float32
     down: Float32
     """Squared change of the components by the border to the next node in x and in y; 0 without one, (N,)."""
-    score: Float32
-    """Squared change of the components by a node, (N,)."""
-    bits: npt.NDArray[np.int32]
-    """The bits of `score`: the same memory, int32 (N,)."""
+    score: Float32  # squared change of the components by a node, (N,)
+    bits: npt.NDArray[np.int32]  # the bits of `score`: the same memory, int32 (N,)
     specular: Float32
     diffuse: Float32
     """Changes of a node's family by the borders beside it, if these lie where the margins say, (N,)."""
     left: Float64
     """Errors that unrefined nodes leave together: the squared error and the four components' changes, (5,)."""
-    levels: Float64
-    """The same for nodes whose score lies between two powers of 2, (L, 5)."""
+    levels: Float64  # the same for nodes whose score lies between two powers of 2, (L, 5)
 
 
 def no_doubts(nodes: int) -> Doubts:

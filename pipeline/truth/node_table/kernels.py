@@ -32,28 +32,22 @@ class Direction(NamedTuple):
     y: np.float32
     z: np.float32
     """Components."""
-    slope: np.float32
-    """Rise per unit of distance in the fabric plane."""
+    slope: np.float32  # rise per unit of distance in the fabric plane
     first: int
     second: int
     """The two azimuths of the table around it."""
-    turn: np.float32
-    """Its place between them, 0 to 1."""
+    turn: np.float32  # its place between them, 0 to 1
 
 
 class NodeDirections(NamedTuple):
     """Directions of one query."""
 
-    behind: bool
-    """True if the light is behind the cloth."""
+    behind: bool  # true if the light is behind the cloth
     light: Direction
     """wi; of light from behind the components of -wi, but slope and azimuths of wi reflected in the fabric plane."""
-    viewer: Direction
-    """wo."""
-    through: Direction
-    """-wo reflected in the fabric plane: the way through a gap, as the back of the cloth sees it."""
-    size: np.float32
-    """1 / |wi + wo|^2."""
+    viewer: Direction  # wo
+    through: Direction  # -wo reflected in the fabric plane: the way through a gap, as the back of the cloth sees it
+    size: np.float32  # 1 / |wi + wo|^2
 
 
 @kernel
@@ -79,10 +73,8 @@ def _direction(x: float, y: float, z: float, sign: float, azimuths: int) -> Dire
 class NodeShares(NamedTuple):
     """Shares of the nodes in the sums of one query; overwritten for each query."""
 
-    weight: Float32
-    """Share of the footprint, (N,)."""
-    lit: Float32
-    """`weight` where the viewer and the light are visible, else 0, (N,)."""
+    weight: Float32  # share of the footprint, (N,)
+    lit: Float32  # `weight` where the viewer and the light are visible, else 0, (N,)
     areas: Float32
     diffuses: Float32
     speculars: Float32
@@ -99,8 +91,7 @@ def no_shares(nodes: int) -> NodeShares:
     return NodeShares(*np.zeros((len(NodeShares._fields), nodes), np.float32))
 
 
-SMOOTH: Final = np.float32(0.0005)
-"""Squared error of a node's share from curvature within it, relative to its square."""
+SMOOTH: Final = np.float32(0.0005)  # squared error of a node's share from curvature within it, relative to its square
 
 LEAP: Final = np.float32(0.1)
 """Difference of a node's horizons at two azimuths between which they are not interpolated: another yarn's edge."""
@@ -133,12 +124,9 @@ class HorizonSlopes(NamedTuple):
 class FlakeLayer(NamedTuple):
     """The layer of flakes on a piece of yarn."""
 
-    square: np.float32
-    """alpha^2."""
-    thickness: np.float32
-    """Optical thickness."""
-    scale: np.float32
-    """alpha^3 / (4 pi), divided by the number of fine nodes in a node."""
+    square: np.float32  # alpha^2
+    thickness: np.float32  # optical thickness
+    scale: np.float32  # alpha^3 / (4 pi), divided by the number of fine nodes in a node
 
 
 @inlined_kernel

@@ -28,11 +28,9 @@ from pipeline.truth.node_table.doubts import Doubts, no_doubts
 from pipeline.truth.node_table.kernels import NodeShares
 from pipeline.truth.scattering.point import Choices, Directions, lit_from_behind, point_share
 
-UNSEEN: Final = 0.002
-"""Relative error of an answer that neither nodes nor borders show."""
+UNSEEN: Final = 0.002  # relative error of an answer that neither nodes nor borders show
 
-PLACES: Final = 8
-"""Places of a row: a border is found to an eighth of a node."""
+PLACES: Final = 8  # places of a row: a border is found to an eighth of a node
 
 _SPREAD: Final = 0.5  # variance of the mean of stratified rows over what independent rows of that scatter would have
 _HIDDEN, _SEEN, _LIT = 0, 1, 2
@@ -45,18 +43,12 @@ _0 = np.float32(0.0)
 class RefineRoom(NamedTuple):
     """Room for the refinement of a query."""
 
-    doubts: Doubts
-    """Possible errors of the nodes."""
-    states: Index
-    """State of each place of a row: hidden, seen, or seen and lit, (PLACES,)."""
-    parts: Index
-    """First and last place of parts not yet decided, (2 PLACES, 2)."""
-    value: Float64
-    """A row's sums, (POINT_SUMS,)."""
-    change: Float64
-    """Change of the sums, (POINT_SUMS,)."""
-    variance: Float64
-    """Squared error of the numerators, (4,)."""
+    doubts: Doubts  # possible errors of the nodes
+    states: Index  # state of each place of a row: hidden, seen, or seen and lit, (PLACES,)
+    parts: Index  # first and last place of parts not yet decided, (2 PLACES, 2)
+    value: Float64  # a row's sums, (POINT_SUMS,)
+    change: Float64  # change of the sums, (POINT_SUMS,)
+    variance: Float64  # squared error of the numerators, (4,)
     first: Float64
     second: Float64
     """Sums over a node's rows, and of the squares of their residuals, (POINT_SUMS,) and (4,)."""
@@ -185,8 +177,7 @@ class Known(NamedTuple):
     seen: bool
     lit: bool
     """True if the viewer, and the light, clear the horizon all around."""
-    every: bool
-    """True if the point model must be evaluated at every place: a highlight is narrower than the node."""
+    every: bool  # true if the point model must be evaluated at every place: a highlight is narrower than the node
 
 
 class Row(NamedTuple):
@@ -197,8 +188,7 @@ class Row(NamedTuple):
     dx: float
     dy: float
     """Where it starts, in the repeat, and how far it leads."""
-    offset: float
-    """Place of the first place within its eighth, 0 <= offset < 1."""
+    offset: float  # place of the first place within its eighth, 0 <= offset < 1
     weight: float
     tilt: float
     """Share of the footprint, and its relative change from the start to the end."""

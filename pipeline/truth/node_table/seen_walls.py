@@ -34,8 +34,7 @@ class WallRoom(NamedTuple):
     speculars: Float32
     """Seen height, share of the footprint, share in the denominator, that of lit walls over the cosine of the rim, and
     share in the specular numerator, (W,)."""
-    places: Float32
-    """The middle of what is seen, (3, W)."""
+    places: Float32  # the middle of what is seen, (3, W)
 
 
 def wall_room(table: ExactNodes) -> WallRoom:

@@ -30,11 +30,9 @@ FINE_NODES: Final = 32
 """Nodes per yarn spacing of the fine table, across and along; for a cloth of more than `_FEW` different cells, down to
 `FEWEST_NODES`."""
 
-TABLE_AZIMUTHS: Final = 128
-"""Directions in which the truth's tables hold horizons."""
+TABLE_AZIMUTHS: Final = 128  # directions in which the truth's tables hold horizons
 
-NOT_REFINED: Final = (1.0, np.inf)
-"""Relative and absolute standard error of an answer that is not refined."""
+NOT_REFINED: Final = (1.0, np.inf)  # relative and absolute standard error of an answer that is not refined
 
 _FEW: Final = 8
 _COARSE, _COARSEST, _COARSE_CELL = 24, 12, 44  # most and fewest nodes of a coarse table; their number for one cell
@@ -132,8 +130,7 @@ def _coarse_nodes(cells: int) -> int:
     return max(_COARSEST, min(_COARSE, 2 * round(0.5 * _COARSE_CELL / math.sqrt(cells))))
 
 
-FINE: Final = NodeTable(_fine_nodes, TABLE_AZIMUTHS, FINE_LINE)
-"""The truth's table for any footprint."""
+FINE: Final = NodeTable(_fine_nodes, TABLE_AZIMUTHS, FINE_LINE)  # the truth's table for any footprint
 
 COARSE: Final = NodeTable(_coarse_nodes, TABLE_AZIMUTHS, FINE_LINE, COARSE_TABLE, _COARSE_RAYS)
 """The truth's table for footprints of `estimator.WIDE`; at 1 % it costs a half to a fifth of the time."""

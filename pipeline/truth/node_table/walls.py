@@ -24,12 +24,10 @@ from pipeline.compiled.decorators import allocating_kernel
 from pipeline.truth.geometry.heightfield import GAP, UNDER, WARP, HeightField, surface_at
 from pipeline.truth.geometry.horizon import horizon, horizons
 
-HEIGHTS: Final = 6
-"""Points of a wall from the rim to the foot."""
+HEIGHTS: Final = 6  # points of a wall from the rim to the foot
 
 Edges = tuple[float, ...]
-Grid = tuple[int, int, int, Edges, Edges]
-"""End, pick, family, and the edges of a piece's nodes along x and y."""
+Grid = tuple[int, int, int, Edges, Edges]  # end, pick, family, and the edges of a piece's nodes along x and y
 
 _INSET, _OUTSET = 1e-9, 1e-7  # distances from the border
 _LEAST_HEIGHT = 1e-4
@@ -39,22 +37,14 @@ _UNSEEN = 1e4
 class WallNodes(NamedTuple):
     """Walls of one side of a cloth: those of warps, their deep ones, those of wefts, their deep ones."""
 
-    starts: tuple[int, int, int, int, int]
-    """First wall of each kind, and the number of all."""
-    places: Float32
-    """Where each wall is in the repeat, and the height of its top, (3, W)."""
-    height: Float32
-    """From the foot to the top, (W,)."""
-    out: Float32
-    """Its horizontal normal, (2, W)."""
-    normal: Float32
-    """Normal of the rim, and 1, (4, W)."""
-    tangent: Float32
-    """Fibre tangent of the rim, (3, W)."""
-    evenly: Float32
-    """Length of a wall and its copies over the area of the repeat, (W,)."""
-    horizon: Float32
-    """Slope of the horizon at points of the wall, from the top down, (A, HEIGHTS, W)."""
+    starts: tuple[int, int, int, int, int]  # first wall of each kind, and the number of all
+    places: Float32  # where each wall is in the repeat, and the height of its top, (3, W)
+    height: Float32  # from the foot to the top, (W,)
+    out: Float32  # its horizontal normal, (2, W)
+    normal: Float32  # normal of the rim, and 1, (4, W)
+    tangent: Float32  # fibre tangent of the rim, (3, W)
+    evenly: Float32  # length of a wall and its copies over the area of the repeat, (W,)
+    horizon: Float32  # slope of the horizon at points of the wall, from the top down, (A, HEIGHTS, W)
     passing: Float32
     """Slope above which a view ray to these points of deep walls clears the back; no rows without deep walls,
     (A, HEIGHTS, W)."""

@@ -30,12 +30,9 @@ _REACH = 5.5  # in standard deviations; what lies beyond is 4e-8
 class WeightRoom(NamedTuple):
     """Room for the weights of one query."""
 
-    masses: Float32
-    """Shares of the intervals along x and along y, by cell and kind of edges, (2, cells, kinds, n)."""
-    touched: Mask
-    """True where any of them may be above 0, (2, cells, kinds)."""
-    points: Float32
-    """Places and shares of the points of a mixture, (2, P)."""
+    masses: Float32  # shares of the intervals along x and along y, by cell and kind of edges, (2, cells, kinds, n)
+    touched: Mask  # true where any of them may be above 0, (2, cells, kinds)
+    points: Float32  # places and shares of the points of a mixture, (2, P)
 
 
 def weight_room(table: ExactNodes, line: Line) -> WeightRoom:

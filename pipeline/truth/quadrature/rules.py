@@ -222,8 +222,7 @@ def cut_parts(patch: QueryPatch, rectangle: Float64, across: Float64, along: Flo
 
 
 _BISECTIONS: Final = 8
-RULES: Final = 6
-"""Number of rules; level l has 2^(l + 1) nodes an axis."""
+RULES: Final = 6  # number of rules; level l has 2^(l + 1) nodes an axis
 
 _RULES: Final = [np.polynomial.legendre.leggauss(2 << level) for level in range(RULES)]
 _NODES: Final = np.concatenate([nodes for nodes, _ in _RULES])  # rule of 2^(l + 1) nodes from 2^(l + 1) - 2 on

@@ -26,12 +26,9 @@ Surface = tuple[int, int, float, float, float, float, float, float, float]
 class Choices(NamedTuple):
     """The options of the model as kernels read them."""
 
-    macro: bool
-    """Cosines in the slab and in A are taken to n_s instead of n_p."""
-    shadows: bool
-    """True if points can hide one another."""
-    rims: bool = False
-    """True if view rays that meet a wall see the yarn's rim above it."""
+    macro: bool  # cosines in the slab and in A are taken to n_s instead of n_p
+    shadows: bool  # true if points can hide one another
+    rims: bool = False  # true if view rays that meet a wall see the yarn's rim above it
 
 
 class Directions(NamedTuple):

@@ -34,10 +34,8 @@ from weaves.fabric import Fabric
 class ComponentColours(NamedTuple):
     """Colours of the components of N queries, linear sRGB."""
 
-    mean: Float64
-    """Colour of each component, in the order of `pipeline.truth.conventions.COMPONENTS`, (N, 4, 3)."""
-    standard_error: Float64
-    """Standard error that the colours bring into the patch BSDF, 1/sr, (N, 3)."""
+    mean: Float64  # colour of each component, in the order of `pipeline.truth.conventions.COMPONENTS`, (N, 4, 3)
+    standard_error: Float64  # standard error that the colours bring into the patch BSDF, 1/sr, (N, 3)
 
 
 class ThreadTable(NamedTuple):
