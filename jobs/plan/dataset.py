@@ -116,7 +116,7 @@ class DataSet:
         """Of its own rows."""
         self.folder = f"{DATASETS}/{recipe.name}-{self.fingerprint[:8]}"
         """Relative to the output folder."""
-        self.shards = []
+        self.shards: list[Shard] = []
         for first, numbers, id in cuts:  # only the first of each set is validated
             own = {"shard": first.shard.model_copy(update=numbers), "folders": (self.folder,), "id": id}
             self.shards.append(first.model_copy(update=own))

@@ -47,7 +47,7 @@ class Training(Task):
                 read[key]["shards"].append(part.id)
         trainings = []
         for single in model.single:
-            own = {"options": single.options, "training": single.training, "dataset": dataset.folder}
+            own: dict[str, Any] = {"options": single.options, "training": single.training, "dataset": dataset.folder}
             trainings.append({key: cls(**own, **rows) for key, rows in read.items()})
         return trainings
 
