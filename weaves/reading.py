@@ -16,8 +16,7 @@ from typing import Any, Final
 
 from weaves.errors import BadInput, brief, one_line
 
-MIB: Final = 1 << 20
-"""Bytes."""
+MIB: Final = 1 << 20  # bytes
 
 MOST_TEXT: Final = MIB // 2
 """Most bytes of a TOML file. The largest fabric has 4,096 ends and picks in colours of their own: some 400 KB."""

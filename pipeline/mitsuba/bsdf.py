@@ -25,10 +25,8 @@ from weaves.errors import BadInput
 from weaves.validation import validated
 
 BSDF: Final = "twillight"
-"""Name of the plugin."""
 
-REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)
-"""Components."""
+REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)  # components
 
 WITHOUT_CLOTH: Final = ContextVar("WITHOUT_CLOTH", default=False)
 """True while a scene without cloth is rendered: Dr.Jit records the BSDFs of other scenes in memory all the same."""
@@ -58,8 +56,7 @@ class RayValues:
 
     def active(self, value: Any) -> Index:
         """Return which rays are active."""
-        chosen: Mask = np.broadcast_to(np.asarray(value, np.bool_).reshape(-1), (self._count,))
-        return np.flatnonzero(chosen)
+        return np.flatnonzero(np.broadcast_to(np.asarray(value, np.bool_).reshape(-1), (self._count,)))
 
     def to_mitsuba(self, kind: Any, values: Any, rows: Index, elsewhere: float = 0.0) -> Any:
         """Return numbers (n,) or vectors (n, c) of the rays `rows` as Mitsuba's `kind`; other rays have `elsewhere`."""
@@ -206,5 +203,4 @@ def _curved(dr: Any, si: Any) -> tuple[tuple[Any, Any], Any]:
 
 
 def _component(hits: RayHits, light: Float64 | Float32) -> Index:
-    """Return the component of each light, (N,)."""
     return np.where(hits.viewer[:, 2] * light[:, 2] < 0.0, TRANSMISSION, REFLECTION)
