@@ -98,7 +98,6 @@ def _move(new: Path, folder: Path, listing: str, own: Hashes) -> None:
 
 
 def _refuse_changed(folder: Path, listing: str, own: Hashes) -> None:
-    """Refuse files of before that are not as they were written."""
     for name, hashes in own.items():
         path = folder / name
         if path.is_symlink() or path.is_dir():

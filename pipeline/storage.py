@@ -188,8 +188,6 @@ def _register_patient_s3() -> None:
     from s3fs import S3FileSystem
 
     class PatientS3(S3FileSystem):  # type: ignore[misc]
-        """S3 that repeats requests which fail."""
-
         retries = 2  # of s3fs itself, also within the body of an answer
 
         async def _call_s3(self, method: str, *options: Any, **arguments: Any) -> Any:

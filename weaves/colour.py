@@ -87,11 +87,9 @@ def linear_rgb(colour: Rgb | str | Spectrum) -> Rgb:
     else:
         shape = science.SpectralShape(360, 780, 1)
         reflectance = np.interp(shape.wavelengths, colour.wavelengths, colour.values)
-        seen = science.sd_to_XYZ(
-            science.SpectralDistribution(reflectance, shape.wavelengths),
-            science.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape),
-            science.SDS_ILLUMINANTS["D65"].copy().align(shape),
-        )
+        observer = science.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
+        daylight = science.SDS_ILLUMINANTS["D65"].copy().align(shape)
+        seen = science.sd_to_XYZ(science.SpectralDistribution(reflectance, shape.wavelengths), observer, daylight)
         rgb = science.XYZ_to_sRGB(seen / 100, apply_cctf_encoding=False)
     red, green, blue = np.clip(rgb, 0, 1).tolist()
     return red, green, blue

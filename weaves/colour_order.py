@@ -35,15 +35,12 @@ class ThreadColours(NamedTuple):
 
 
 class PaletteColour(Frozen):
-    """A colour of threads; what is not given is that of the yarn."""
+    """A colour of threads, as `Yarn` has it; what is not given is that of the yarn."""
 
     diffuse: Colour
-    """Colour k_d of the light scattered many times and sent back."""
     specular: Colour | None = None
-    """Colour k_s of the light scattered once by the fibres."""
     diffuse_transmission: Colour | None = None
-    """Colour k_dt of the light scattered many times that leaves on the other side; if not given, as much of the yarn's
-    as the other colours leave (`Yarn.most_diffuse`)."""
+    """If not given, as much of the yarn's as the other colours leave (`Yarn.most_diffuse`)."""
 
     def on(self, yarn: Yarn, thickness: float) -> Yarn:
         """Return a yarn in this colour, of a layer of an optical thickness."""

@@ -80,7 +80,6 @@ def with_widths(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _width(given: dict[str, Any], yarn: Mapping[str, Any], per_cm: Any, axis: int) -> float:
-    """Return the width of a yarn in spacings."""
     count = validated(Count, given, "")
     key = next(iter(given))
     if (count.tex is None) == (count.ne is None):

@@ -14,7 +14,6 @@ from typing import Final
 MOST_LETTERS: Final = 300  # most letters of a sentence
 
 _PART = 80  # letters of a file, a key or a value in it
-_WORD = 60  # letters of a name that is compared with known ones
 
 
 class BadInput(ValueError):  # noqa: N818 - the name reads as the sentence does
@@ -85,6 +84,6 @@ def printable(text: str) -> str:
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return the end of a sentence: ``"did you mean 'x'? known: a, b, x"``, or only its last part if none is near."""
     names = sorted(known)
-    close = difflib.get_close_matches(word[:_WORD], names, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(word[:60], names, n=1, cutoff=0.5)
     suggestion = f"did you mean {close[0]!r}? " if close else ""
     return f"{suggestion}known: {', '.join(names)}"

@@ -65,13 +65,11 @@ class Rib(Family):
 
 
 class Basket(Family):
-    """Plain weave with groups in both directions."""
+    """Plain weave with groups in both directions, of `ends` and of `picks`."""
 
     family: Literal["basket"] = "basket"
     ends: StrictInt = Field(default=2, ge=2, le=16)
-    """Ends that move together."""
     picks: StrictInt = Field(default=2, ge=2, le=16)
-    """Picks that lie together."""
 
     def build(self) -> Draft:
         """Weave it."""

@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import cache
-from typing import Annotated, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
-from pydantic import AfterValidator, Field, StrictBool, StrictInt, ValidationError, model_validator
+from pydantic import Field, StrictBool, StrictInt, ValidationError, ValidationInfo, field_validator, model_validator
 
 from weaves.draft import Draft, Family, Matrix, cells
 from weaves.errors import BadInput
@@ -38,42 +38,35 @@ LARGE_SATIN_ENDS = (9, 10)
 IRREGULAR_REPEATS = (4, 8)  # fewest and most ends, and picks, of an irregular draft
 LONGEST_FLOAT = 4  # longest float of an irregular draft, in cells
 
-
-def _range_of(key: str) -> Callable[[tuple[float, float]], tuple[float, float]]:
-    """Return a check that a range rises and lies where a yarn's `key` may lie."""
-
-    def check(bounds: tuple[float, float]) -> tuple[float, float]:
-        if bounds[0] > bounds[1]:
-            raise ValueError("a range is [lowest, highest]")
-        for value in bounds:
-            try:
-                Yarn.model_validate({"bend": 0.0, "roughness": 1.0, key: value})
-            except ValidationError as error:
-                raise ValueError(error.errors()[0]["msg"]) from error
-        return bounds
-
-    return check
-
-
 Range = tuple[Number, Number]
-Roughness = Annotated[Range, AfterValidator(_range_of("roughness"))]
 
 
 class Ranges(Frozen):
     """Ranges [lowest, highest] of the parameters of the yarns, drawn for each yarn separately."""
 
-    roughness_warp: Roughness = (0.01, 0.49)
-    """Roughness of the warp, uniform in its square root."""
-    roughness_weft: Roughness = (0.01, 0.49)
-    """Roughness of the weft, uniform in its square root."""
-    relief: Annotated[Range, AfterValidator(_range_of("relief"))] = (0.2, 2.0)
+    roughness_warp: Range = (0.01, 0.49)
+    """Roughness of the warp, uniform in its square root, as that of the weft."""
+    roughness_weft: Range = (0.01, 0.49)
+    relief: Range = (0.2, 2.0)
     """Scale of the height field."""
-    width: Annotated[Range, AfterValidator(_range_of("width"))] = (1.0, 1.0)
+    width: Range = (1.0, 1.0)
     """Gap scale; the published generator takes [0.6, 0.9] for plain weaves, [0.85, 0.95] for the others."""
-    bend: Annotated[Range, AfterValidator(_range_of("bend"))] = (10.0, 50.0)
+    bend: Range = (10.0, 50.0)
     """Largest inclination, degrees."""
-    twist: Annotated[Range, AfterValidator(_range_of("twist"))] = (0.0, 0.0)
+    twist: Range = (0.0, 0.0)
     """Fibre angle, degrees; one value for both yarns, which a mill spins alike."""
+
+    @field_validator("*")
+    @classmethod
+    def _allowed_in_a_yarn(cls, bounds: Range, info: ValidationInfo) -> Range:
+        if bounds[0] > bounds[1]:
+            raise ValueError("a range is [lowest, highest]")
+        for value in bounds:
+            try:
+                Yarn.model_validate({"bend": 0.0, "roughness": 1.0, str(info.field_name).partition("_")[0]: value})
+            except ValidationError as error:
+                raise ValueError(error.errors()[0]["msg"]) from error
+        return bounds
 
 
 class Population(Frozen):
@@ -205,7 +198,6 @@ def _catalogue() -> dict[FamilyName, list[Family]]:
 
 @cache
 def _known() -> set[tuple[tuple[int, int], bytes]]:
-    """Return the canonical forms of all drafts of the catalogue."""
     return {weave.build().canonical() for weaves in _catalogue().values() for weave in weaves}
 
 

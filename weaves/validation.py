@@ -79,7 +79,6 @@ def validated(model: type[Model], data: Mapping[str, Any], where: str) -> Model:
 
 
 def _bad_input(error: ValidationError, model: type[BaseModel], data: object, where: str) -> BadInput:
-    """Turn a pydantic error into one sentence."""
     # Unknown keys first: a misspelt key also makes the right one missing, and the former message is more useful.
     errors = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
     first = errors[0]

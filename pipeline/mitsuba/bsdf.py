@@ -24,7 +24,7 @@ from pipeline.mitsuba.worn import ClothOptions, RayHits, Worn
 from weaves.errors import BadInput
 from weaves.validation import validated
 
-BSDF: Final = "twillight"  # name of the plugin
+BSDF: Final = "twillight"
 
 REFLECTION, TRANSMISSION, STRAIGHT_THROUGH = range(3)  # components
 
@@ -56,8 +56,7 @@ class RayValues:
 
     def active(self, value: Any) -> Index:
         """Return which rays are active."""
-        chosen: Mask = np.broadcast_to(np.asarray(value, np.bool_).reshape(-1), (self._count,))
-        return np.flatnonzero(chosen)
+        return np.flatnonzero(np.broadcast_to(np.asarray(value, np.bool_).reshape(-1), (self._count,)))
 
     def to_mitsuba(self, kind: Any, values: Any, rows: Index, elsewhere: float = 0.0) -> Any:
         """Return numbers (n,) or vectors (n, c) of the rays `rows` as Mitsuba's `kind`; other rays have `elsewhere`."""
@@ -204,5 +203,4 @@ def _curved(dr: Any, si: Any) -> tuple[tuple[Any, Any], Any]:
 
 
 def _component(hits: RayHits, light: Float64 | Float32) -> Index:
-    """Return the component of each light, (N,)."""
     return np.where(hits.viewer[:, 2] * light[:, 2] < 0.0, TRANSMISSION, REFLECTION)

@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from pydantic import Field
@@ -35,7 +35,7 @@ from pipeline.scenes.loading import faceted, has_uv
 from weaves.errors import BadInput
 from weaves.validation import Frozen, validated
 
-INTEGRATOR: Final = "twillight_path"  # name of the plugin
+INTEGRATOR: Final = "twillight_path"
 
 MOST_RAYS: Final = 2**18  # most rays that are traced at a time; a ray takes about a kilobyte
 
@@ -169,14 +169,6 @@ def _refuse_meshes(mi: Any, scene: Any) -> None:
                 raise BadInput("scene", "shape", name, allowed)
 
 
-class _Bounce(NamedTuple):
-    """Where paths came from, the density of their direction, and whether it was that of a delta lobe."""
-
-    place: Any
-    pdf: Any
-    delta: Any
-
-
 class _Path:
     """Paths of one set of rays: a loop over bounces in Python, each of which is evaluated at once."""
 
@@ -190,14 +182,15 @@ class _Path:
         mi, dr, sampler = self._mi, self._dr, self._sampler
         cone = _Cone(mi, dr)
         light, throughput, valid = mi.Spectrum(0.0), mi.Spectrum(1.0), mi.Bool(False)
-        before = _Bounce(dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True))
+        # Where paths come from, the density of their direction, and whether it is that of a delta lobe.
+        place, pdf, delta = dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True)
         depth = 0
         while True:
             si = self._scene.ray_intersect(ray, active)
             if depth == 0:
                 valid = si.is_valid()
             if depth > 0 or not self._options.hide_emitters:
-                light += throughput * self._emitted(si, before, active)
+                light += throughput * self._emitted(si, place, pdf, delta, active)
             depth += 1
             active = active & si.is_valid()
             if depth == self._options.max_depth or not dr.any(active):
@@ -209,17 +202,17 @@ class _Path:
             light += throughput * self._lit(si, to_light, active)
             drawn, weight = si.bsdf().sample(self._context, si, lobe, direction, active)
             throughput *= weight
-            before = _Bounce(si, drawn.pdf, mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta))
-            cone.scatter(drawn.pdf, before.delta)
+            place, pdf, delta = si, drawn.pdf, mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
+            cone.scatter(pdf, delta)
             ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
-            self._leave(ray, si, chord, active & before.delta)
+            self._leave(ray, si, chord, active & delta)
             largest = dr.max(throughput)
             active = active & (largest > 0.0)
             if depth >= self._options.rr_depth:
                 kept = dr.minimum(largest, 0.95)
                 active = active & (end < kept)
                 throughput /= dr.maximum(kept, 1e-8)
-            self._evaluate(light, throughput, active, ray, before.pdf, before.delta, cone.state)
+            self._evaluate(light, throughput, active, ray, pdf, delta, cone.state)
         return light, valid
 
     def _bend(self, si: Any, active: Any) -> Any:
@@ -254,16 +247,16 @@ class _Path:
         out = out & (hit.shape == si.shape)
         ray.o = dr.select(out, hit.spawn_ray(ray.d).o, ray.o)
 
-    def _emitted(self, si: Any, before: _Bounce, active: Any) -> Any:
+    def _emitted(self, si: Any, place: Any, pdf: Any, delta: Any, active: Any) -> Any:
         """Return the light of emitters that rays hit, weighted against `_lit`."""
         mi, dr, scene = self._mi, self._dr, self._scene
         emitter = si.emitter(scene, active)
         if self._scalar and emitter is None:
             return mi.Spectrum(0.0)
-        emitted = mi.DirectionSample3f(scene, si, before.place)
-        sampled = active & ~before.delta if not self._scalar else active and not before.delta
-        other = scene.pdf_emitter_direction(before.place, emitted, sampled) if dr.any(sampled) else mi.Float(0.0)
-        weight = dr.select(before.delta, 1.0, self._heuristic(before.pdf, other))
+        emitted = mi.DirectionSample3f(scene, si, place)
+        sampled = active & ~delta if not self._scalar else active and not delta
+        other = scene.pdf_emitter_direction(place, emitted, sampled) if dr.any(sampled) else mi.Float(0.0)
+        weight = dr.select(delta, 1.0, self._heuristic(pdf, other))
         return weight * emitter.eval(si, active)
 
     def _lit(self, si: Any, numbers: Any, active: Any) -> Any:

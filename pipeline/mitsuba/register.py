@@ -19,9 +19,6 @@ HOW: Final = (
     "Mitsuba finds no LLVM library of version 16 or newer, so it computes one ray at a time, which is slow: "
     "`apt install libllvm19` on Debian, or name the library in DRJIT_LIBLLVM_PATH"
 )
-"""How to install LLVM."""
-
-_COLOURS = "must have RGB colours, such as llvm_ad_rgb or scalar_rgb"
 
 _registered: set[str] = set()
 
@@ -36,7 +33,7 @@ def register() -> Any:
     if mi.variant() is None:
         mi.set_variant(best_variant())
     if not _rgb(str(mi.variant())):
-        raise BadInput("mitsuba", "variant", mi.variant(), _COLOURS)
+        _refuse_colours()
     if not _registered:
         mi.detail.add_variant_callback(lambda old, new: _enter(mi))
     _enter(mi)
@@ -85,11 +82,10 @@ def _enter(mi: Any) -> None:
     mi.register_integrator(INTEGRATOR, integrator_class(mi, dr) if _rgb(variant) else _refuse_colours)
 
 
-def _refuse_colours(props: Any) -> NoReturn:
-    """Refuse the variant that is set."""
+def _refuse_colours(props: Any = None) -> NoReturn:
     import mitsuba as mi
 
-    raise BadInput("mitsuba", "variant", mi.variant(), _COLOURS)
+    raise BadInput("mitsuba", "variant", mi.variant(), "must have RGB colours, such as llvm_ad_rgb or scalar_rgb")
 
 
 def _guarded(render: Callable[..., Any]) -> Callable[..., Any]:

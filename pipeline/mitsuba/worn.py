@@ -250,7 +250,6 @@ class Worn:
         return lobes
 
     def _ask(self, queries: Queries, answer: _Answer[Part], lobes: Sequence[Lobes] | None = None) -> list[Part]:
-        """Return the answers of each run of queries."""
         runs = [queries.take(slice(start, start + RUN)) for start in range(0, len(queries.u), RUN)]
         known: Sequence[Lobes | None] = lobes or [None] * len(runs)
         tasks = list(zip(runs, known, strict=True))

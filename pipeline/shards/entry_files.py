@@ -137,8 +137,6 @@ def _columns(path: Path, names: Sequence[str]) -> list[str]:
 
 
 def _in_order(where: str, ids: npt.NDArray[Any], given: dict[str, npt.NDArray[Any]], count: int) -> Float32:
-    """Return the answers in the order of the questions."""
-
     def refuse(bad: npt.NDArray[np.bool_], column: str, values: npt.NDArray[Any], allowed: str) -> None:
         if rows := int(bad.sum()):
             row = int(bad.argmax())

@@ -21,7 +21,7 @@ from pydantic import BaseModel, FailFast, Field, ValidationError
 from pipeline.atomic import atomic_write
 from pipeline.shards.queries import Kind
 from pipeline.shards.schema import SCHEMA_VERSION
-from pipeline.shards.store import read_columns, rows_of
+from pipeline.shards.store import numbers_of, read_table, rows_of
 from pipeline.truth.query import Answers, Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -54,7 +54,6 @@ class ShardEntry(Frozen):
     """First row of the split's stream."""
     rows: int
     sha256: str
-    """Hash of the file's bytes."""
 
 
 class Manifest(Frozen):
@@ -120,7 +119,7 @@ class Manifest(Frozen):
     def columns(self, folder: Path, fabric: str, split: str) -> dict[str, npt.NDArray[Any]]:
         """Return all rows of a fabric's split or set by column, the fabric left out; errors as `read`."""
         entries = self.by_fabric(folder, [fabric], split)[fabric]
-        parts = [read_columns(folder / entry.file, entry.kind) for entry in entries]
+        parts = [numbers_of(read_table(folder / entry.file, entry.kind)) for entry in entries]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -131,7 +130,6 @@ class PublishedFile(Frozen):
     """Path within the folder."""
     bytes: int
     sha256: str
-    """Hash of its bytes."""
     role: Role | None = None
     """Role of its fabrics; None for files without rows."""
     split: Split | None = None
@@ -140,26 +138,20 @@ class PublishedFile(Frozen):
 
 
 class Published(Frozen):
-    """The contents of a published data set."""
+    """The contents of a published data set; what `Manifest` has too means the same."""
 
     name: str
-    """Name of its recipe."""
     version: str
     """Version of the columns, that of the truth, and 0."""
     fingerprint: str
-    """Fingerprint of everything that shaped its rows."""
     schema_version: int
-    """Version of the columns."""
     truth_version: int
     """Version of the ground truth; 0 if it is not known."""
     licence: str
     """SPDX identifier."""
     rows: int
-    """Number of all rows."""
     roles: dict[Role, list[str]]
-    """Names of the fabrics in each role."""
     fabrics: dict[str, Fabric]
-    """Every fabric in full."""
     options: dict[str, Any]
     """The recipe's data set section."""
     files: Annotated[list[PublishedFile], FailFast()]

@@ -71,7 +71,7 @@ class RowPiece(NamedTuple):
     def read(self) -> dict[str, npt.NDArray[Any]]:
         """Return the rows by column, without the fabric, checksums verified; BadInput for another or damaged file."""
         if not self.joined:
-            return store.read_columns(self.path, "components")
+            return store.numbers_of(store.read_table(self.path))
         refuse_irregular(self.path, "a file of rows")
         missing = "does not exist", "get the whole data set"
         with store.readable(self.path, missing, "get the data set again"), local_copy(self.path) as file:
@@ -92,7 +92,6 @@ class DatasetRows(NamedTuple):
     folder: Path
     fabrics: dict[str, Fabric]
     roles: dict[Role, list[str]]
-    """Names of the fabrics in each role."""
     pieces: list[RowPiece]  # all rows that every model may read, in their order
 
     @classmethod

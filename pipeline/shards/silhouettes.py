@@ -44,7 +44,6 @@ class SilhouetteRows(Frozen):
     kind: Literal["opacity", "grazing_cosine"]
     """Target: the opacity, or mean and variance of the grazing cosine over the footprint."""
     rows: int = Field(ge=1)
-    """Rows for a fabric."""
     points: int = Field(ge=32)
     """Rays of an opacity, a power of two; of grazing cosines a sixteenth."""
     sigma: tuple[float, float]

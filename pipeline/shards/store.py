@@ -134,11 +134,6 @@ def numbers_of(table: pa.Table) -> dict[str, npt.NDArray[Any]]:
     return {name: table.column(name).to_numpy() for name in table.column_names if name != "fabric"}
 
 
-def read_columns(path: Path, kind: Kind) -> dict[str, npt.NDArray[Any]]:
-    """Read a shard's columns but the fabric with their checksums verified; errors as `read_table`."""
-    return numbers_of(read_table(path, kind))
-
-
 def columns_of(*rows: Queries | Answers) -> dict[str, npt.NDArray[Any]]:
     """Return queries, answers or both by column."""
     columns: dict[str, npt.NDArray[Any]] = {}

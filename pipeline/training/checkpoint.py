@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -85,16 +85,9 @@ class State:
             self.best = {"step": step, "held_out_loss": loss}
             torch._foreach_copy_(self._best, self._average)
 
-    def weights(self) -> dict[str, Tensor]:
-        """Return the averaged weights by name, on the CPU."""
-        return self._named(self._average)
-
-    def best_weights(self) -> dict[str, Tensor]:
-        """Return the averaged weights of the lowest held-out loss; without held-out queries, the last ones."""
-        return self._named(self._best if self.best else self._average)
-
-    def _named(self, learnt: Sequence[Tensor]) -> dict[str, Tensor]:
-        averaged = iter(learnt)
+    def weights(self, best: bool = False) -> dict[str, Tensor]:
+        """Return the averaged weights on the CPU: the last, or the `best` if held-out queries were looked at."""
+        averaged = iter(self._best if best and self.best else self._average)
         return {
             name: (next(averaged) if tensor.is_floating_point() else tensor).detach().cpu().contiguous().clone()
             for name, tensor in self.network.state_dict().items()

@@ -57,9 +57,8 @@ class TrainingRows:
     """A table of rows (rows, COLUMNS), fabric after fabric, `counts` of each, at least 1; it may be memory-mapped."""
 
     def __init__(self, table: Float32, counts: Sequence[int]) -> None:
-        self.table, self.counts = table, list(counts)
-        self.windows = [[count] for count in counts]
-        self._starts = np.concatenate([[0], np.cumsum(self.counts)])
+        self.table, self.windows = table, [[count] for count in counts]
+        self._starts = np.concatenate([[0], np.cumsum(counts)])
 
     def index(self, fabrics: Index, rows: Index) -> Index:
         """Return the places in the table of rows (F, n) of fabrics (F,)."""
@@ -82,7 +81,6 @@ class WindowedRows:
         rows = ROW_GROUP * min(max(MOST_IN_TABLE // (ROW_GROUP * len(shards)), 1), _MOST_GROUPS)
         self._pieces = [_windows(folder, own, rows) for own in shards]
         self.windows = [[sum(piece.rows for piece in window) for window in own] for own in self._pieces]
-        self.counts = [sum(window) for window in self.windows]
         self._window = lru_cache(maxsize=MOST_IN_TABLE // rows)(self._read)
 
     def take(self, fabrics: Index, rows: Index) -> Float32:
@@ -159,8 +157,7 @@ def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: P
             table[start : start + part.rows] = _stacked(read_table(folder / part.file, names=_NAMES))
 
         with ThreadPoolExecutor(_READERS) as pool:  # one shard of each is in memory
-            for _ in pool.map(fill, parts, starts):
-                pass
+            list(pool.map(fill, parts, starts))
     return TrainingRows(np.load(cache, mmap_mode="r"), counts)
 
 

@@ -121,7 +121,7 @@ def train(
                 progress(done / training.steps)
         state.check(training.steps)
 
-        weights = state.best_weights()
+        weights = state.weights(best=True)
         card |= {"curve": state.curve, "steps_taken": int(state.curve[-1]["step"]), "kept": _kept(state)}
         # Beside the options; the number of cores is not part of it.
         processor = torch.backends.cpu.get_cpu_capability()

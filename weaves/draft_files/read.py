@@ -42,11 +42,11 @@ class DraftThreads(NamedTuple):
 class DraftFile(NamedTuple):
     """A draft as its file has it."""
 
-    title: str  # title, as the file or its name says
+    title: str  # as the file or its name says
     program: str  # program that wrote it, with its version
     warp_over: Bools  # true where the warp is on top, (picks, ends), the first pick and the first end first
-    ends: DraftThreads  # the warp yarns
-    picks: DraftThreads  # the weft yarns
+    ends: DraftThreads
+    picks: DraftThreads
     remarks: tuple[str, ...]  # sentences on what could not be used
 
 
@@ -206,9 +206,8 @@ def _threads(pattern: PatternData, axis: str, count: int, table: Mapping[int, st
     """Return the colours and lengths of the threads of the ``"warp"`` or ``"weft"``."""
     yarns = getattr(pattern, axis)
     named = getattr(pattern, f"{axis}_colors")
-    spacing, thickness = (
-        _mean(getattr(yarns, key), getattr(pattern, f"{axis}_{key}"), count) for key in ("spacing", "thickness")
-    )
+    spacing = _mean(yarns.spacing, getattr(pattern, f"{axis}_spacing"), count)
+    thickness = _mean(yarns.thickness, getattr(pattern, f"{axis}_thickness"), count)
     scale = CENTIMETRES.get((yarns.units or "").strip().lower())
     per_cm = 1 / (spacing * scale) if spacing and scale else None
     if per_cm is not None and not 0.1 <= per_cm <= 1000:
@@ -217,11 +216,8 @@ def _threads(pattern: PatternData, axis: str, count: int, table: Mapping[int, st
     if spacing and scale is None:
         stated = f"the unit {yarns.units!r}" if yarns.units else "no unit"
         remarks.append(one_line(f"[{axis.upper()}] Spacing has {stated}: known are {', '.join(CENTIMETRES)}", 160))
-    return DraftThreads(
-        colours=tuple(table[named.get(thread, yarns.color)] for thread in range(1, count + 1)),
-        width=thickness / spacing if spacing and thickness else None,
-        per_cm=per_cm,
-    )
+    colours = tuple(table[named.get(thread, yarns.color)] for thread in range(1, count + 1))
+    return DraftThreads(colours, thickness / spacing if spacing and thickness else None, per_cm)
 
 
 def _mean(default: float | None, own: Mapping[int, float], count: int) -> float | None:

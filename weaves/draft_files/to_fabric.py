@@ -79,7 +79,6 @@ def fabric_of(draft: DraftFile, like: Fabric, name: str, where: str, given: dict
 
 
 def _repeat(over: Bools, where: str, read: list[str], assumed: list[str]) -> Bools:
-    """Cut a draft to its smallest repeat."""
     picks, ends = over.shape
     periods = []
     for axis, section, threads in ((0, "[TREADLING]", "picks"), (1, "[THREADING]", "ends")):
@@ -100,7 +99,6 @@ def _repeat(over: Bools, where: str, read: list[str], assumed: list[str]) -> Boo
 
 
 def _refuse_loose(matrix: Bools, where: str) -> None:
-    """Refuse a draft with a yarn that stays on one side: it is not woven in."""
     for section, thread, lines in (("[THREADING]", "end", matrix.T), ("[TREADLING] or [LIFTPLAN]", "pick", matrix)):
         for number, line in enumerate(lines, 1):
             if line.all() or not line.any():

@@ -31,6 +31,7 @@ Thread = Annotated[int, Field(ge=1, le=MOST_THREADS)]
 Count = Annotated[int, Field(ge=0, le=MOST_THREADS)]
 Length = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
 Level = Annotated[int, Field(ge=0, le=65535)]
+Index = Annotated[int, Field(ge=0, le=65536)]
 
 
 def _filled(section: Any) -> Any:
@@ -56,10 +57,8 @@ Numbers = Annotated[set[Count], BeforeValidator(_filled_parts)]
 Sets = Annotated[dict[Thread, Numbers], BeforeValidator(_filled)]
 Colours = Annotated[dict[Thread, Count], BeforeValidator(_filled)]
 Lengths = Annotated[dict[Thread, Length], BeforeValidator(_filled)]
-Table = Annotated[
-    dict[Annotated[int, Field(ge=0, le=65536)], Annotated[tuple[Level, Level, Level], BeforeValidator(_parts)]],
-    BeforeValidator(_filled),
-]
+Levels = Annotated[tuple[Level, Level, Level], BeforeValidator(_parts)]
+Table = Annotated[dict[Index, Levels], BeforeValidator(_filled)]
 
 
 class _Text(BaseModel):
@@ -79,7 +78,7 @@ class _Weaving(BaseModel):
 
 class _Yarns(BaseModel):
     threads: Annotated[int | None, Field(ge=1, le=MOST_THREADS)] = None
-    color: Annotated[tuple[Annotated[int, Field(ge=0, le=65536)], ...] | None, BeforeValidator(_parts)] = None
+    color: Annotated[tuple[Index, ...] | None, BeforeValidator(_parts)] = None
     spacing: Length | None = None
     thickness: Length | None = None
     units: str | None = None

@@ -9,7 +9,7 @@ from pipeline.fingerprint import file_sha256
 from pipeline.shards.check import check_shard
 from pipeline.shards.generate import AnyShardTask, ExtraShardTask, ShardTask, generate_shard, set_name
 from pipeline.shards.manifest import Manifest, ShardEntry
-from pipeline.shards.store import read_about, read_columns, rows_of, write_columns
+from pipeline.shards.store import numbers_of, read_about, read_table, rows_of, write_columns
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.shards.extra import GRAZING, OPACITY, SAMPLES
 from tests.refusals import refusal
@@ -22,7 +22,7 @@ EXTRA = [SAMPLES.model_copy(update={"texels_per_yarn": 1}), OPACITY, GRAZING]
 
 
 def read_shard(path):
-    return rows_of(read_columns(path, "components"))
+    return rows_of(numbers_of(read_table(path)))
 
 
 @pytest.fixture
@@ -147,7 +147,7 @@ def test_extra_rows_are_shards_like_all_others(folder, extra):
     manifest.save(folder)
     read = Manifest.load(folder).columns(folder, "denim", set_name(extra))
     generate_shard(ExtraShardTask(fabric=TASK.fabric, extra=extra, start=0, rows=64), folder / "whole.parquet")
-    whole = read_columns(folder / "whole.parquet", extra.kind)
+    whole = numbers_of(read_table(folder / "whole.parquet", extra.kind))
     assert read.keys() == whole.keys()
     for name, column in whole.items():
         np.testing.assert_array_equal(read[name], column)
@@ -158,7 +158,7 @@ def test_damaged_extra_rows_are_named(folder):
     manifest = _extra(folder, OPACITY)
     entry = manifest.shards[0]
     path = folder / entry.file
-    column = read_columns(path, "opacity")
+    column = numbers_of(read_table(path, "opacity"))
     write_columns(path, "opacity", "denim", column | {"opacity": 2 * column["opacity"] + 1}, {})
     faults = check_shard(folder, entry, manifest)
     assert any("SHA-256" in fault for fault in faults)

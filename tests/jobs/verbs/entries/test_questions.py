@@ -11,7 +11,7 @@ from jobs.recipe.load import load_recipe
 from pipeline.fingerprint import file_sha256
 from pipeline.shards.generate import ShardTask, generate_shard
 from pipeline.shards.schema import QUERY_COLUMNS, SCHEMA
-from pipeline.shards.store import read_columns
+from pipeline.shards.store import numbers_of, read_table
 from pipeline.truth.options import TruthOptions
 from reports.images.exr import read_exr
 from tests.jobs import made_up
@@ -46,7 +46,7 @@ def test_the_questions_are_those_of_the_shards_without_their_answers(folder, rec
     assert (voile["name"], voile["role"], voile["first_id"], voile["last_id"]) == ("voile", "unseen", 64, 127)
     task = ShardTask(fabric=load_fabric("voile"), start=0, rows=64, split="test", seed=dataset.seed, truth=coarse)
     generate_shard(task, tmp_path / "shard.parquet")
-    drawn = read_columns(tmp_path / "shard.parquet", "components")
+    drawn = numbers_of(read_table(tmp_path / "shard.parquet"))
     for name in QUERY_COLUMNS:
         np.testing.assert_array_equal(table[name].to_numpy()[64:128], drawn[name])
 
