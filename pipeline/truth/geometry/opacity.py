@@ -98,7 +98,9 @@ def hits(front: HeightField, back: HeightField, x: float, y: float, towards: Ray
     """Return whether a ray, z < 0, that enters the boundary above (x, y) of the repeat hits a yarn or `filled` gap."""
     if visible(front, x, y, front.highest, UNDER, towards):
         return False
-    return filled or not (has_gaps(front) and _passes(front, back, x, y, towards))
+    if filled or not has_gaps(front):
+        return True
+    return not _passes(front, back, x, y, towards)
 
 
 @allocating_kernel
