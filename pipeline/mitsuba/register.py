@@ -24,10 +24,7 @@ _registered: set[str] = set()
 
 
 def register() -> Any:
-    """Enter the plugins into Mitsuba, and return the module.
-
-    Without a variant, `best_variant` is set; BadInput if the one that is set has other colours than RGB.
-    """
+    """Enter the plugins into Mitsuba and return the module; without a variant, set the best; BadInput if not RGB."""
     import mitsuba as mi
 
     if mi.variant() is None:
