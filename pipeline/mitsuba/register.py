@@ -43,8 +43,8 @@ def dress(loaded: Loaded, method: str = USUAL_METHOD) -> Any:
     worn = {}
     alike: dict[str, Any] = {"type": BSDF, "method": method, "bounces": loaded.options.bounces}
     for key, (cloth, fabric) in loaded.cloths.items():
-        placed = {"yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1], "turn": cloth.turn}
-        worn[key] = mi.load_dict({**alike, "fabric": cloth.fabric or fabric.name, **placed})
+        layout = {"yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1], "turn": cloth.turn}
+        worn[key] = mi.load_dict({**alike, "fabric": cloth.fabric or fabric.name, **layout})
     for shape in loaded.world.shapes():
         name = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
         if name.startswith(PREFIX):
