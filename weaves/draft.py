@@ -69,11 +69,7 @@ class Draft:
         return "\n".join(row.replace("#", "██").replace(".", "· ") for row in self.rows())
 
     def different_cells(self) -> int:
-        """Return the number of cells that no translation of the cloth onto itself carries into one another.
-
-        An 8-end satin has 64 cells of 8 different kinds. Each translation group has as many members in every orbit, so
-        the number is that of all cells over that of the translations.
-        """
+        """Return the number of orbits of cells under translations of the cloth onto itself; all are equally large."""
         return self.warp_over.size // len(translations(self.warp_over))
 
     def loom(self) -> Loom:

@@ -130,8 +130,8 @@ def _fields_at(model: type[BaseModel], location: Sequence[int | str]) -> set[str
     for step in location:
         fields = [known.model_fields[str(step)] for known in models if step in known.model_fields]
         inner = [model for field in fields for model in _models(field)]
-        # A step that is no field is an index (stay) or the tag of a union (choose).
-        models = inner or [known for known in models if _tagged(known, step)] or models
+        tagged = [known for known in models if any(step in get_args(f.annotation) for f in known.model_fields.values())]
+        models = inner or tagged or models  # a step that is no field is the tag of a union (choose) or an index (stay)
     return {name for known in models for name in (*known.model_fields, *getattr(known, "also_read", ()))}
 
 
@@ -141,7 +141,3 @@ def _models(field: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [found for part in get_args(annotation) for found in _models(part)]
-
-
-def _tagged(model: type[BaseModel], tag: int | str) -> bool:
-    return any(tag in get_args(field.annotation) for field in model.model_fields.values())

@@ -28,10 +28,7 @@ def _rational(t: float) -> float:
 
 @inlined_kernel
 def normal_quantile(p: float) -> float:
-    """Return the x at which the standard normal distribution reaches p, 0 < p < 1, to 1.2e-9 relative.
-
-    A footprint's centre is known to float32, so the last digits of Acklam's form are not refined further.
-    """
+    """Return the standard normal quantile of p, 0 < p < 1, to 1.2e-9 relative; centres of footprints are float32."""
     if p < _TAIL:
         return _rational(math.sqrt(-2.0 * math.log(p)))
     if p > 1.0 - _TAIL:

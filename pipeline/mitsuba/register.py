@@ -24,10 +24,7 @@ _registered: set[str] = set()
 
 
 def register() -> Any:
-    """Enter the plugins into Mitsuba, and return the module.
-
-    Without a variant, `best_variant` is set; BadInput if the one that is set has other colours than RGB.
-    """
+    """Enter the plugins into Mitsuba and return the module; without a variant, set the best; BadInput if not RGB."""
     import mitsuba as mi
 
     if mi.variant() is None:
@@ -46,8 +43,8 @@ def dress(loaded: Loaded, method: str = USUAL_METHOD) -> Any:
     worn = {}
     alike: dict[str, Any] = {"type": BSDF, "method": method, "bounces": loaded.options.bounces}
     for key, (cloth, fabric) in loaded.cloths.items():
-        place = {"yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1], "turn": cloth.turn}
-        worn[key] = mi.load_dict({**alike, "fabric": cloth.fabric or fabric.name, **place})
+        layout = {"yarns": cloth.yarns[0], "yarns_v": cloth.yarns[1], "turn": cloth.turn}
+        worn[key] = mi.load_dict({**alike, "fabric": cloth.fabric or fabric.name, **layout})
     for shape in loaded.world.shapes():
         name = str(shape.bsdf().id()) if shape.bsdf() is not None else ""
         if name.startswith(PREFIX):

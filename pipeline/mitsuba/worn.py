@@ -175,10 +175,7 @@ class Worn:
         return Sample(light.astype(np.float32), pdf, straight, weight)
 
     def transparency(self, hits: RayHits) -> Float32:
-        """Return the share of light from straight behind that reaches the viewer of each hit, (N,).
-
-        It goes through the cloth, or past a silhouette (`pipeline.scenes.shade.compose`).
-        """
+        """Return the light straight through the cloth or past a silhouette, to the viewer of each hit, (N,)."""
         method, covered = self._bsdf.method, self.coverage(hits)
         parts = self._ask(self._looks(hits), lambda rows, seed, lobes: method.transparency(self.fabric, rows, seed))
         return 1.0 - covered + covered * np.concatenate(parts)

@@ -37,9 +37,8 @@ class AngularSamples(Frozen):
     samples: int = Field(ge=1)
     """Pairs of directions, the same for every texel."""
     directions: Literal["projected_disc", "hemisphere"]
-    """Density of the directions, as in `QueryOptions`."""
+    """Density of the directions, and their largest angle, as in `QueryOptions`."""
     max_angle: float = Field(gt=0, le=89.9)
-    """Largest angle of either direction to the macro normal, in degrees."""
     truth: TruthOptions
 
     @property

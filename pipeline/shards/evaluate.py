@@ -73,10 +73,7 @@ def truth_answerer(fabric: Fabric, options: TruthOptions, seed: int) -> Answerer
 
 
 class Summary:
-    """Statistics of the results, collected row by row in constant memory.
-
-    `rows` of the file, `bad` ones among them; `points` that were evaluated in `seconds`, on all threads together.
-    """
+    """Statistics in constant memory: `rows`, `bad` ones among them, `points` evaluated in `seconds` of all threads."""
 
     _EDGES = np.linspace(-8.0, 2.0, 5001)  # of log10: a median to 0.25 %
 

@@ -169,10 +169,7 @@ class Published(Frozen):
 
 
 def _read(contents: type[Contents], folder: Path, wide: Sequence[str], remedies: tuple[str, str]) -> Contents:
-    """Read the manifest of a folder; a table named by `wide` has an entry a fabric.
-
-    `remedies` end the sentences about a manifest that is missing and about a file that is none.
-    """
+    """Read a manifest whose tables `wide` have an entry a fabric; `remedies` are for a missing and for a broken one."""
     path = folder / FILE
     try:
         found = read_json(path, _MOST_BYTES, "a manifest", wide=dict.fromkeys(wide, _MOST_FABRICS))

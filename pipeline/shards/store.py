@@ -100,10 +100,7 @@ def readable(path: Path, missing: tuple[str, str], broken: str) -> Iterator[None
 
 
 def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ()) -> pa.Table:
-    """Read a shard of a kind, or only some of its columns by their `names`, with checksums verified.
-
-    BadInput if the file is missing, cut short, damaged, or not a shard of this kind and schema.
-    """
+    """Read a shard, or its columns `names`, verified; BadInput if it is missing, damaged or of another kind."""
     schema = pa.schema([SCHEMAS[kind].field(name) for name in names]) if names else SCHEMAS[kind]
     refuse_irregular(path, "a shard")
     with readable(path, *_REMEDIES), local_copy(path) as file:

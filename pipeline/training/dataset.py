@@ -221,10 +221,7 @@ class Order:
 
 
 class Batches:
-    """Batches of a training, in an order, as tensors on one device.
-
-    A GPU holds the whole table if it takes less than half of the free memory.
-    """
+    """Batches in an order, as tensors on one device; a GPU holds a table of less than half of its free memory."""
 
     def __init__(self, rows: TrainingRows | WindowedRows, order: Order, device: torch.device) -> None:
         self.rows, self.order, self.device = rows, order, device

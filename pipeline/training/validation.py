@@ -28,10 +28,7 @@ _LOOK_ROWS = 2048  # most queries of a look during the training
 
 
 class HeldOut:
-    """Held-out queries of the trained fabrics of a data set, at most so many rows in all.
-
-    `options` and `card` are what `restore` needs beside the weights.
-    """
+    """Held-out queries of trained fabrics, at most `rows` in all; `options` and `card` are for `restore_methods`."""
 
     def __init__(self, options: Any, card: dict[str, Any], manifest: Manifest, folder: Path, rows: int) -> None:
         self._options, self._card, self._manifest = options, card, manifest

@@ -118,10 +118,9 @@ def _section_name(field: str) -> str:
 
 
 def wif_pattern(text: str, where: str) -> PatternData:
-    """Return what a WIF text says; `where` names the file in messages.
+    """Return what a WIF text says, with a UserWarning for what cannot be used; `where` names the file in messages.
 
-    BadInput if there is no section [WIF], a section is missing, damaged or contradicts another, or a limit is
-    exceeded. A UserWarning if something cannot be used.
+    BadInput if there is no section [WIF], one is missing, damaged or contradicts another, or a limit is exceeded.
     """
     try:
         wif = _Wif.model_validate(_sections(text, where))
