@@ -74,16 +74,12 @@ class Options(Design):
         """Version of the model's numbers (`pipeline.versions`)."""
         return versions.MODELS.get(self.model, 1)
 
-    @property
-    def departures(self) -> tuple[str, ...]:
-        """Deviations from the published method, for the page."""
-        return ()
-
-    @property
-    def extra_rows(self) -> tuple[ExtraRows, ...]:
-        """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
-        return ()
-
+    departures: ClassVar[tuple[str, ...]] = ()
+    """Deviations from the published method, for the page."""
+    extra_rows: ClassVar[tuple[ExtraRows, ...]] = ()
+    """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
+    variant: ClassVar[str] = ""
+    """Setting of the only method of a model without settings."""
     kinds: ClassVar[frozenset[str]] = frozenset()
     """Kinds of queries that it evaluates, of `behind`, `stretch` and `curvature` (`QueryOptions`)."""
     turns: ClassVar[bool] = False
@@ -117,11 +113,6 @@ class Options(Design):
     def setting_of(cls, setting: float) -> str:
         """Return the text of a setting in Records, tables and names of files."""
         return f"k = {setting}"
-
-    @property
-    def variant(self) -> str:
-        """Setting of the only method of a model without settings."""
-        return ""
 
     def single(self) -> list[Self]:
         """Return options with one setting each: one for every k, or these if the model has no settings."""

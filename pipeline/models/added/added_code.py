@@ -122,6 +122,6 @@ class AddedMethod(AddedCode, Options):
         return frozenset(self.answers)
 
     @property
-    def variant(self) -> str:
+    def variant(self) -> str:  # type: ignore[override]
         """Setting of its only method."""
         return self.setting

@@ -58,7 +58,7 @@ class WovenOptions(ComponentLossOptions):
         return self
 
     @property
-    def departures(self) -> tuple[str, ...]:
+    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
         changes = {
             "a picture of the repeat seen from the queried place": self.one_blob == "local",
