@@ -18,7 +18,6 @@ from pipeline.scenes import swatch
 from pipeline.scenes.scene import Cloth, Scene
 
 DRAPE_YARNS: Final = 80.0  # yarns along a unit of uv of the scene `drape`
-
 _SIZE: Final = (256, 192)
 _HEM_YARNS: Final = 100.0  # along a unit of uv of the scene `hem`
 _HEM_FOCAL, _HEM_RADIUS = 1200.0, 8.0 / _HEM_YARNS  # in pixels; in the scene's lengths

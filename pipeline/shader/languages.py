@@ -14,7 +14,6 @@ from weaves.errors import BadInput, WorkFailed, one_line
 
 SOURCE: Final = "slang"
 ONNX: Final = "onnx"  # the language of the source, and the network of a model alone: they need no compiler
-
 ALL: Final = "all"  # every language
 
 

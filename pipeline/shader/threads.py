@@ -29,9 +29,7 @@ TINT_COLUMNS: Final = 18
 """Columns of a thread: factors on k_s, k_d and k_dt, then their integrals less 1 from thread 0 to its near border."""
 
 SPREAD_OUT: Final = 0.8  # in repeats of the colours: a Gaussian this wide covers them evenly, to 6e-6
-
 BELL_ENDS: Final = 3.0  # deviations at which the Gaussian across threads is cut off
-
 _NEAR: Final = 64  # threads that have sums of their own, at least
 
 

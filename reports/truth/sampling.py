@@ -44,9 +44,7 @@ from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric, load_fabric
 
 _FABRICS: Final = ("silk_charmeuse", "polyester_lining", "organza", "denim")
-
 SETTINGS: Final = ("cosine", "cosine by sides", "one point", "lobes")  # samplers
-
 _DIRECTIONS, _REPEATS = 64, 2
 _TO_FAR = 0.1  # share of the flakes' light that reaches the far side, roughly
 _POINT = np.float32(1e-3)  # deviation of a point

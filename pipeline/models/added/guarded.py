@@ -31,11 +31,8 @@ if TYPE_CHECKING:
     from weaves.fabric import Fabric
 
 _STATE: Final = struct.Struct("<ddi64s16s")
-
 GIB: Final = 2**30  # bytes
-
 _NO_MEMORY: Final = "can't allocate memory"  # in a RuntimeError of PyTorch
-
 STATE_BYTES: Final = _STATE.size  # size of the shared bytes
 
 

@@ -20,7 +20,6 @@ from pipeline.models.options import ComponentLossOptions
 
 SPECULAR = slice(0, 2)
 DIFFUSE = slice(2, 4)
-
 SLOPE = 0.01  # slope of the leaky ReLU below 0
 
 

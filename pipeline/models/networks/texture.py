@@ -25,9 +25,7 @@ from pipeline.models.options import TextureOptions
 _FEATURE_SCALE = 0.1  # standard deviation of the first features
 _NO_BLUR = 0.25  # standard deviation, in texels, below which a blur is skipped
 DEPTH_SCALE: Final = 0.1  # shift of a learnt depth of 1, in mean sides of the repeat
-
 STEEPEST: Final = 0.6  # smallest wo.z that parallax is computed with
-
 LAYERS: Final = 3  # hidden layers of all perceptrons
 
 

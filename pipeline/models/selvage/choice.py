@@ -38,7 +38,6 @@ Chosen = npt.NDArray[np.uint8]
 """Answers of N queries, (N,): numbers of levels from the cheapest on, then of the fallback."""
 
 PRICES: Final[Float64] = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 400)])  # prices of a second, in squared errors
-
 _SAMPLE: Final = 512  # queries that the price of a wished time is found on
 _RAISE: Final = 1.02  # of the price, if all queries take longer at it than the sample did
 

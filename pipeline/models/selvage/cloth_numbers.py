@@ -17,11 +17,8 @@ NODE_LEVELS: Final[tuple[Level, ...]] = (1, 2, 4, 8)
 """Levels of detail of the soft nodes, from the cheapest on. The answers are theirs, then that of the fallback."""
 
 FLOOR: Final = 0.05  # colour added to the colour that errors are relative to: a third of that of a usual cloth
-
 GREY: Final = np.array([0.3, 0.3, 0.5, 0.5])  # weights of the four components in a grey cloth's colour
-
 NUMBERS: Final = 5  # numbers of a cloth, the first of them 1
-
 _PAIRS: Final = ((0, 3), (1, 3), (2, 3), (3, 4))  # of answers
 _ROWS: Final = 2048  # single queries decide fewer numbers of more of them
 _EVERY: Final = 2  # of them is answered by the fallback, which takes longest
