@@ -177,10 +177,7 @@ def _swatch(mi: Any) -> dict[str, Any]:
 
 
 def _hem(mi: Any) -> dict[str, Any]:
-    """Return strips of denim that hang over lines, bent against the sky: yarns of 40, 13, 4.5, 1.5 and .5 pixels.
-
-    The radius of every hem is eight yarn spacings. Lines are tilted in the picture, so that a hem crosses pixels.
-    """
+    """Return strips of denim over tilted lines against the sky: hems of 40, 13, 4.5, 1.5 and .5 pixels a yarn."""
     turn = np.linspace(math.pi, 0.0, 513)
     lines = {}
     for number, (pixels, left, right, height, tilt) in enumerate(_HEMS):

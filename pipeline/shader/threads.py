@@ -58,17 +58,14 @@ def family_heights(table: SoftNodeTable) -> tuple[float, float]:
 
 
 class SeenTints:
-    """Mean factors of the threads that footprints see on one side of a cloth."""
+    """Mean factors of the threads that footprints of viewers in front see on one side of a cloth."""
 
     def __init__(self, table: SoftNodeTable, tints: tuple[Float32, Float32]) -> None:
         self._table, self._tints = table, tints
         self._near = by_copy(table)
 
     def __call__(self, queries: Queries) -> Float64:
-        """Return the mean factors of the components of N queries, (N, 4, 3); NaN where too many threads are near.
-
-        Viewers are in front.
-        """
+        """Return mean factors of the components of N queries, (N, 4, 3); NaN where too many threads are near."""
         u, v, dx, dy, rho = (np.asarray(column, np.float64) for column in footprints(queries, SMALLEST))
         narrowest = np.array([narrow_axis(*row) for row in zip(dx, dy, rho, strict=True)])
         even, through = narrowest >= self._table.uniform, queries.wi[:, 2] < 0.0
@@ -119,10 +116,7 @@ def _across(rows: Float64, centre: Float64, sigma: Float64) -> Float64:
 
 
 def by_copy(table: SoftNodeTable) -> SoftNodeTable:
-    """Return a table of several repeats, _NEAR ends and picks or more, in which each thread is a kind of its own.
-
-    No footprint covers it evenly.
-    """
+    """Return a table of _NEAR ends and picks or more, each thread a kind of its own; nothing covers it evenly."""
     ends, picks = (int(n) for n in table.repeat)
     wide, high = ends * -(-_NEAR // ends), picks * -(-_NEAR // picks)
     pick, end = np.indices((high, wide)).reshape(2, -1)

@@ -46,10 +46,7 @@ RECORDS: Final = RowRecords(
 
 
 def measure(drafts: Sequence[str] = _DRAFTS) -> Iterator[Prediction]:
-    """Measure what predicts the rings of the shade, then transmittances of the data sheets.
-
-    Each fit to the shade chooses among the `drafts`.
-    """
+    """Measure what predicts the rings of the shade, where fits choose a draft, then transmittances of data sheets."""
     errors = {LABORATORY: Errors(STRAIGHT_NOISE, FACE_NOISE, SCATTERED_NOISE)}
     errors |= held_out_rings(read_bsdf(MEASURED[_SHADE]), "visible", lambda share: None, drafts)
     for method, row in errors.items():

@@ -209,10 +209,7 @@ def unchecked(method: Method) -> Method:
 
 
 def load_function(options: AddedFunction) -> Callable[..., float]:
-    """Import a function from outside; the function returned raises MethodFailed unless it returns a finite number.
-
-    Errors as `imported`.
-    """
+    """Import a metric, and let it raise MethodFailed unless it returns a finite number; errors as `imported`."""
     function, root = imported(options)
 
     def measured(*arguments: Any) -> float:

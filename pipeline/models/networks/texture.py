@@ -30,10 +30,7 @@ LAYERS: Final = 3  # hidden layers of all perceptrons
 
 
 def level_shapes(texels_per_yarn: int, levels: int, repeat: tuple[int, int]) -> list[tuple[int, int]]:
-    """Return (rows, columns) of each level over a repeat (ends, picks), finest first, each half as fine, at least 1.
-
-    With `levels` 0 they go down to one texel.
-    """
+    """Return (rows, columns) of levels, finest first, each half as fine; `levels` 0: down to one texel."""
     columns, rows = (extent * texels_per_yarn for extent in repeat)
     shapes = [(rows, columns)]
     while shapes[-1] != (1, 1) and len(shapes) != levels:

@@ -53,10 +53,7 @@ def probes(
 
 
 def colours(fabric: Fabric, queries: Queries, every: int = 1) -> Float64:
-    """Return a grey cloth's colour by all answers, (N, answers); NaN where the fallback's is not known.
-
-    The fallback answers one of `every` so many queries.
-    """
+    """Return a grey cloth's colour by all answers, (N, answers); by the fallback for one of `every` rows, else NaN."""
     answers = [SoftNodes(level).predict(fabric, queries) for level in NODE_LEVELS]
     last = np.full(len(queries.u), np.nan)
     last[::every] = fallback_answers(fabric, queries.take(slice(None, None, every)), 0) @ GREY

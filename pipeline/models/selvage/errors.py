@@ -120,10 +120,7 @@ def _write_all_terms(queries: Queries, result: Float32) -> None:
 
 
 def coefficients_of(fabric: Fabric, behind: bool) -> Float32:
-    """Return the coefficients of a cloth, (cases, answers, TERMS and ranges of sizes).
-
-    Those of light from behind are 0 unless wanted.
-    """
+    """Return a cloth's coefficients, (cases, answers, TERMS and ranges of sizes); 0 of light behind unless wanted."""
     return (_BOTH if behind else _FRONT).of(fabric)
 
 
