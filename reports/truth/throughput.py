@@ -155,15 +155,10 @@ def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
         lit = size > 1e-3
         reached = float(np.mean(doubt[lit] <= error * size[lit]))
         saved = _saved(fabric, queries.take(slice(200)), options)
-        yield _rate(
-            partial(estimate, fabric, queries, options, _SEED),
-            lambda answers: len(answers.count),
-            f"queries, auto at {error:.0%}",
-            fabric.name,
-            "queries/s",
-            f"{reached:.0%} state {error:.0%} or less; median {np.median(doubt[lit] / size[lit]):.2%}; "
-            f"{saved:.0f} x fewer points than mc; table built in {built:.2f} s",
-        )
+        note = f"{reached:.0%} state {error:.0%} or less; median {np.median(doubt[lit] / size[lit]):.2%}; "
+        note += f"{saved:.0f} x fewer points than mc; table built in {built:.2f} s"
+        call, what = partial(estimate, fabric, queries, options, _SEED), f"queries, auto at {error:.0%}"
+        yield _rate(call, lambda answers: len(answers.count), what, fabric.name, "queries/s", note)
 
 
 def _saved(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:

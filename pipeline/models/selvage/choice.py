@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Lock
 from time import thread_time
+from timeit import repeat
 from typing import Final
 
 import numpy as np
@@ -149,12 +150,6 @@ def _measure(kind: int, answers: Sequence[Answer], fabric: Fabric) -> Float64:
         queries = draw_queries(options, fabric.weave.repeat, _SEED, 0, _TIMED_ROWS[index])
         call = partial(answer, fabric, queries, 0)
         call()
-        result[index] = min(_seconds(call) for _ in range(_CALLS)) / _TIMED_ROWS[index]
+        # The processor time of this thread: other work on the machine does not count.
+        result[index] = min(repeat(call, timer=thread_time, repeat=_CALLS, number=1)) / _TIMED_ROWS[index]
     return result
-
-
-def _seconds(call: Callable[[], object]) -> float:
-    """Return the processor time of this thread in a call: other work on the machine does not count."""
-    start = thread_time()
-    call()
-    return thread_time() - start
