@@ -100,8 +100,7 @@ class PicturePart(NamedTuple):
     of a pixel that cloth covers, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
     ``fabric``, the number of the cloth in the scene from 1 on."""
     queries: int
-    fallback: int
-    """Queries that the fallback answered."""
+    fallback: int  # queries that the fallback answered
 
 
 def sharpened(loaded: Loaded, side: int) -> Loaded:

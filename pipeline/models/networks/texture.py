@@ -128,17 +128,12 @@ def texels_of(texture: Tensor) -> Float32:
 class TextureNetwork(QueryNetwork):
     """Textures of one fabric, with a repeat of so many ends and picks, and perceptrons that read them."""
 
-    textures: ClassVar[tuple[str, ...]]
-    """Names of those parts that are textures."""
+    textures: ClassVar[tuple[str, ...]]  # names of those parts that are textures
     options: TextureOptions
-    levels: nn.ParameterList
-    """Pyramid of features, finest first."""
-    decoder: nn.Sequential
-    """Puts out the four components in network space."""
-    depth: nn.Parameter | None
-    """The offset texture."""
-    offset: nn.Sequential | None
-    """Perceptron from the offset texture and the view to the depth."""
+    levels: nn.ParameterList  # pyramid of features, finest first
+    decoder: nn.Sequential  # puts out the four components in network space
+    depth: nn.Parameter | None  # the offset texture
+    offset: nn.Sequential | None  # perceptron from the offset texture and the view to the depth
 
     def __init__(self, options: TextureOptions, repeat: tuple[int, int]) -> None:
         super().__init__()
