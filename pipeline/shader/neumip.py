@@ -60,8 +60,8 @@ class Weights:
             biases = self.add(f"{name} biases", layer.biases, "biases")
             weights = self.add(f"{name} weights", rows, "weights (inputs, outputs)")
             activation = "none" if index == len(layers) - 1 else "ReLU"
-            placed = descriptor.PlacedLayer(network=network, biases=biases, weights=weights, activation=activation)
-            described.append(placed)
+            entry = descriptor.PlacedLayer(network=network, biases=biases, weights=weights, activation=activation)
+            described.append(entry)
         return described
 
     def files(self) -> dict[str, bytes]:
