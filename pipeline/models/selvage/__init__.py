@@ -1,20 +1,17 @@
-"""`selvage`: a wished error or time, and the cheapest answer that keeps it; its options and wishes."""
+"""`selvage`: a wished error or time, and the cheapest answer that keeps it; its options."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from pipeline.models.analytic.adapter import AnalyticOptions
+from pipeline.models.selvage.wish import USUAL_ERROR, text_of
 from pipeline.truth.options import Walls
-from weaves.errors import BadInput
 
 if TYPE_CHECKING:
     from pipeline.models.selvage.model import Selvage
-
-USUAL_ERROR: Final = 0.02  # wished error of a method that is named without one
 
 _WishedError = Annotated[float, Field(gt=0, lt=1)]
 
@@ -52,21 +49,11 @@ class SelvageOptions(AnalyticOptions):
 
     @classmethod
     def setting_of(cls, setting: float) -> str:
-        """Return the text of a wished error in Records, tables and names of files."""
-        return f"error {100 * setting:g} %"
+        """Return the text of a wished error."""
+        return text_of(setting)
 
     def methods(self) -> list[Selvage]:
         """Return one method for each wished error."""
         from pipeline.models.selvage.model import Selvage
 
         return [Selvage(error, self.name, self.walls) for error in self.errors]
-
-
-def refuse_wishes(name: str, error: float | None, time: float | None) -> None:
-    """Refuse both wishes at once, and one that is out of its range, as wishes of the method `name`."""
-    if error is not None and time is not None:
-        raise BadInput(name, "time", time, "leave out time or error: only one of them can be wished")
-    if error is not None and not 0.0 < error < 1.0:
-        raise BadInput(name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
-    if time is not None and not 0.0 < time < math.inf:
-        raise BadInput(name, "time", time, "seconds a query above 0 are needed, such as 5e-6")

@@ -20,9 +20,10 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import refuse_other
-from pipeline.models.selvage import USUAL_ERROR, SelvageOptions, choice, refuse_wishes
+from pipeline.models.selvage import choice
 from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
 from pipeline.models.selvage.errors import CASES, CURVED, coefficients_of, squared_errors
+from pipeline.models.selvage.wish import USUAL_ERROR, refuse_wishes, text_of
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import Walls
 from pipeline.truth.query import Queries
@@ -43,7 +44,7 @@ class Selvage:
     takes_wishes: ClassVar[bool] = True
 
     def __init__(self, error: float = USUAL_ERROR, name: str = "selvage", walls: Walls = "rim") -> None:
-        self.name, self.setting, self.error = name, SelvageOptions.setting_of(error), error
+        self.name, self.setting, self.error = name, text_of(error), error
         self._curves = {behind: PerFabric(partial(self._error_curves, behind=behind)) for behind in (False, True)}
         self._nodes = [SoftNodes(level, name, walls) for level in NODE_LEVELS]
         self._answers: list[Callable[[Fabric, Queries, int], Float32]] = [node.predict for node in self._nodes]
