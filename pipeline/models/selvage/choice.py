@@ -123,10 +123,7 @@ def kinds_of(queries: Queries) -> Index:
 
 
 def seconds_of(kinds: Index, answers: Sequence[Answer], fabric: Fabric) -> Float64:
-    """Return the seconds of a query of some kinds by answer, (all kinds, answers); NaN of other kinds.
-
-    The answers are those of soft nodes, and the fallback if it is at hand.
-    """
+    """Return the seconds of a query of some kinds by answer, (all kinds, answers); NaN of other kinds."""
     result = np.full((_SIZES * CASES, len(answers)), np.nan)
     with _LOCK:
         known = _KNOWN.of(fabric)
