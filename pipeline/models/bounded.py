@@ -74,9 +74,6 @@ def _with_open_back(table: SoftNodeTable) -> SoftNodeTable:
 
 
 def limited(components: Float32, bounds: Float32) -> Float32:
-    """Return components (N, 4), at most their bounds (N, 4); both >= 0.
-
-    An excess of one yarn is added to the other yarn's component, up to its bound.
-    """
+    """Return components (N, 4), at most their bounds (N, 4), both >= 0; the other yarn's receive the excess."""
     kept = np.minimum(components, bounds)
     return np.minimum(kept + (components - kept)[:, _OTHER_YARN], bounds)

@@ -16,7 +16,6 @@ from weaves.errors import BadInput
 from weaves.reading import MIB, read_bytes
 
 WEIGHTS, CARD = "model.safetensors", "card.json"
-
 _HASHES: Final = "sha256"  # key of a card: hashes of the weights' file, and of the card without this second hash
 _MOST_BYTES: Final = 8 * MIB  # of a card; those of a hundred fabrics have 100 kB
 _MOST_WEIGHTS: Final = 256 * MIB  # the largest networks of the recipes have a tenth

@@ -146,10 +146,7 @@ class Domain(Frozen):
 
 
 def domain_of(cards: Sequence[Mapping[str, Any]]) -> Domain | None:
-    """Return the domain on the cards of a network, or of several that know one fabric each; None if there is none.
-
-    The several were trained on queries of the same distribution.
-    """
+    """Return the domain on cards of one network, or of several of one fabric and the same queries; None without."""
     domains = [Domain.model_validate(card["domain"]) for card in cards if "domain" in card]
     if not domains:
         return None

@@ -85,8 +85,7 @@ class Trainable(nn.Module):
 class QueryNetwork(Trainable):
     """A network that answers each query by itself, from what it makes of a fabric once."""
 
-    options: Any
-    """The design, with the method's name."""
+    options: Any  # the design, with the method's name
     columns: ClassVar[tuple[str, ...]] = ("u", "v", "sigma", "wi", "wo")
     """Columns of the queries that it reads, centres as shares of the repeat; here those of round footprints of flat
     cloth, the inputs of the published networks."""

@@ -55,35 +55,25 @@ class Options(Design):
     name: Name = Field(default_factory=lambda options: options["model"])
     """Name in tables and files, and of the trained model."""
 
-    learns: ClassVar[bool] = True
-    """True if the model is trained."""
-    of_one_material: ClassVar[bool] = False
-    """True if a trained model knows a single fabric."""
-    blends: ClassVar[bool] = False
-    """True if blended latents of two fabrics give the fabrics between them."""
+    learns: ClassVar[bool] = True  # true if the model is trained
+    of_one_material: ClassVar[bool] = False  # true if a trained model knows a single fabric
+    blends: ClassVar[bool] = False  # true if blended latents of two fabrics give the fabrics between them
     any_physics: ClassVar[bool] = False
     """True if it can learn any physics of the truth (`pipeline.models.domain.PHYSICS`); else only the default, and what
     it has an option for."""
     seconds: ClassVar[tuple[float, float]] = (2.4e-5, 3e-6)
     """Estimate of the time of one query in training and in prediction, on one core of a server of 2022."""
-    prepare_seconds: ClassVar[float] = 0.1
-    """Estimate of the time until a fabric can be evaluated."""
+    prepare_seconds: ClassVar[float] = 0.1  # estimate of the time until a fabric can be evaluated
 
     @property
     def version(self) -> int:
         """Version of the model's numbers (`pipeline.versions`)."""
         return versions.MODELS.get(self.model, 1)
 
-    @property
-    def departures(self) -> tuple[str, ...]:
-        """Deviations from the published method, for the page."""
-        return ()
-
-    @property
-    def extra_rows(self) -> tuple[ExtraRows, ...]:
-        """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
-        return ()
-
+    departures: ClassVar[tuple[str, ...]] = ()  # deviations from the published method, for the page
+    extra_rows: ClassVar[tuple[ExtraRows, ...]] = ()
+    """Sets of rows that a training reads beside the data set's own; each becomes shards of its fabrics."""
+    variant: ClassVar[str] = ""  # setting of the only method of a model without settings
     kinds: ClassVar[frozenset[str]] = frozenset()
     """Kinds of queries that it evaluates, of `behind`, `stretch` and `curvature` (`QueryOptions`)."""
     turns: ClassVar[bool] = False
@@ -117,11 +107,6 @@ class Options(Design):
     def setting_of(cls, setting: float) -> str:
         """Return the text of a setting in Records, tables and names of files."""
         return f"k = {setting}"
-
-    @property
-    def variant(self) -> str:
-        """Setting of the only method of a model without settings."""
-        return ""
 
     def single(self) -> list[Self]:
         """Return options with one setting each: one for every k, or these if the model has no settings."""
@@ -168,7 +153,6 @@ class TextureOptions(ComponentLossOptions):
     offset_frozen: float = Field(default=0.33, ge=0, le=1)
     """Share of the training after which the offset texture is held fixed (`neumip`: 10,000 of 30,000 iterations)."""
 
-    channels: ClassVar[int] = 7
-    """Channels of every texture; `curved` does not say."""
+    channels: ClassVar[int] = 7  # channels of every texture; `curved` does not say
     texture_rate: ClassVar[float] = 3.0
     """Learning rate of the textures relative to that of the perceptrons: short trainings touch each texel rarely."""

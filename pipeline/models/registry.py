@@ -82,8 +82,7 @@ def restore_methods(options: ModelOptions, trained: Trained) -> list[Method]:
         return [load_added(options)]
     if isinstance(options, AnalyticOptions):
         return list(options.methods())
-    methods: list[Method] = module_of(options.model).restore(options, trained)
-    return methods
+    return list(module_of(options.model).restore(options, trained))
 
 
 def load_methods(options: ModelOptions, folders: Sequence[Path] = ()) -> list[Method]:

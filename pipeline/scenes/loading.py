@@ -86,8 +86,7 @@ class Loaded:
 
     scene: Scene
     options: SceneOptions
-    mi: Any
-    """The module mitsuba."""
+    mi: Any  # the module mitsuba
     world: Any  # its scene
     dressed: Any  # the scene's cloth alone
     behind: Any  # the scene without its cloth
@@ -95,8 +94,7 @@ class Loaded:
     worn: dict[str, list[int]]
     """For every key the numbers of the shapes that wear it (`pipeline.scenes.rays.shape_numbers`)."""
     lights: list[Light]
-    camera: Camera
-    """That of frame 0."""
+    camera: Camera  # that of frame 0
 
 
 def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:

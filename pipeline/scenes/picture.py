@@ -37,11 +37,8 @@ from pipeline.truth.scattering.thread_colours import component_colours
 from weaves.fabric import Fabric
 
 QUERIES: Final = 2**20  # queries of a window, at most; a single pixel may have more
-
 CHUNK: Final = 2**14  # queries that a thread answers at a time
-
 MOST_SAMPLES: Final = 8  # most rays along each side of a pixel
-
 _AHEAD = 3  # windows under way: threads have work while a frame is traced
 
 Plane = Float32  # a picture of some channels, (H, W, channels)
@@ -103,8 +100,7 @@ class PicturePart(NamedTuple):
     of a pixel that cloth covers, and of one ray ``depth``, ``normal``, ``uv`` and ``sigma`` in yarn spacings, and
     ``fabric``, the number of the cloth in the scene from 1 on."""
     queries: int
-    fallback: int
-    """Queries that the fallback answered."""
+    fallback: int  # queries that the fallback answered
 
 
 def sharpened(loaded: Loaded, side: int) -> Loaded:

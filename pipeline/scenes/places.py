@@ -44,8 +44,7 @@ class Places(NamedTuple):
     """N places of one cloth in the world, the cloth's own scale and turn applied."""
 
     position: Float64
-    outward: Float64
-    """Geometric normal on the shading normal's side, (N, 3)."""
+    outward: Float64  # geometric normal on the shading normal's side, (N, 3)
     frame: Float64  # rows x, y, z, (N, 3, 3)
     uv: Float64  # in yarn spacings, (N, 2)
     jacobian: Float64  # d(uv)/d(pixel), (N, 2, 2)

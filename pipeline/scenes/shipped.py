@@ -18,7 +18,6 @@ from pipeline.scenes import swatch
 from pipeline.scenes.scene import Cloth, Scene
 
 DRAPE_YARNS: Final = 80.0  # yarns along a unit of uv of the scene `drape`
-
 _SIZE: Final = (256, 192)
 _HEM_YARNS: Final = 100.0  # along a unit of uv of the scene `hem`
 _HEM_FOCAL, _HEM_RADIUS = 1200.0, 8.0 / _HEM_YARNS  # in pixels; in the scene's lengths
@@ -178,10 +177,7 @@ def _swatch(mi: Any) -> dict[str, Any]:
 
 
 def _hem(mi: Any) -> dict[str, Any]:
-    """Return strips of denim that hang over lines, bent against the sky: yarns of 40, 13, 4.5, 1.5 and .5 pixels.
-
-    The radius of every hem is eight yarn spacings. Lines are tilted in the picture, so that a hem crosses pixels.
-    """
+    """Return strips of denim over tilted lines against the sky: hems of 40, 13, 4.5, 1.5 and .5 pixels a yarn."""
     turn = np.linspace(math.pi, 0.0, 513)
     lines = {}
     for number, (pixels, left, right, height, tilt) in enumerate(_HEMS):

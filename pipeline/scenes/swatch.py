@@ -27,7 +27,6 @@ LIGHTS: Final = (((-0.55, 0.75, 0.75), 2.4), ((0.6, -0.5, 1.0), 0.5))
 """Direction to each light, of any length, and its irradiance on a surface that faces it."""
 BOARD: Final = 0.25  # albedo of the board
 HALF_BOARD: Final = 20.0  # half its side; that of the cloth is 1/2
-
 _STEPS = 8  # of Newton's method: the slope is at most .32
 
 

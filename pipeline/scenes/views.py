@@ -25,7 +25,6 @@ from pipeline.scenes.options import View, ViewOptions
 from pipeline.scenes.places import unit
 
 HEADING: Final = 37.0  # direction in which the cloth slides from frame to frame, as an angle from the weft, in degrees
-
 _SPHERE_PIXELS = 6.0  # that a yarn spacing takes at the centre of the sphere
 _FIELD_OF_VIEW = 50.0  # angle that the plane's picture spans from left to right, in degrees
 _PLANE_LIGHT = (48.0, 62.0)  # degrees: angle to the normal, azimuth from the right towards the horizon

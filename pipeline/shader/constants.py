@@ -44,9 +44,7 @@ ARRAYS: Final[dict[str, tuple[ModuleType, tuple[str, ...], tuple[str, ...]]]] = 
 """Columns of arrays: those of `pipeline.analytic.soft_nodes.nodes.SoftNodeTable`, then what only the shader has."""
 
 TEXTURE_WIDTH: Final = 1024  # texels of a row of every texture
-
 OTHER_ROW: Final = 4 + soft_horizons.AZIMUTHS // 2  # row of a node from which on it has what not all tables know
-
 FALL_ROWS: Final = soft_horizons.AZIMUTHS // 4  # rows of a node for the falls of one curvature
 
 LEVEL_TINY: Final = 1e-18

@@ -199,5 +199,4 @@ def _short(values: Float32) -> list[Any]:
     """Return numbers of single precision with the fewest digits that tell all of them apart."""
     # `str` keeps to NumPy's print options, which other packages change.
     numbers = [float(np.format_float_scientific(value, unique=True)) for value in values.ravel()]
-    short: list[Any] = np.array(numbers).reshape(values.shape).tolist()
-    return short
+    return list(np.array(numbers).reshape(values.shape).tolist())

@@ -40,7 +40,6 @@ TRANSPARENCY_COLUMN, DENSITY_COLUMN, ANSWER_COLUMNS = 8, 9, 10
 """Columns of answers after components and bounds, and the number of all."""
 
 COLOUR: Final = slice(-3, None)  # columns of golden answers that follow all others: the patch BSDF in linear RGB, 1/sr
-
 _TRIALS = 4
 _DIGITS_OF_LINES = 32  # what is seen on a view line is found by steps: it loses digits in single precision
 _LEAST_RISE = 0.05  # of light and viewer

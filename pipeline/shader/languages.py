@@ -14,7 +14,6 @@ from weaves.errors import BadInput, WorkFailed, one_line
 
 SOURCE: Final = "slang"
 ONNX: Final = "onnx"  # the language of the source, and the network of a model alone: they need no compiler
-
 ALL: Final = "all"  # every language
 
 
@@ -96,10 +95,7 @@ def compiler_for(languages: Sequence[str]) -> Path:
 def translate(
     languages: Sequence[str], compiler: Path, source: Path, folder: Path, entries: Collection[str]
 ) -> dict[str, list[str]]:
-    """Write the files of languages, each in a folder of its name, for the entry points that the source has.
-
-    Returns their paths in `folder`; WorkFailed if slangc refuses the source.
-    """
+    """Write programs in a folder for each language; return their paths, WorkFailed if slangc refuses the source."""
     written: dict[str, list[str]] = {}
     for name in languages:
         (folder / name).mkdir()

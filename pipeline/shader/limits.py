@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 MOST_NODES: Final = 1024  # most fixed nodes of a table, those that fill up blocks included
-
 MOST_REPEAT_CELLS: Final = 1024  # most cells of a repeat, ends times picks
 
 MOST_HEIGHT: Final = 8192

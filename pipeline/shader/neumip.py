@@ -57,14 +57,11 @@ class Weights:
         described = []
         for index, layer in enumerate(layers):
             rows, name = np.pad(layer.weights, ((0, -len(layer.weights) % 4), (0, 0))), f"{network} {index}"
-            described.append(
-                descriptor.PlacedLayer(
-                    network=network,
-                    biases=self.add(f"{name} biases", layer.biases, "biases"),
-                    weights=self.add(f"{name} weights", rows, "weights (inputs, outputs)"),
-                    activation="none" if index == len(layers) - 1 else "ReLU",
-                )
-            )
+            biases = self.add(f"{name} biases", layer.biases, "biases")
+            weights = self.add(f"{name} weights", rows, "weights (inputs, outputs)")
+            activation = "none" if index == len(layers) - 1 else "ReLU"
+            entry = descriptor.PlacedLayer(network=network, biases=biases, weights=weights, activation=activation)
+            described.append(entry)
         return described
 
     def files(self) -> dict[str, bytes]:
@@ -102,6 +99,8 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
     channels += ["0"] * (-len(channels) % 4)
     trained_on, outside = _training(method.domain, fabric)
     ends, picks = fabric.thread_colours()
+    files = {"float32": "tables/weights.f32", "float16": "tables/weights.f16"}
+    buffer = descriptor.Buffer(files=files, channels=4, elements=weights.count, arrays=weights.places)
     described = descriptor.Descriptor(
         model=NEUMIP,
         fabric=fabric.name,
@@ -111,14 +110,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         repeat=fabric.weave.repeat,
         threads=(len(ends.diffuse), len(picks.diffuse)),
         limits={"elements": MOST_ELEMENTS},
-        buffers={
-            "weights": descriptor.Buffer(
-                files={"float32": "tables/weights.f32", "float16": "tables/weights.f16"},
-                channels=4,
-                elements=weights.count,
-                arrays=weights.places,
-            )
-        },
+        buffers={"weights": buffer},
         network=descriptor.Networks(
             name=method.name,
             trained_on=trained_on,

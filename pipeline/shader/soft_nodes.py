@@ -39,7 +39,10 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
     refuse_large_repeat(fabric)
     sides = tabulate_sides(fabric, level, kinds)
     cloth = tables(sides)
-    threads = len(sides.tints[0]), len(sides.tints[1])
+    threads, buffers = (len(sides.tints[0]), len(sides.tints[1])), {}
+    for name, (channels, files) in _BUFFERS.items():
+        elements, arrays = getattr(cloth, name).size // channels, cloth.places.get(name, {})
+        buffers[name] = Buffer(files=files, channels=channels, elements=elements, arrays=arrays)
     described = Descriptor(
         fabric=fabric.name,
         level=level,
@@ -50,15 +53,7 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
         kinds=sorted(kinds),
         scalars=cloth.scalars,
         back_scalars=cloth.back_scalars,
-        buffers={
-            name: Buffer(
-                files=files,
-                channels=channels,
-                elements=getattr(cloth, name).size // channels,
-                arrays=cloth.places.get(name, {}),
-            )
-            for name, (channels, files) in _BUFFERS.items()
-        },
+        buffers=buffers,
     )
     return Shader(
         SOFT_NODES_SOURCES,

@@ -29,9 +29,7 @@ TINT_COLUMNS: Final = 18
 """Columns of a thread: factors on k_s, k_d and k_dt, then their integrals less 1 from thread 0 to its near border."""
 
 SPREAD_OUT: Final = 0.8  # in repeats of the colours: a Gaussian this wide covers them evenly, to 6e-6
-
 BELL_ENDS: Final = 3.0  # deviations at which the Gaussian across threads is cut off
-
 _NEAR: Final = 64  # threads that have sums of their own, at least
 
 
@@ -60,17 +58,14 @@ def family_heights(table: SoftNodeTable) -> tuple[float, float]:
 
 
 class SeenTints:
-    """Mean factors of the threads that footprints see on one side of a cloth."""
+    """Mean factors of the threads that footprints of viewers in front see on one side of a cloth."""
 
     def __init__(self, table: SoftNodeTable, tints: tuple[Float32, Float32]) -> None:
         self._table, self._tints = table, tints
         self._near = by_copy(table)
 
     def __call__(self, queries: Queries) -> Float64:
-        """Return the mean factors of the components of N queries, (N, 4, 3); NaN where too many threads are near.
-
-        Viewers are in front.
-        """
+        """Return mean factors of the components of N queries, (N, 4, 3); NaN where too many threads are near."""
         u, v, dx, dy, rho = (np.asarray(column, np.float64) for column in footprints(queries, SMALLEST))
         narrowest = np.array([narrow_axis(*row) for row in zip(dx, dy, rho, strict=True)])
         even, through = narrowest >= self._table.uniform, queries.wi[:, 2] < 0.0
@@ -121,10 +116,7 @@ def _across(rows: Float64, centre: Float64, sigma: Float64) -> Float64:
 
 
 def by_copy(table: SoftNodeTable) -> SoftNodeTable:
-    """Return a table of several repeats, _NEAR ends and picks or more, in which each thread is a kind of its own.
-
-    No footprint covers it evenly.
-    """
+    """Return a table of _NEAR ends and picks or more, each thread a kind of its own; nothing covers it evenly."""
     ends, picks = (int(n) for n in table.repeat)
     wide, high = ends * -(-_NEAR // ends), picks * -(-_NEAR // picks)
     pick, end = np.indices((high, wide)).reshape(2, -1)

@@ -27,7 +27,6 @@ FABRICS: Final = ("polyester_lining", "denim", "silk_charmeuse", "satin_8", "twi
 """One of each family, and the largest repeats."""
 
 COUNTS: Final = (64, 256, 1024)  # points of the estimators that sample
-
 _SEED = 21
 _DARK = 1e-3  # 1/sr: patches below return too little for a relative error
 

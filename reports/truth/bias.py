@@ -26,7 +26,6 @@ from reports.truth.row_records import RowRecords
 
 LIMIT: Final = 0.003  # bias that is small enough
 SIDES: Final = ("light in front", "light behind")  # where the light is; the viewer is in front
-
 _SEED = 22
 _TABLE: Final = TruthOptions(estimator="node_table")
 

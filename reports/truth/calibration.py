@@ -35,7 +35,6 @@ from weaves.population import Population, Ranges, population_fabrics
 RATIOS: Final = (0.8, 1.25)  # ratios of calibrated errors
 _LEVEL: Final = 0.99  # level of the intervals of ratios
 EXCEEDED: Final = 0.003  # largest share of errors beyond their bound
-
 _SIGMA: Final = (0.05, 32.0)
 _OPTICS: Final = {
     "roughness_warp": (0.05, 0.7),
@@ -47,7 +46,6 @@ _OPTICS: Final = {
 _SOLID: Final = Ranges(width=(1.0, 1.0), **_OPTICS)
 _OPEN: Final = Ranges(width=(0.6, 0.95), **_OPTICS)
 _NARROW: Final = Ranges(width=(0.2, 0.6), **_OPTICS)
-
 _PLANE: Final = TruthOptions(parallax=False)
 
 CLASSES: Final = {

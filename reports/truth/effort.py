@@ -16,7 +16,6 @@ from reports.truth.row_records import RowRecords
 
 CLASSES: Final = ("table alone", "borders refined", "sampled")  # how a query is answered, the cheapest first
 RELATIVE_ERROR: Final = 0.01  # requested error
-
 _SEED = 23
 _CLASS_OF: Final = {COARSE_TABLE: 0, FINE_TABLE: 0, REFINED: 1, SAMPLED: 2}
 

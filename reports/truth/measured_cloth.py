@@ -20,7 +20,6 @@ from pipeline.fitting.straight import STRAIGHT_NOISE
 from reports.truth.row_records import RowRecords
 
 LABORATORY: Final = "a second measurement"  # the laboratories' own errors
-
 _DRAFTS: Final = ("plain", "twill 2/2")  # one takes two to three minutes for all rings
 _SHADE = "shade_6216"
 _QUANTITIES: Final = ("light straight through", "reflectance", "BRDF below 65 degrees")
@@ -47,10 +46,7 @@ RECORDS: Final = RowRecords(
 
 
 def measure(drafts: Sequence[str] = _DRAFTS) -> Iterator[Prediction]:
-    """Measure what predicts the rings of the shade, then transmittances of the data sheets.
-
-    Each fit to the shade chooses among the `drafts`.
-    """
+    """Measure what predicts the rings of the shade, where fits choose a draft, then transmittances of data sheets."""
     errors = {LABORATORY: Errors(STRAIGHT_NOISE, FACE_NOISE, SCATTERED_NOISE)}
     errors |= held_out_rings(read_bsdf(MEASURED[_SHADE]), "visible", lambda share: None, drafts)
     for method, row in errors.items():

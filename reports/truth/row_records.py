@@ -43,10 +43,7 @@ class RowRecords(Generic[Row]):
         return [record for row in found for record in self._of(vars(row))]
 
     def from_records(self, records: Iterable[Record]) -> list[Row]:
-        """Return the rows that Records hold, in their order; Records of other metrics are left out.
-
-        A row is left out if a field without a default has no Record.
-        """
+        """Return the rows that Records hold, in their order; other metrics and rows that lack a field are left out."""
         names = {metric: name for name, metric in self.metrics.items()}
         first = next(iter(names))
         rows: dict[tuple[str, str, str], dict[str, Any]] = {}

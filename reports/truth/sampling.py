@@ -44,9 +44,7 @@ from weaves.colour import LUMINANCE
 from weaves.fabric import Fabric, load_fabric
 
 _FABRICS: Final = ("silk_charmeuse", "polyester_lining", "organza", "denim")
-
 SETTINGS: Final = ("cosine", "cosine by sides", "one point", "lobes")  # samplers
-
 _DIRECTIONS, _REPEATS = 64, 2
 _TO_FAR = 0.1  # share of the flakes' light that reaches the far side, roughly
 _POINT = np.float32(1e-3)  # deviation of a point
@@ -108,32 +106,26 @@ def scene_subjects(name: str, looks: int) -> list[Subject]:
     ]
 
 
-class _Estimate(NamedTuple):
-    """Values of the directions of a sampler, (looks, directions); seconds of them all, without and with values."""
-
-    values: Float64
-    draw_seconds: float
-    seconds: float
-
-
 def _savings(subjects: Sequence[Subject], name: str) -> Iterator[VarianceSaving]:
     """Yield the savings of all samplers over the looks of some cloths together."""
     parts = list(map(_estimates, subjects))
     base, base_time = math.nan, math.nan
     for sampler in SETTINGS:
-        estimates = [part[sampler] for part in parts]
-        values = np.concatenate([estimate.values for estimate in estimates])
+        of_subjects, draw_seconds, seconds = zip(*(part[sampler] for part in parts), strict=True)
+        values = np.concatenate(of_subjects)
         variance = float(values.var(axis=1, ddof=1).mean())
-        draw_time = 1e9 * sum(estimate.draw_seconds for estimate in estimates) / values.size
-        whole = 1e9 * sum(estimate.seconds for estimate in estimates) / values.size
+        draw_time, whole = 1e9 * sum(draw_seconds) / values.size, 1e9 * sum(seconds) / values.size
         if sampler == "cosine":
             base, base_time = variance, whole
         saved = base / variance
         yield VarianceSaving(sampler, name, saved, saved * base_time / whole, draw_time, whole, values.size)
 
 
-def _estimates(subject: Subject) -> dict[str, _Estimate]:
-    """Return what each sampler finds; samplers are timed in turns by the processor's clock, the shortest counts."""
+def _estimates(subject: Subject) -> dict[str, tuple[Float64, float, float]]:
+    """Return the values that each sampler finds, (looks, directions), and seconds of them all, without and with values.
+
+    Samplers are timed in turns by the processor's clock, the shortest counts.
+    """
     count = len(subject.looks.u)
     looks = subject.looks.take(np.repeat(np.arange(count), _DIRECTIONS))
     random = np.random.default_rng(1).random((len(looks.u), 5))
@@ -163,7 +155,7 @@ def _estimates(subject: Subject) -> dict[str, _Estimate]:
             if name in values:
                 best[name] = min(best[name][0], middle - begun), min(best[name][1], end - begun)
             values[name] = weight
-    return {name: _Estimate(values[name].reshape(count, -1), *best[name]) for name in draws}
+    return {name: (values[name].reshape(count, -1), *best[name]) for name in draws}
 
 
 class _Directions(NamedTuple):

@@ -28,17 +28,10 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import ALPHA
+from pipeline.truth.node_table import kernels
 from pipeline.truth.node_table.answer import sum_pieces
 from pipeline.truth.node_table.build import FIRST_FINE, NODES_X, NODES_Y, PIECE_FAMILY, ExactNodes
-from pipeline.truth.node_table.kernels import (
-    FlakeLayer,
-    NodeShares,
-    Normals,
-    Tangents,
-    no_shares,
-    node_directions,
-    scattered,
-)
+from pipeline.truth.node_table.kernels import FlakeLayer, NodeShares, Normals, Tangents
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
@@ -107,7 +100,7 @@ def _points() -> Iterator[Rate]:
 
     plain = _rate(lambda: _numpy_points(fabric, table, queries), int, "points, NumPy", fabric.name, "points/s")
     yield plain
-    shares = no_shares(table.normal.shape[1])._replace(weight=table.evenly)
+    shares = kernels.no_shares(table.normal.shape[1])._replace(weight=table.evenly)
     for name, evaluate in (("specular", _evaluate_speculars), ("everything", _evaluate_all)):
         call = partial(evaluate, model, table, columns, shares)
         rate = _rate(call, float, f"points, {name}", fabric.name, "points/s")
@@ -123,7 +116,7 @@ def _evaluate_speculars(model: ClothSide, table: ExactNodes, columns: WideQuerie
     points, one = 0, np.float32(1.0)
     shares.lit[:] = one
     for row in range(len(columns.u)):
-        towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
+        towards = kernels.node_directions(columns.wi[row], columns.wo[row], len(table.slope))
         for p in range(len(table.pieces)):
             piece = table.pieces[p]
             count, f0 = piece[NODES_X] * piece[NODES_Y], piece[FIRST_FINE]
@@ -133,7 +126,7 @@ def _evaluate_speculars(model: ClothSide, table: ExactNodes, columns: WideQuerie
             tangent = Tangents(table.fine[4, f0:f1], table.fine[5, f0:f1], table.fine[6, f0:f1])
             layer = FlakeLayer(np.float32(alpha**2), np.float32(model.front.thickness), one)
             lit, speculars = shares.lit[:count], shares.speculars[:count]
-            scattered(normal, tangent, towards.light, towards.viewer, one, layer, lit, speculars, None)
+            kernels.scattered(normal, tangent, towards.light, towards.viewer, one, layer, lit, speculars, None)
             points += count
     return points
 
@@ -143,7 +136,7 @@ def _evaluate_all(model: ClothSide, table: ExactNodes, columns: WideQueries, sha
     """Sum all nodes for every query, as the estimator does; return their number."""
     points, sums = 0, np.zeros((3, 5))
     for row in range(len(columns.u)):
-        towards = node_directions(columns.wi[row], columns.wo[row], len(table.slope))
+        towards = kernels.node_directions(columns.wi[row], columns.wo[row], len(table.slope))
         points += sum_pieces(model, table, towards, shares, sums[0], sums[1], sums[2])[-1]
     return points
 
@@ -162,15 +155,10 @@ def _queries(fabric: Fabric, rows: int) -> Iterator[Rate]:
         lit = size > 1e-3
         reached = float(np.mean(doubt[lit] <= error * size[lit]))
         saved = _saved(fabric, queries.take(slice(200)), options)
-        yield _rate(
-            partial(estimate, fabric, queries, options, _SEED),
-            lambda answers: len(answers.count),
-            f"queries, auto at {error:.0%}",
-            fabric.name,
-            "queries/s",
-            f"{reached:.0%} state {error:.0%} or less; median {np.median(doubt[lit] / size[lit]):.2%}; "
-            f"{saved:.0f} x fewer points than mc; table built in {built:.2f} s",
-        )
+        note = f"{reached:.0%} state {error:.0%} or less; median {np.median(doubt[lit] / size[lit]):.2%}; "
+        note += f"{saved:.0f} x fewer points than mc; table built in {built:.2f} s"
+        call, what = partial(estimate, fabric, queries, options, _SEED), f"queries, auto at {error:.0%}"
+        yield _rate(call, lambda answers: len(answers.count), what, fabric.name, "queries/s", note)
 
 
 def _saved(fabric: Fabric, queries: Queries, options: TruthOptions) -> float:

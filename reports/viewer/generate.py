@@ -22,8 +22,7 @@ from weaves.fabric import load_fabric
 HOME: Final = Path(__file__).parent
 _SOURCES: Final = Path(languages.__file__).parent
 
-KINDS: Final = {"points": "#define ONE_POINT\n", "nodes": ""}
-"""Programs by what they draw, and how their source begins."""
+KINDS: Final = {"points": "#define ONE_POINT\n", "nodes": ""}  # programs by what they draw, and how their source begins
 
 THREADS: Final = "_threads"  # end of the names of programs for cloth whose threads differ in colour
 

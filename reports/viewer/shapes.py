@@ -17,16 +17,13 @@ from pipeline.truth.query import Queries
 Shape = Literal["plane", "sphere", "drape"]
 
 VIEW_SPREAD: Final = 0.27  # tangent of half the angle of view
-
 HALF_ARC: Final = math.radians(72.0)  # half of the angle of an arc of the drape
 
 RADII: Final = (11.0, 13.0, 9.0, 12.0, 15.0, 10.0, 14.0, 11.0, 8.0, 13.0, 12.0, 10.0)
 """Radii of the arcs, from left to right; the first one comes towards the viewer."""
 
 HALF_HEIGHT: Final = 110.0  # half of the height of the drape
-
 SPHERE_RADIUS: Final = 60.0  # radius of the sphere, rounded so that repeats close around it
-
 _SHADOW = 0.01  # a ray to the light starts so far above the cloth
 
 

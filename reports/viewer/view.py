@@ -45,7 +45,6 @@ from weaves.fabric import Fabric
 from weaves.yarn import Yarn
 
 SCRIPTS: Final = ("tables.js", "picture.js", "controls.js")
-
 _HOME = Path(__file__).parent
 
 VIEWS: Final = {
@@ -63,14 +62,10 @@ AGAINST_LIGHT: Final = {"Against the light": Viewpoint("drape", -20.0, 6.0, 330.
 """One more view of cloth that light comes through."""
 
 STILL: Final = "Drape"  # view of the still picture, with which the page opens
-
 STILL_SIZE: Final = 384
-
 BEND_FACTORS: Final = (0.6, 1.0, 1.4)  # factors of the bends of both yarns
-
 WIDTHS: Final = (0.8, 1.0, 1.25)
 NARROWER: Final = (0.65, 0.8, 1.0)  # factors of the widths of both yarns: the second ones if yarns would overlap
-
 STEEPEST_BEND: Final = 85.0  # largest bend of a yarn, degrees
 
 TWISTED: Final = 30.0

@@ -16,7 +16,6 @@ from pipeline.models.options import Name, Options
 from weaves.validation import Frozen
 
 ADDED_MODEL: Final = "added"  # the value of `model` of all methods from outside
-
 GROUP: Final = "twillight.methods"  # group of the entry points by which an installed package offers methods
 
 Kind = Literal["behind", "stretch", "curvature"]
@@ -122,6 +121,6 @@ class AddedMethod(AddedCode, Options):
         return frozenset(self.answers)
 
     @property
-    def variant(self) -> str:
+    def variant(self) -> str:  # type: ignore[override]
         """Setting of its only method."""
         return self.setting

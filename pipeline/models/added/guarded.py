@@ -31,11 +31,8 @@ if TYPE_CHECKING:
     from weaves.fabric import Fabric
 
 _STATE: Final = struct.Struct("<ddi64s16s")
-
 GIB: Final = 2**30  # bytes
-
 _NO_MEMORY: Final = "can't allocate memory"  # in a RuntimeError of PyTorch
-
 STATE_BYTES: Final = _STATE.size  # size of the shared bytes
 
 
@@ -212,10 +209,7 @@ def unchecked(method: Method) -> Method:
 
 
 def load_function(options: AddedFunction) -> Callable[..., float]:
-    """Import a function from outside; the function returned raises MethodFailed unless it returns a finite number.
-
-    Errors as `imported`.
-    """
+    """Import a metric, and let it raise MethodFailed unless it returns a finite number; errors as `imported`."""
     function, root = imported(options)
 
     def measured(*arguments: Any) -> float:

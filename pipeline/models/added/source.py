@@ -20,7 +20,6 @@ from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput, WorkFailed, nearest
 
 ADD: Final = "--add"
-
 _MOST_BYTES: Final = 512 * 2**20  # of a package
 _MOST_FILE: Final = 16 * 2**20  # bytes of a file of code
 _OURS: Final = ("weaves", "pipeline", "reports", "jobs", "twillight")

@@ -61,10 +61,7 @@ class SoftNodesOptions(AnalyticOptions):
 
 
 class SoftNodes(Analytic["SoftNodeTable"]):
-    """Soft nodes of one level of `pipeline.analytic.soft_nodes.groups.DETAILS`.
-
-    View rays that meet a wall see `walls`.
-    """
+    """Soft nodes of one level of `pipeline.analytic.soft_nodes.groups.DETAILS`; rays that meet a wall see `walls`."""
 
     turns: ClassVar[bool] = SoftNodesOptions.turns
 

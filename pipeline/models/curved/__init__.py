@@ -69,12 +69,12 @@ class CurvedOptions(TextureOptions):
         )
 
     @property
-    def extra_rows(self) -> tuple[ExtraRows, ...]:
+    def extra_rows(self) -> tuple[ExtraRows, ...]:  # type: ignore[override]
         """The queries about the silhouette of the trained fabric."""
         return (self.silhouettes,)
 
     @property
-    def departures(self) -> tuple[str, ...]:
+    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
         changes = {
             "pyramids for footprints": self.levels != 1,

@@ -20,7 +20,6 @@ from pipeline.models.options import ComponentLossOptions
 
 SPECULAR = slice(0, 2)
 DIFFUSE = slice(2, 4)
-
 SLOPE = 0.01  # slope of the leaky ReLU below 0
 
 
@@ -70,10 +69,8 @@ class Residual(nn.Module):
 class EncoderDecoder(QueryNetwork):
     """A network of two parts, which subclasses create."""
 
-    encoder: nn.Module
-    """Runs once a fabric."""
-    decoder: nn.Module
-    """Runs for every query; all that a renderer keeps beside what was encoded."""
+    encoder: nn.Module  # runs once a fabric
+    decoder: nn.Module  # runs for every query; all that a renderer keeps beside what was encoded
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of parameters of both parts."""

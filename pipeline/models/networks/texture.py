@@ -25,17 +25,12 @@ from pipeline.models.options import TextureOptions
 _FEATURE_SCALE = 0.1  # standard deviation of the first features
 _NO_BLUR = 0.25  # standard deviation, in texels, below which a blur is skipped
 DEPTH_SCALE: Final = 0.1  # shift of a learnt depth of 1, in mean sides of the repeat
-
 STEEPEST: Final = 0.6  # smallest wo.z that parallax is computed with
-
 LAYERS: Final = 3  # hidden layers of all perceptrons
 
 
 def level_shapes(texels_per_yarn: int, levels: int, repeat: tuple[int, int]) -> list[tuple[int, int]]:
-    """Return (rows, columns) of each level over a repeat (ends, picks), finest first, each half as fine, at least 1.
-
-    With `levels` 0 they go down to one texel.
-    """
+    """Return (rows, columns) of levels, finest first, each half as fine; `levels` 0: down to one texel."""
     columns, rows = (extent * texels_per_yarn for extent in repeat)
     shapes = [(rows, columns)]
     while shapes[-1] != (1, 1) and len(shapes) != levels:
@@ -133,17 +128,12 @@ def texels_of(texture: Tensor) -> Float32:
 class TextureNetwork(QueryNetwork):
     """Textures of one fabric, with a repeat of so many ends and picks, and perceptrons that read them."""
 
-    textures: ClassVar[tuple[str, ...]]
-    """Names of those parts that are textures."""
+    textures: ClassVar[tuple[str, ...]]  # names of those parts that are textures
     options: TextureOptions
-    levels: nn.ParameterList
-    """Pyramid of features, finest first."""
-    decoder: nn.Sequential
-    """Puts out the four components in network space."""
-    depth: nn.Parameter | None
-    """The offset texture."""
-    offset: nn.Sequential | None
-    """Perceptron from the offset texture and the view to the depth."""
+    levels: nn.ParameterList  # pyramid of features, finest first
+    decoder: nn.Sequential  # puts out the four components in network space
+    depth: nn.Parameter | None  # the offset texture
+    offset: nn.Sequential | None  # perceptron from the offset texture and the view to the depth
 
     def __init__(self, options: TextureOptions, repeat: tuple[int, int]) -> None:
         super().__init__()

@@ -19,7 +19,7 @@ class NeumipOptions(TextureOptions):
     answer 0 where the light is behind the tangent plane."""
 
     @property
-    def departures(self) -> tuple[str, ...]:
+    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
         changes = {"no offset": not self.offset, "blind to the curvature it learns from": self.ignore_curvature}
         return ("four components in place of RGB", *(change for change, made in changes.items() if made))

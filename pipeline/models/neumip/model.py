@@ -1,17 +1,15 @@
 """A neural texture of one fabric at all scales [Kuznetsov2021NeuMIP].
 
 The centre is first shifted along the view by a learnt depth, as parallax does; then a pyramid of feature textures is
-read, bilinear within a level and linear between the two levels around log2(sigma / sigma_0), sigma_0 = half a finest
-texel; a small perceptron decodes features and directions:
+read (pipeline.models.networks.texture); a small perceptron decodes features and directions:
 
     offset    texture 7 (bilinear) + wo.xy -> 25 -> 25 -> 25 -> 1
               shift = 0.1 output wo.xy / max(wo.z, 0.6), in mean sides of the repeat
     decoder   features 7 + wi.xy + wo.xy -> 25 -> 25 -> 25 -> 4
 
-All textures hold one repeat and wrap. Early in the training they are blurred, and the blur is annealed, so that
-coarse structure is learnt first; the offset texture is held fixed later on. Head and loss are ADAPTED to the four
-components: the specular ones are learnt in log space as in `woven`, where the authors put out RGB as (e^x - 1) times
-a mask. So are the counts of texels, queries and steps; the published training takes 45 minutes of a GPU.
+Head and loss are ADAPTED to the four components: the specular ones are learnt in log space as in `woven`, where the
+authors put out RGB as (e^x - 1) times a mask. So are the counts of texels, queries and steps; the published training
+takes 45 minutes of a GPU.
 """
 
 from __future__ import annotations

@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Lock
 from time import thread_time
+from timeit import repeat
 from typing import Final
 
 import numpy as np
@@ -38,7 +39,6 @@ Chosen = npt.NDArray[np.uint8]
 """Answers of N queries, (N,): numbers of levels from the cheapest on, then of the fallback."""
 
 PRICES: Final[Float64] = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 400)])  # prices of a second, in squared errors
-
 _SAMPLE: Final = 512  # queries that the price of a wished time is found on
 _RAISE: Final = 1.02  # of the price, if all queries take longer at it than the sample did
 
@@ -123,10 +123,7 @@ def kinds_of(queries: Queries) -> Index:
 
 
 def seconds_of(kinds: Index, answers: Sequence[Answer], fabric: Fabric) -> Float64:
-    """Return the seconds of a query of some kinds by answer, (all kinds, answers); NaN of other kinds.
-
-    The answers are those of soft nodes, and the fallback if it is at hand.
-    """
+    """Return the seconds of a query of some kinds by answer, (all kinds, answers); NaN of other kinds."""
     result = np.full((_SIZES * CASES, len(answers)), np.nan)
     with _LOCK:
         known = _KNOWN.of(fabric)
@@ -150,12 +147,6 @@ def _measure(kind: int, answers: Sequence[Answer], fabric: Fabric) -> Float64:
         queries = draw_queries(options, fabric.weave.repeat, _SEED, 0, _TIMED_ROWS[index])
         call = partial(answer, fabric, queries, 0)
         call()
-        result[index] = min(_seconds(call) for _ in range(_CALLS)) / _TIMED_ROWS[index]
+        # The processor time of this thread: other work on the machine does not count.
+        result[index] = min(repeat(call, timer=thread_time, repeat=_CALLS, number=1)) / _TIMED_ROWS[index]
     return result
-
-
-def _seconds(call: Callable[[], object]) -> float:
-    """Return the processor time of this thread in a call: other work on the machine does not count."""
-    start = thread_time()
-    call()
-    return thread_time() - start

@@ -17,11 +17,8 @@ NODE_LEVELS: Final[tuple[Level, ...]] = (1, 2, 4, 8)
 """Levels of detail of the soft nodes, from the cheapest on. The answers are theirs, then that of the fallback."""
 
 FLOOR: Final = 0.05  # colour added to the colour that errors are relative to: a third of that of a usual cloth
-
 GREY: Final = np.array([0.3, 0.3, 0.5, 0.5])  # weights of the four components in a grey cloth's colour
-
 NUMBERS: Final = 5  # numbers of a cloth, the first of them 1
-
 _PAIRS: Final = ((0, 3), (1, 3), (2, 3), (3, 4))  # of answers
 _ROWS: Final = 2048  # single queries decide fewer numbers of more of them
 _EVERY: Final = 2  # of them is answered by the fallback, which takes longest
@@ -56,10 +53,7 @@ def probes(
 
 
 def colours(fabric: Fabric, queries: Queries, every: int = 1) -> Float64:
-    """Return a grey cloth's colour by all answers, (N, answers); NaN where the fallback's is not known.
-
-    The fallback answers one of `every` so many queries.
-    """
+    """Return a grey cloth's colour by all answers, (N, answers); by the fallback for one of `every` rows, else NaN."""
     answers = [SoftNodes(level).predict(fabric, queries) for level in NODE_LEVELS]
     last = np.full(len(queries.u), np.nan)
     last[::every] = fallback_answers(fabric, queries.take(slice(None, None, every)), 0) @ GREY

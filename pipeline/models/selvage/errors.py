@@ -40,7 +40,6 @@ OF_CLOTH: Final = (0, 1, 4)
 """Terms whose coefficients depend on the cloth: the constant one, size, inclination of the viewer."""
 
 TERMS: Final = 15  # terms of the polynomial
-
 SIZE_LIMITS: Final = (0.1, 0.3, 1.0, 3.0)  # limits of the ranges of sizes with factors of their own, in yarn spacings
 SIZES: Final = np.log(np.array(SIZE_LIMITS, np.float32))
 
@@ -48,7 +47,6 @@ CASES: Final = 4
 """Cases, each with coefficients of its own: light in front, behind; curved cloth with light in front, behind."""
 
 CURVED: Final = 2  # first case of curved cloth
-
 _LEAST_COSINE = np.float32(0.03)  # lower directions are as this one
 _SMALLEST, _LARGEST = np.float32(math.log(0.03)), np.float32(math.log(16.0))  # sizes beyond are as these
 _BENDS = np.float32(30.0)  # of flat cloth on: curvature well above which errors are of another kind
@@ -122,10 +120,7 @@ def _write_all_terms(queries: Queries, result: Float32) -> None:
 
 
 def coefficients_of(fabric: Fabric, behind: bool) -> Float32:
-    """Return the coefficients of a cloth, (cases, answers, TERMS and ranges of sizes).
-
-    Those of light from behind are 0 unless wanted.
-    """
+    """Return a cloth's coefficients, (cases, answers, TERMS and ranges of sizes); 0 of light behind unless wanted."""
     return (_BOTH if behind else _FRONT).of(fabric)
 
 

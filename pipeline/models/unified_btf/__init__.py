@@ -57,7 +57,7 @@ class BtfOptions(ComponentLossOptions):
         return AngularSamples(**{name: getattr(self, name) for name in AngularSamples.model_fields if name != "kind"})
 
     @property
-    def extra_rows(self) -> tuple[ExtraRows, ...]:
+    def extra_rows(self) -> tuple[ExtraRows, ...]:  # type: ignore[override]
         """The samples of the trained fabrics' texels."""
         return (self.angular_samples,)
 
@@ -71,15 +71,11 @@ class BtfOptions(ComponentLossOptions):
 class UnifiedBtfOptions(BtfOptions):
     """One encoder and decoder of angular samples for all fabrics [Rainer2020Unified]."""
 
+    departures: ClassVar[tuple[str, ...]] = ("four components in place of RGB, in samples and answers",)
     seconds: ClassVar[tuple[float, float]] = (4e-5, 1.5e-6)
 
     model: Literal["unified_btf"] = "unified_btf"
     latent: int = Field(default=32, ge=1, le=512)
-
-    @property
-    def departures(self) -> tuple[str, ...]:
-        """Deviations from the published method, for the page."""
-        return ("four components in place of RGB, in samples and answers",)
 
 
 class BtfAutoencoderOptions(BtfOptions):
@@ -90,12 +86,8 @@ class BtfAutoencoderOptions(BtfOptions):
     """
 
     of_one_material: ClassVar[bool] = True
+    departures: ClassVar[tuple[str, ...]] = (*UnifiedBtfOptions.departures, "the encoder of 2020")
     seconds: ClassVar[tuple[float, float]] = (1.5e-5, 1.5e-6)
 
     model: Literal["btf_autoencoder"] = "btf_autoencoder"
     latent: int = Field(default=8, ge=1, le=512)
-
-    @property
-    def departures(self) -> tuple[str, ...]:
-        """Deviations from the published method, for the page."""
-        return ("four components in place of RGB, in samples and answers", "the encoder of 2020")

@@ -115,10 +115,7 @@ class SetEncoder(nn.Module):
         self.scale: Tensor
 
     def forward(self, angles: Tensor, values: Tensor) -> Tensor:
-        """Encode T texels seen under the same n pairs of directions, (T, latent).
-
-        `angles` (n, 4) are the directions, `values` (n, T, 4) the samples.
-        """
+        """Encode T texels, (T, latent), from values (n, T, 4) under the same n pairs of directions, angles (n, 4)."""
         count, texels, _ = values.shape
         weights = self.weigh(angles) / count
         mean = (values.flatten(1).t() @ weights).reshape(texels, -1)  # component by component, m numbers each
@@ -132,10 +129,7 @@ def decoder(latent: int, hidden: int, outputs: int = 4) -> nn.Sequential:
 
 
 class UnifiedBtfNetwork(EncoderDecoder):
-    """Encoder and decoder, with the samples of the fabrics they are trained on.
-
-    `texels` are these samples, addressed by index in batches; none for inference.
-    """
+    """Encoder and decoder, with the samples of the fabrics trained on, by index in batches; none for inference."""
 
     options: BtfOptions
     encoder: SetEncoder

@@ -44,12 +44,10 @@ class WovenOptions(ComponentLossOptions):
     roll: bool = True
     """Begin the repeat at a random yarn in every training step: cloth has no origin, and no ground truth is spent."""
 
-    smallest_size: ClassVar[float] = 0.005
-    """Footprint, in repeats, at which the encoded size is 0."""
+    smallest_size: ClassVar[float] = 0.005  # footprint, in repeats, at which the encoded size is 0
     largest_size: ClassVar[float] = 1.0
     """Footprint, in repeats, at which the encoded size is 1; a Gaussian of one repeat already averages all of it."""
-    transparency_weight: ClassVar[float] = 1.0
-    """Weight of the transparency's squared error, with `transmission`."""
+    transparency_weight: ClassVar[float] = 1.0  # weight of the transparency's squared error, with `transmission`
 
     @model_validator(mode="after")
     def _local_is_fused(self) -> WovenOptions:
@@ -58,7 +56,7 @@ class WovenOptions(ComponentLossOptions):
         return self
 
     @property
-    def departures(self) -> tuple[str, ...]:
+    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
         changes = {
             "a picture of the repeat seen from the queried place": self.one_blob == "local",

@@ -138,10 +138,7 @@ class Woven(NetworkMethod[WovenNetwork]):
         return self._part(first, (blended, *place)).answered(queries)
 
     def transparency(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
-        """Return the share of light from straight behind that passes unscattered, float32 (N,) in [0, 1].
-
-        0 if `transmission` was not learnt.
-        """
+        """Return the share of light from straight behind that passes unscattered, (N,) in [0, 1]; 0 if not learnt."""
         if not self.options.transmission:
             return np.zeros(len(queries.u), np.float32)
         network = self.network_of(fabric)

@@ -66,10 +66,7 @@ class Placement(NamedTuple):
 
 
 def standard(fabric: Fabric) -> tuple[Fabric, Symmetry, tuple[int, int]]:
-    """Bring a fabric into standard position; return it, and mirrors and exchange that were applied first.
-
-    Last come the end and the pick of the result at which the standard repeat begins.
-    """
+    """Bring a fabric into standard position; return it, the symmetry applied first, and its first end and pick."""
     best = min((*_smallest(moved(fabric, symmetry)), symmetry) for symmetry in SYMMETRIES)
     *_, (pick, end), symmetry = best
     return begun_at(moved(fabric, symmetry), (end, pick)), symmetry, (end, pick)

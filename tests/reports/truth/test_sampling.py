@@ -31,7 +31,7 @@ def test_all_samplers_have_the_same_mean(name):
     """Each against the cosine, over all looks, by a z-test; chance of a false alarm 0.3 %."""
     fabric = load_fabric(name)
     looks = draw_queries(QueryOptions(max_angle=75.0), fabric.weave.repeat, 3, 0, 200)
-    values = {sampler: found.values for sampler, found in _estimates(Subject(fabric, looks)).items()}
+    values = {sampler: found for sampler, (found, *_) in _estimates(Subject(fabric, looks)).items()}
     for sampler in SETTINGS[1:]:
         apart = values[sampler].mean() - values["cosine"].mean()
         error = math.sqrt(sum((values[one].var(axis=1) / values[one].shape[1]).mean() for one in ("cosine", sampler)))
