@@ -49,8 +49,7 @@ class Crew:
         self._threads: dict[str, int] = {}
         self._checked: dict[str, str] = {}  # what differs, by address; empty: nothing
         self._looked = -_SECONDS_BETWEEN_LOOKS
-        self.accepted: list[str] = []
-        """Addresses of the workers that may get tasks."""
+        self.accepted: list[str] = []  # addresses of the workers that may get tasks
         # Topic and keys of this run: another run of the same task, with another folder, is not this one.
         self._topic = f"twillight-{uuid.uuid4().hex}"
         self._number = 0

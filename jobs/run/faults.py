@@ -31,8 +31,7 @@ class Fault(NamedTuple):
     """A file that is not as it should be."""
 
     kind: Kind
-    path: str
-    """Relative to the output folder."""
+    path: str  # relative to the output folder
     why: str  # reason, a sentence about the file
     task: Task | None = None  # the task that makes it
     never_run: bool = False  # true if neither receipt nor product of the task exists

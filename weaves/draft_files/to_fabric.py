@@ -31,8 +31,7 @@ class Imported(NamedTuple):
     """A fabric from a draft file, with what was read and assumed."""
 
     fabric: Fabric
-    read: tuple[str, ...]
-    """Sentences on what the file states."""
+    read: tuple[str, ...]  # sentences on what the file states
     assumed: tuple[str, ...]  # sentences on what it does not state, or what could not be used
 
 

@@ -42,8 +42,7 @@ class _OnHeldOut(Measurement):
     fabric: Coloured
     role: Role
     dataset: HeldOutRows
-    errors: ErrorOptions
-    """Number of these queries."""
+    errors: ErrorOptions  # number of these queries
 
     @classmethod
     def of(cls, subjects: Subjects, fabric: Fabric, role: Role, **more: Any) -> Self:
@@ -88,10 +87,8 @@ class OnFabric(_OnHeldOut):
     frame_options: FrameOptions
     views: dict[View, Made]
     picture_options: PictureOptions
-    shown: tuple[str, ...]
-    """Settings that pictures are made of."""
-    edge: Made | None
-    """The truth's edge, where cloth is curved."""
+    shown: tuple[str, ...]  # settings that pictures are made of
+    edge: Made | None  # the truth's edge, where cloth is curved
     edge_options: EdgeOptions | None
 
     @classmethod
@@ -164,8 +161,7 @@ class OnUnseenPopulation(Measurement):
     ways: RunOptions
     fabrics: tuple[Coloured, ...]
     dataset: HeldOutRows
-    errors: ErrorOptions
-    """Number of these queries, each fabric."""
+    errors: ErrorOptions  # number of these queries, each fabric
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -208,8 +204,7 @@ class ErrorsBySize(Measurement):
     kind: Literal["errors by size"] = "errors by size"
     model: Trained
     dataset: HeldOutRows
-    seed: int
-    """Seed of the points of random methods."""
+    seed: int  # seed of the points of random methods
 
     @property
     def cost(self) -> float:
@@ -260,10 +255,8 @@ class AtExtremes(Measurement):
     kind: Literal["extremes"] = "extremes"
     code: ClassVar = ("truth", "extremes")
     model: Trained
-    fabrics: tuple[tuple[Uncoloured, Role], ...]
-    """One fabric of each role."""
-    truth: TruthOptions
-    """The recipe's physics, at a fixed precision."""
+    fabrics: tuple[tuple[Uncoloured, Role], ...]  # one fabric of each role
+    truth: TruthOptions  # the recipe's physics, at a fixed precision
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -305,8 +298,7 @@ class Latents(Measurement):
     code: ClassVar = ("truth", "bench")
     seconds: ClassVar = 10.0
     model: Trained
-    presets: tuple[Uncoloured, ...]
-    """Presets of the pairs."""
+    presets: tuple[Uncoloured, ...]  # presets of the pairs
     queries: QueryOptions
     truth: TruthOptions
 

@@ -52,12 +52,10 @@ class TruthPicture(_OfFabric):
 
     kind: Literal["truth picture"] = "truth picture"
     scene: View
-    extent: tuple[int, int]
-    """Width and height in pixels."""
+    extent: tuple[int, int]  # width and height in pixels
     view: ViewOptions
     truth: TruthOptions
-    seed: int
-    """Seed of the truth's points."""
+    seed: int  # seed of the truth's points
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
@@ -145,8 +143,7 @@ class LivePage(_OfFabric):
 
     kind: Literal["live page"] = "live page"
     endings: ClassVar = (".html",)
-    pixels: int
-    """Along each side of the pictures of the truth and of other methods."""
+    pixels: int  # along each side of the pictures of the truth and of other methods
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
