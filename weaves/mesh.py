@@ -105,7 +105,6 @@ def _ending(places: Floats, first: float, last: float) -> Floats:
 
 
 def _grids(piece: _Piece) -> Mesh:
-    """Join the vertices of every rectangle to triangles."""
     count, rows, columns = piece.z.shape
     x, y = (piece.end[:, None, None] + piece.x, piece.pick[:, None, None] + piece.y[:, None])
     vertices = np.stack(np.broadcast_arrays(x, y, piece.z), axis=-1).reshape(-1, 3)

@@ -167,7 +167,6 @@ def _note(
 
 
 def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]) -> str:
-    """Return a note on fabrics and scenes that a model does not cover."""
     if not model.of_one_material:
         return ""
     fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]

@@ -74,7 +74,6 @@ def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) ->
 
 @contextmanager
 def _external(scheduler: Scheduler, say: Callable[[str], None]) -> Iterator[Any]:
-    """Connect to a running scheduler that has a worker."""
     from distributed import Client, Security
 
     for name in ("distributed", "distributed.client", "distributed.utils"):  # each has a level of its own

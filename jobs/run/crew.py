@@ -287,7 +287,6 @@ def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected:
 
 
 def _outcome(content: Mapping[str, Any]) -> Outcome:
-    """Return the outcome in a message."""
     files = {name: Product(**product) for name, product in content["files"].items()}
     return Outcome(**{**content, "files": files})
 

@@ -80,7 +80,6 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
 
 
 def _product_faults(ledger: Ledger, path: str, receipt: Receipt, task: Task) -> Iterator[Fault]:
-    """Yield the fault of one product, if it has one."""
     expected, size = receipt.files.get(Path(path).name), ledger.store.size(path)
     try:
         if expected is None:
@@ -100,7 +99,6 @@ def _product_faults(ledger: Ledger, path: str, receipt: Receipt, task: Task) -> 
 
 
 def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
-    """Yield the faults of the files in a page's folder."""
     from reports.page.files import read_files
 
     try:

@@ -156,7 +156,6 @@ class Board:
         self.say(f"nothing reported for {silence:.0f} s; under way: {', '.join(names[:_MOST_NAMED])}{more} ({where})")
 
     def _advance(self, task: Task, share: float) -> None:
-        """Take the finished share of a task under way."""
         with self._lock:
             began, before = self._under_way.get(task.id, (0.0, 0.0))
             self._under_way[task.id] = began if share else time.monotonic(), share  # it may have waited at its worker

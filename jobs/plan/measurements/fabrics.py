@@ -37,8 +37,6 @@ if TYPE_CHECKING:
 
 
 class _OnHeldOut(Measurement):
-    """A measurement on the held-out queries of a fabric."""
-
     fabric: Coloured
     role: Role
     dataset: HeldOutRows

@@ -94,7 +94,6 @@ def _about(recipe: Recipe) -> dict[str, Any]:
 
 
 def _readme(recipe: Recipe, count: int) -> str:
-    """Return what an entrant reads."""
     columns = [(f"`{field.name}`", field.metadata[b"meaning"].decode()) for field in QUESTION_COLUMNS]
     fabrics = [
         (f"`{fabric.name}`", role, f"{fabric.weave.name}, {' × '.join(map(str, fabric.weave.repeat))}")
