@@ -38,7 +38,6 @@ from weaves.validation import Frozen
 Number = Annotated[float, Strict()]
 
 NARROWEST_YARN: Final = 0.05  # least width of a yarn, in yarn spacings
-
 _ROUNDING = 1e-9  # of sums of colours
 
 

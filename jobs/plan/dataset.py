@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from pipeline.shards.manifest import ShardEntry
 
 DATASETS: Final = "datasets"  # folder of all data sets, relative to the output folder
-
 _START: Final = 0.1  # seconds of any shard
 
 

@@ -25,7 +25,6 @@ from weaves.errors import BadInput, WorkFailed
 from weaves.reading import MIB, read_json
 
 MOST_WORKERS: Final = 1024  # worker processes of a cluster on this machine, at most
-
 _SECONDS: Final = 5  # for a scheduler to answer
 _TRIES_TO_START: Final = 3  # the cluster on this machine
 _SECONDS_FOR_A_WORKER: Final = 60  # a cluster that adapts starts one when there is work

@@ -34,7 +34,6 @@ from weaves.fabric import load_fabric
 from weaves.validation import validated
 
 _WHERE: Final = "render"
-
 _MOST_FRAMES: Final = 100_000
 _RATE: Final = 24  # frames a second of a film
 _LAYERS: Final = {"normal": "XYZ", "uv": "UV", "sigma": ("major", "minor")}

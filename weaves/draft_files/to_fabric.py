@@ -23,7 +23,6 @@ from weaves.validation import validated
 from weaves.yarn import NARROWEST_YARN
 
 LONG_REPEAT: Final = 128  # threads of a longer repeat are searched for a shorter one, of which the last is not whole
-
 MOST_SOURCE: Final = 2000  # most letters of a fabric's `source`
 
 

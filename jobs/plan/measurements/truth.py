@@ -79,14 +79,8 @@ class TruthPicture(_OfFabric):
         """Render it."""
         from reports.measure.pictures import render_truth
 
-        options = PictureOptions(
-            views=(self.scene,),
-            sphere_size=self.extent,
-            plane_size=self.extent,
-            view=self.view,
-            truth=self.truth,
-            seed=self.seed,
-        )
+        sizes = {"sphere_size": self.extent, "plane_size": self.extent}
+        options = PictureOptions(views=(self.scene,), view=self.view, truth=self.truth, seed=self.seed, **sizes)
         render_truth(self.fabric, self.scene, options, out / self.products[0])
 
 

@@ -33,9 +33,7 @@ from weaves.draft_files.write import wif_text
 from weaves.errors import BadInput
 
 _TEXELS: Final = 16  # of a map of the geometry, across a yarn
-
 _LISTING: Final = "questions.json"  # lists the fabrics, and all files with their hashes
-
 _TEMPLATE: Final = Path(__file__).with_name("questions.md")
 
 

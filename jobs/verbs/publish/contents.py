@@ -18,7 +18,6 @@ from pipeline.shards.manifest import Manifest, Role, ShardEntry
 from weaves.errors import BadInput
 
 MOST_FILES: Final = 90  # most Parquet files, if each role and split has one at least
-
 ROLES: Final[tuple[Role, ...]] = ("seen", "population", "unseen", "unseen_population")
 POPULATIONS: Final[tuple[Role, ...]] = ("population", "unseen_population")  # roles of random fabrics
 _SPLITS: Final = ("train", "validation", "test")
