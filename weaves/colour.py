@@ -23,9 +23,7 @@ Unit = Annotated[float, Strict(), Field(ge=0, le=1, allow_inf_nan=False)]
 Rgb = tuple[float, float, float]
 
 EXPECTED = 'a colour is three numbers from 0 to 1 (linear RGB), "#rrggbb" (sRGB), or a spectrum { wavelengths, values }'
-
-LUMINANCE: Final = (0.2126, 0.7152, 0.0722)
-"""Luminance of linear sRGB primaries (Rec. 709)."""
+LUMINANCE: Final = (0.2126, 0.7152, 0.0722)  # luminance of linear sRGB primaries (Rec. 709)
 
 
 class Spectrum(Frozen):
@@ -35,8 +33,7 @@ class Spectrum(Frozen):
         min_length=2, max_length=1000
     )
     """In nanometres, rising."""
-    values: tuple[Unit, ...] = Field(min_length=2, max_length=1000)
-    """Reflectance at each wavelength."""
+    values: tuple[Unit, ...] = Field(min_length=2, max_length=1000)  # reflectance at each wavelength
 
     @model_validator(mode="after")
     def _sampled(self) -> Spectrum:

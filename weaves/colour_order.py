@@ -19,7 +19,6 @@ from weaves.validation import Frozen
 from weaves.yarn import Yarn
 
 MOST_COLOURS: Final = 256  # most colours of a palette
-
 MOST_THREADS: Final = 4096  # most ends, and most picks, after which the colours must repeat
 
 Run = tuple[str, Annotated[StrictInt, Field(ge=1, le=MOST_THREADS)]]

@@ -37,10 +37,8 @@ TEX_TIMES_NE: Final = 1e3 * 453.59237 / (840 * 0.9144)
 class Count(Frozen):
     """A yarn by its count, in place of its width."""
 
-    tex: Annotated[float, Strict()] | None = Field(default=None, ge=0.1, le=10000)
-    """Grams a kilometre."""
-    ne: Annotated[float, Strict()] | None = Field(default=None, ge=0.1, le=1000)
-    """Cotton count."""
+    tex: Annotated[float, Strict()] | None = Field(default=None, ge=0.1, le=10000)  # grams a kilometre
+    ne: Annotated[float, Strict()] | None = Field(default=None, ge=0.1, le=1000)  # cotton count
     fibre_density: Annotated[float, Strict()] = Field(default=1.52, ge=0.5, le=20)
     """Density of the fibre, g/cm^3: cotton 1.52, wool 1.31, silk 1.34, flax 1.5, polyester 1.38, polyamide 1.14."""
     packing: Annotated[float, Strict()] = Field(default=0.6, ge=0.1, le=0.91)

@@ -207,14 +207,12 @@ class Loom(Family):
     """Any draft, as a loom is set up: pick j raises the shafts tied to its treadle, end i rises with its shaft."""
 
     family: Literal["loom"] = "loom"
-    threading: tuple[StrictInt, ...] = Field(min_length=1)
-    """Shaft of each end, from 1."""
+    threading: tuple[StrictInt, ...] = Field(min_length=1)  # shaft of each end, from 1
     tie_up: tuple[Annotated[tuple[StrictBool | StrictInt, ...], Field(max_length=LARGEST_REPEAT)], ...] = Field(
         max_length=LARGEST_REPEAT
     )
     """One row per treadle: 1 for each shaft that it lifts, else 0."""
-    treadling: tuple[StrictInt, ...] = Field(min_length=1)
-    """Treadle of each pick, from 1."""
+    treadling: tuple[StrictInt, ...] = Field(min_length=1)  # treadle of each pick, from 1
 
     def build(self) -> Draft:
         """Weave the draft of the loom; BadInput if a shaft or treadle does not exist."""

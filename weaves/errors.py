@@ -12,7 +12,6 @@ from collections.abc import Iterable
 from typing import Final
 
 MOST_LETTERS: Final = 300  # most letters of a sentence
-
 _PART = 80  # letters of a file, a key or a value in it
 
 

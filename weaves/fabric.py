@@ -50,21 +50,16 @@ class Fabric(Frozen):
 
     also_read = ("sett",)
 
-    name: Annotated[str, AfterValidator(_file_name)]
-    """Letters, digits, - and _: it becomes part of file names."""
+    name: Annotated[str, AfterValidator(_file_name)]  # letters, digits, - and _: it becomes part of file names
     source: str = Field(default="", max_length=2000)
     optical_thickness: Annotated[float, Strict()] = Field(default=2.0, ge=0.001, le=100)
     """Optical thickness T of the yarn layer."""
     yarns_per_cm: tuple[PerCm, PerCm] | None = None
     """Ends per centimetre and picks per centimetre: the physical size, where it is known; a file may call it `sett`."""
-    draft: Weave
-    """The weave family and its numbers."""
-    warp: Yarn
-    """The yarns along y."""
-    weft: Yarn
-    """The yarns along x."""
-    colours: ColourOrder | None = None
-    """Colours of single ends and picks, in place of the colours of the two yarns."""
+    draft: Weave  # the weave family and its numbers
+    warp: Yarn  # the yarns along y
+    weft: Yarn  # the yarns along x
+    colours: ColourOrder | None = None  # colours of single ends and picks, in place of the colours of the two yarns
 
     @model_validator(mode="before")
     @classmethod

@@ -51,10 +51,8 @@ class Rib(Family):
     """Plain weave with groups in one direction: `picks` together make a warp rib, `ends` together a weft rib."""
 
     family: Literal["rib"] = "rib"
-    ends: StrictInt = Field(default=1, ge=1, le=16)
-    """Ends that move together."""
-    picks: StrictInt = Field(default=2, ge=1, le=16)
-    """Picks that lie together."""
+    ends: StrictInt = Field(default=1, ge=1, le=16)  # ends that move together
+    picks: StrictInt = Field(default=2, ge=1, le=16)  # picks that lie together
 
     def build(self) -> Draft:
         """Weave it; BadInput unless exactly one of the two numbers is 1."""
@@ -84,10 +82,8 @@ def _blocks(ends: int, picks: int, name: str) -> Draft:
 class _Stepped(Family):
     """A weave all of whose ends take the same steps."""
 
-    over: Steps
-    """Picks each end passes over: one number, or one a step."""
-    under: Steps
-    """Picks it then passes under."""
+    over: Steps  # picks each end passes over: one number, or one a step
+    under: Steps  # picks it then passes under
 
     def one_end(self) -> list[bool]:
         """Follow one end through a repeat: True where it is over the pick."""
@@ -153,10 +149,8 @@ class Satin(Family):
     """A satin, which shows the warp, or a sateen, which shows the weft."""
 
     family: Literal["satin", "sateen"] = "satin"
-    ends: StrictInt = Field(default=5, ge=5, le=LARGEST_REPEAT)
-    """Ends, and picks, of the repeat."""
-    move: StrictInt = 2
-    """Ends from one binding point to that of the next pick."""
+    ends: StrictInt = Field(default=5, ge=5, le=LARGEST_REPEAT)  # ends, and picks, of the repeat
+    move: StrictInt = 2  # ends from one binding point to that of the next pick
 
     def build(self) -> Draft:
         """Weave it; BadInput if the move makes no satin, with those that would."""

@@ -37,9 +37,8 @@ class Mesh(NamedTuple):
 class RepeatMesh(NamedTuple):
     """Meshes of a cloth; together they have one point above every point of the plane, none in gaps."""
 
-    warp: Mesh
+    warp: Mesh  # parts of the yarn that are visible from above
     weft: Mesh
-    """Parts of each yarn that are visible from above."""
     walls: Mesh
     """The steps between them; those at x = 0 and y = 0 are in it, those at the far borders belong to the next
     repeat."""
@@ -106,7 +105,6 @@ def _ending(places: Floats, first: float, last: float) -> Floats:
 
 
 def _grids(piece: _Piece) -> Mesh:
-    """Join the vertices of every rectangle to triangles."""
     count, rows, columns = piece.z.shape
     x, y = (piece.end[:, None, None] + piece.x, piece.pick[:, None, None] + piece.y[:, None])
     vertices = np.stack(np.broadcast_arrays(x, y, piece.z), axis=-1).reshape(-1, 3)

@@ -44,17 +44,13 @@ Range = tuple[Number, Number]
 class Ranges(Frozen):
     """Ranges [lowest, highest] of the parameters of the yarns, drawn for each yarn separately."""
 
-    roughness_warp: Range = (0.01, 0.49)
-    """Roughness of the warp, uniform in its square root, as that of the weft."""
+    roughness_warp: Range = (0.01, 0.49)  # roughness of the warp, uniform in its square root, as that of the weft
     roughness_weft: Range = (0.01, 0.49)
-    relief: Range = (0.2, 2.0)
-    """Scale of the height field."""
+    relief: Range = (0.2, 2.0)  # scale of the height field
     width: Range = (1.0, 1.0)
     """Gap scale; the published generator takes [0.6, 0.9] for plain weaves, [0.85, 0.95] for the others."""
-    bend: Range = (10.0, 50.0)
-    """Largest inclination, degrees."""
-    twist: Range = (0.0, 0.0)
-    """Fibre angle, degrees; one value for both yarns, which a mill spins alike."""
+    bend: Range = (10.0, 50.0)  # largest inclination, degrees
+    twist: Range = (0.0, 0.0)  # fibre angle, degrees; one value for both yarns, which a mill spins alike
 
     @field_validator("*")
     @classmethod
@@ -82,8 +78,7 @@ class Population(Frozen):
     """True: the families take turns, and of each the share `solid` is solid. False: both are drawn."""
     exclude: tuple[str, ...] = ()
     """Drafts, such as ``twill 4/4``, that must not occur, nor shifts, mirror images or rearrangements of them."""
-    plain: Ranges = Ranges()
-    """Ranges of plain, rib and basket weaves."""
+    plain: Ranges = Ranges()  # ranges of plain, rib and basket weaves
     twill: Ranges = Ranges(roughness_warp=(0.49, 1), roughness_weft=(0.49, 1), relief=(1, 2), twist=(-30, -30))
     """Ranges of all twills."""
     satin: Ranges = Ranges(roughness_warp=(0.04, 0.49), roughness_weft=(0.49, 1.0), relief=(0.2, 1.0))

@@ -38,9 +38,8 @@ class ClothSurface(NamedTuple):
     yarn: npt.NDArray[np.int8]  # `WARP`, `WEFT`, or `GAP` where no yarn covers the point, int8
     under: Bools  # true where the yarn on top is too narrow and the one beneath shows
     height: Floats  # in yarn spacings, -inf in gaps; the axis of a yarn is at 0 where a float begins and ends
-    normal: Floats
-    tangent: Floats
-    """Unit ply normal n_p (upward) and unit fibre tangent t; +z and 0 in gaps, float64 (..., 3)."""
+    normal: Floats  # unit ply normal n_p (upward), +z in gaps, (..., 3)
+    tangent: Floats  # unit fibre tangent t, 0 in gaps, (..., 3)
 
 
 def surface_at(fabric: Fabric, x: npt.ArrayLike, y: npt.ArrayLike) -> ClothSurface:

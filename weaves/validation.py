@@ -32,8 +32,7 @@ class Frozen(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    also_read: ClassVar[tuple[str, ...]] = ()
-    """Keys that a file may have in place of fields."""
+    also_read: ClassVar[tuple[str, ...]] = ()  # keys that a file may have in place of fields
 
 
 def read_toml(path: Path) -> dict[str, Any]:

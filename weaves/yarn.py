@@ -38,7 +38,6 @@ from weaves.validation import Frozen
 Number = Annotated[float, Strict()]
 
 NARROWEST_YARN: Final = 0.05  # least width of a yarn, in yarn spacings
-
 _ROUNDING = 1e-9  # of sums of colours
 
 
@@ -49,20 +48,14 @@ class Yarn(Frozen):
 
     width: Number = Field(default=1.0, ge=NARROWEST_YARN, le=1)
     """Gap scale g: width of the yarn in yarn spacings; below 1 the cloth has gaps."""
-    bend: Number = Field(ge=0, le=85)
-    """Largest inclination of a float, u_max, in degrees; 0 is drawn flat."""
-    twist: Number = Field(default=0.0, ge=-89, le=89)
-    """Angle of the fibres to the yarn's axis, psi, in degrees."""
-    roughness: Number = Field(ge=0.01, le=1)
-    """Microflake roughness alpha: small is lustrous."""
-    relief: Number = Field(default=1.0, ge=0.01, le=2)
-    """Scale of the height field, beta."""
+    bend: Number = Field(ge=0, le=85)  # largest inclination of a float, u_max, in degrees; 0 is drawn flat
+    twist: Number = Field(default=0.0, ge=-89, le=89)  # angle of the fibres to the yarn's axis, psi, in degrees
+    roughness: Number = Field(ge=0.01, le=1)  # microflake roughness alpha: small is lustrous
+    relief: Number = Field(default=1.0, ge=0.01, le=2)  # scale of the height field, beta
     blend: Number = Field(default=0.5, ge=0, le=1)
     """Weight w_d of the ply normal in the diffuse cosine; the macro normal has the rest."""
-    specular: Colour = (0.3, 0.3, 0.3)
-    """Colour k_s of the light scattered once by the fibres."""
-    diffuse: Colour = (0.3, 0.3, 0.3)
-    """Colour k_d of the light scattered many times and sent back."""
+    specular: Colour = (0.3, 0.3, 0.3)  # colour k_s of the light scattered once by the fibres
+    diffuse: Colour = (0.3, 0.3, 0.3)  # colour k_d of the light scattered many times and sent back
     diffuse_transmission: Colour = (0.0, 0.0, 0.0)
     """Colour k_dt of the light scattered many times that leaves on the other side."""
 

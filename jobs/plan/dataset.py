@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from pipeline.shards.manifest import ShardEntry
 
 DATASETS: Final = "datasets"  # folder of all data sets, relative to the output folder
-
 _START: Final = 0.1  # seconds of any shard
 
 
@@ -33,10 +32,8 @@ class Shard(Task):
     stage: ClassVar[Stage] = "generate"
     shares_process: ClassVar[bool] = True
 
-    shard: AnyShardTask
-    """Rows of one fabric, and how they are answered."""
-    role: str
-    """Role of the fabric in the data set (`pipeline.shards.manifest`)."""
+    shard: AnyShardTask  # rows of one fabric, and how they are answered
+    role: str  # role of the fabric in the data set (`pipeline.shards.manifest`)
     folders: Places
 
     @property
@@ -114,8 +111,7 @@ class DataSet:
         cuts = list(_cuts(recipe))
         self.fingerprint = fingerprint(sorted(id for first, _, id in cuts if isinstance(first.shard, ShardTask)))
         """Of its own rows."""
-        self.folder = f"{DATASETS}/{recipe.name}-{self.fingerprint[:8]}"
-        """Relative to the output folder."""
+        self.folder = f"{DATASETS}/{recipe.name}-{self.fingerprint[:8]}"  # relative to the output folder
         self.shards: list[Shard] = []
         for first, numbers, id in cuts:  # only the first of each set is validated
             own = {"shard": first.shard.model_copy(update=numbers), "folders": (self.folder,), "id": id}

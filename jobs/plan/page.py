@@ -30,22 +30,17 @@ class Page(Task):
 
     recipe: str
     about: str
-    dataset: str
-    """Name and fingerprint of the data set."""
+    dataset: str  # name and fingerprint of the data set
     fabrics: tuple[tuple[Fabric, Role], ...]
     models: tuple[ModelNote, ...]
     options: BenchOptions
     metrics: Annotated[tuple[AddedMetric, ...], PLACE]
     """Metrics from outside; the ids of their measurements are in `measured`."""
-    measured: tuple[str, ...]
-    """Ids of the measurements."""
-    records: Places
-    """Files of Records of the measurements."""
-    timing: Place
-    """File of the Records of times; the machine beside it is the page's."""
+    measured: tuple[str, ...]  # ids of the measurements
+    records: Places  # files of Records of the measurements
+    timing: Place  # file of the Records of times; the machine beside it is the page's
     pictures: Annotated[tuple[PictureFile, ...], PLACE]
-    live: Annotated[dict[str, str], PLACE]
-    """Live page of each fabric that has one, by the fabric's name."""
+    live: Annotated[dict[str, str], PLACE]  # live page of each fabric that has one, by the fabric's name
 
     @classmethod
     def planned(cls, subjects: Subjects, benches: Sequence[Measurement]) -> Page:
@@ -172,7 +167,6 @@ def _note(
 
 
 def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]) -> str:
-    """Return a note on fabrics and scenes that a model does not cover."""
     if not model.of_one_material:
         return ""
     fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]

@@ -32,8 +32,7 @@ class Schedule(NamedTuple):
     """A simulated run."""
 
     workers: int
-    makespan: float
-    """Seconds from the first start to the last end."""
+    makespan: float  # seconds from the first start to the last end
     work: float  # seconds of all tasks
     tail: float  # seconds at the end in which not all workers are busy: the straggler tail
 

@@ -56,8 +56,7 @@ class Made(TaskPart):
     """Products of another task that this one reads."""
 
     task: str
-    path: Place
-    """Path of its product, or of the folder of its products."""
+    path: Place  # path of its product, or of the folder of its products
 
     @property
     def needs(self) -> tuple[str, ...]:

@@ -25,8 +25,7 @@ class Training(Task):
     options: ModelOptions
     training: TrainingOptions
     fabrics: tuple[str, ...]
-    shards: tuple[str, ...]
-    """Ids of the tasks that make its rows."""
+    shards: tuple[str, ...]  # ids of the tasks that make its rows
     dataset: Place
 
     @classmethod

@@ -15,7 +15,6 @@ from weaves.draft import Draft
 from weaves.fabric import Fabric
 
 SECONDS_A_POINT: Final = 5.5e-7  # one point of the truth, on one core of a server of 2021
-
 _POINTS_A_ROW: Final = 1100  # for 2 % relative error, on average
 _SAMPLED: Final = 0.15  # share of the points of sampling that `auto` takes where tables answer most rows
 _ROW, _ROW_A_CELL, _MOST_CELLS = 1.2e-5, 3e-6, 8  # a row of a table: seconds, and more for each of the first cells

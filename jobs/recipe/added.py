@@ -34,10 +34,8 @@ class Added:
 
     def __init__(self, given: Sequence[str] = ()) -> None:
         self._given: dict[str, AddedMethod] = {}
-        self.metrics: list[AddedMetric] = []
-        """The metrics from outside."""
-        self.forms = [Path(text) for text in given if text.endswith(FORM)]
-        """The forms of entries."""
+        self.metrics: list[AddedMetric] = []  # the metrics from outside
+        self.forms = [Path(text) for text in given if text.endswith(FORM)]  # the forms of entries
         for text in (text for text in given if not text.endswith(FORM)):
             source = text if ":" in text else _installed().get(text)
             if source is None:

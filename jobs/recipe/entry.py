@@ -17,7 +17,6 @@ from weaves.errors import BadInput
 from weaves.validation import Frozen, read_toml, validated
 
 FORM: Final = "entry.toml"  # file of the form
-
 ANSWER_FILES: Final = ("answers.parquet", "answers.csv")  # files of the answers, of which one lies beside the form
 
 

@@ -86,7 +86,6 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
 
 
 def _entries(recipe: Recipe, forms: Sequence[Path]) -> Iterator[Entry]:
-    """Read entries, which answer the questions of a recipe."""
     taken = [model.options.name for model in recipe.models]
     for path in forms:
         entry = read_entry(path, recipe.questions, len(recipe.tested) * recipe.dataset.rows.test)
@@ -108,7 +107,6 @@ def _beside(
 
 
 def _fabrics(names: Sequence[str], recipe: Path, key: str) -> Iterator[Fabric]:
-    """Load the fabrics that a recipe names."""
     known, what = preset_names(), "a preset or the path of a .toml file beside the recipe"
     for index, name in enumerate(names):
         yield load_fabric(_beside(name, known, recipe, f"{key}.{index}", what) or name)

@@ -46,12 +46,9 @@ def _not_too_many(population: Population) -> Population:
 class Rows(Frozen):
     """Queries for each fabric."""
 
-    train: StrictInt = Field(ge=1, le=10**10)
-    """For training, each named fabric."""
-    population: StrictInt = Field(default=0, ge=0, le=10**10)
-    """For training, each member of the population."""
-    validation: StrictInt = Field(default=2048, ge=1, le=10**10)
-    """For the figures on model cards, each named fabric."""
+    train: StrictInt = Field(ge=1, le=10**10)  # for training, each named fabric
+    population: StrictInt = Field(default=0, ge=0, le=10**10)  # for training, each member of the population
+    validation: StrictInt = Field(default=2048, ge=1, le=10**10)  # for the figures on model cards, each named fabric
     test: StrictInt = Field(default=8192, ge=1, le=10**10)
     """For the benchmark, each named fabric and each of the unseen population; no model ever reads them."""
 
@@ -61,20 +58,16 @@ class DatasetOptions(Frozen):
 
     seen: tuple[StrictStr, ...] = Field(min_length=1)
     """Fabrics to train on and measure: preset names, or paths to TOML files relative to the recipe."""
-    unseen: tuple[StrictStr, ...] = ()
-    """Fabrics that general models are measured on and never trained on."""
-    population: Population = Population()
-    """Random fabrics, only trained on."""
+    unseen: tuple[StrictStr, ...] = ()  # fabrics that general models are measured on and never trained on
+    population: Population = Population()  # random fabrics, only trained on
     unseen_population: Annotated[Population, AfterValidator(_not_too_many)] = Population()
     """Random fabrics that general models are measured on, on held-out queries, and never trained on.
 
     No draft of it is in the population, unless a seen fabric has it too. No design may be chosen by what is measured
     on it (CONTRIBUTING.md)."""
     rows: Rows
-    shard_rows: StrictInt = Field(default=8192, ge=64, le=2**24)
-    """Most rows of one shard, which is one task."""
-    seed: StrictInt = Field(default=0, ge=0, lt=2**63)
-    """Seed of all queries and points."""
+    shard_rows: StrictInt = Field(default=8192, ge=64, le=2**24)  # most rows of one shard, which is one task
+    seed: StrictInt = Field(default=0, ge=0, lt=2**63)  # seed of all queries and points
     queries: QueryOptions = QueryOptions()
     truth: TruthOptions = TruthOptions()
     training_truth: TruthOptions | None = None

@@ -207,5 +207,4 @@ def _check_models(recipe: Recipe, where: str) -> None:
 
 
 def _only_known(where: str, index: int, model: str, name: str, own: object, value: object) -> BadInput:
-    """Return the refusal of a physics that a model cannot have."""
     return BadInput(where, f"dataset.truth.{name}", value, f"{model} (models.{index}) knows {name} = {own!r} only")

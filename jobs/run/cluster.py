@@ -25,7 +25,6 @@ from weaves.errors import BadInput, WorkFailed
 from weaves.reading import MIB, read_json
 
 MOST_WORKERS: Final = 1024  # worker processes of a cluster on this machine, at most
-
 _SECONDS: Final = 5  # for a scheduler to answer
 _TRIES_TO_START: Final = 3  # the cluster on this machine
 _SECONDS_FOR_A_WORKER: Final = 60  # a cluster that adapts starts one when there is work
@@ -74,7 +73,6 @@ def connected(scheduler: Scheduler, workers: int, say: Callable[[str], None]) ->
 
 @contextmanager
 def _external(scheduler: Scheduler, say: Callable[[str], None]) -> Iterator[Any]:
-    """Connect to a running scheduler that has a worker."""
     from distributed import Client, Security
 
     for name in ("distributed", "distributed.client", "distributed.utils"):  # each has a level of its own

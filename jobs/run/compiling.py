@@ -22,8 +22,7 @@ class KernelGroup(NamedTuple):
     """Kernels that are compiled together: those of an estimator, or of a model."""
 
     name: str
-    model: Options | None = None
-    """None: `name` is an estimator."""
+    model: Options | None = None  # None: `name` is an estimator
 
     def compile(self, ready: Callable[[str], None]) -> None:
         """Compile the kernels, or read them from the cache; `ready` is called with the name of each kernel."""

@@ -49,8 +49,7 @@ class Crew:
         self._threads: dict[str, int] = {}
         self._checked: dict[str, str] = {}  # what differs, by address; empty: nothing
         self._looked = -_SECONDS_BETWEEN_LOOKS
-        self.accepted: list[str] = []
-        """Addresses of the workers that may get tasks."""
+        self.accepted: list[str] = []  # addresses of the workers that may get tasks
         # Topic and keys of this run: another run of the same task, with another folder, is not this one.
         self._topic = f"twillight-{uuid.uuid4().hex}"
         self._number = 0
@@ -288,7 +287,6 @@ def _work(task: Task, out: str, inputs: Mapping[str, str], topic: str, expected:
 
 
 def _outcome(content: Mapping[str, Any]) -> Outcome:
-    """Return the outcome in a message."""
     files = {name: Product(**product) for name, product in content["files"].items()}
     return Outcome(**{**content, "files": files})
 

@@ -31,8 +31,7 @@ class Fault(NamedTuple):
     """A file that is not as it should be."""
 
     kind: Kind
-    path: str
-    """Relative to the output folder."""
+    path: str  # relative to the output folder
     why: str  # reason, a sentence about the file
     task: Task | None = None  # the task that makes it
     never_run: bool = False  # true if neither receipt nor product of the task exists
@@ -81,7 +80,6 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
 
 
 def _product_faults(ledger: Ledger, path: str, receipt: Receipt, task: Task) -> Iterator[Fault]:
-    """Yield the fault of one product, if it has one."""
     expected, size = receipt.files.get(Path(path).name), ledger.store.size(path)
     try:
         if expected is None:
@@ -101,7 +99,6 @@ def _product_faults(ledger: Ledger, path: str, receipt: Receipt, task: Task) -> 
 
 
 def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
-    """Yield the faults of the files in a page's folder."""
     from reports.page.files import read_files
 
     try:

@@ -32,7 +32,6 @@ ELSEWHERE: Final = "taken from another data set"
 """Reason of a task that need not run: its products are in another data set, and a run links them."""
 
 CHANGED: Final = "changed: "  # beginning of the reason of a task that was made before with another identity
-
 _MOST_KEYS: Final = 3  # that a reason names
 _SECONDS_BETWEEN_SYNCS: Final = 1.0
 

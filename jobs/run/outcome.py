@@ -26,8 +26,7 @@ class Outcome(NamedTuple):
 
     files: Mapping[str, Product] = MappingProxyType({})
     seconds: float = 0.0
-    reason: str = ""
-    """One line; empty if the task is done."""
+    reason: str = ""  # one line; empty if the task is done
     traceback: str = ""
     """That of an unexpected exception, which may not occur elsewhere; empty for bad input and for work that failed."""
     worker: str = ""  # address of the worker; empty if it is not known

@@ -29,8 +29,7 @@ class Event(NamedTuple):
 
     name: EventName
     task: Task | None
-    share: float | None
-    """Finished share of the task."""
+    share: float | None  # finished share of the task
     message: str | None  # reason of a failure, or a sentence
 
 
@@ -44,13 +43,10 @@ class Board:
 
     def __init__(self, tasks: Sequence[Task], estimate: Estimate, show: Callable[[Event, Board], None]) -> None:
         self.planned: Counter[Stage] = Counter()
-        self.ended: Counter[Stage] = Counter()
-        """Tasks by stage, done or failed."""
+        self.ended: Counter[Stage] = Counter()  # tasks by stage, done or failed
         self.failed: Counter[Stage] = Counter()
-        self.work: defaultdict[Stage, float] = defaultdict(float)
-        """Expected cost of what is done, by stage."""
-        self.all_work: defaultdict[Stage, float] = defaultdict(float)
-        """Expected cost of everything, by stage."""
+        self.work: defaultdict[Stage, float] = defaultdict(float)  # expected cost of what is done, by stage
+        self.all_work: defaultdict[Stage, float] = defaultdict(float)  # expected cost of everything, by stage
         self.workers = 0
         self.dashboard: str | None = None
         self._estimate, self._show = estimate, show
@@ -160,7 +156,6 @@ class Board:
         self.say(f"nothing reported for {silence:.0f} s; under way: {', '.join(names[:_MOST_NAMED])}{more} ({where})")
 
     def _advance(self, task: Task, share: float) -> None:
-        """Take the finished share of a task under way."""
         with self._lock:
             began, before = self._under_way.get(task.id, (0.0, 0.0))
             self._under_way[task.id] = began if share else time.monotonic(), share  # it may have waited at its worker

@@ -45,7 +45,6 @@ def _left(board: Board) -> str:
 
 
 def _failure(event: Event) -> str:
-    """Return the line of a task that failed."""
     assert event.task is not None
     return f"{event.name}: {event.task.stage} {event.task.title}: {event.message}"
 

@@ -43,8 +43,7 @@ class Receipt(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    task: str
-    """Id of the task."""
+    task: str  # id of the task
     stage: str
     title: str
     files: dict[Annotated[str, Field(pattern=r"^[^/\\.][^/\\]*$")], Product]

@@ -90,7 +90,6 @@ def import_draft(
 
 
 def _part(text: str, flag: str, threads: DraftThreads) -> tuple[int, int] | None:
-    """Return the first and the last thread of a part, from the command line."""
     if not text:
         return None
     sides, most = re.fullmatch(r"([0-9]{1,6})-([0-9]{1,6})", text), len(threads.colours)
@@ -172,7 +171,6 @@ def gallery(
 
 
 def _write(verb: str, name: str, kind: str, path: Path, options: Mapping[str, Any], **flags: str) -> None:
-    """Export a fabric and print what was written."""
     with _named_flags(verb, **flags):
         print_lines(export(load_fabric(name), kind, path, **options))
 

@@ -92,7 +92,6 @@ def _name(out: Path) -> str:
 
 
 def _write(fitted: Fitted, out: Path, source: str, remarks: Iterable[str] = ()) -> None:
-    """Write a fabric, and print its numbers and all sentences on it."""
     fabric = fitted.fabric.model_copy(update={"source": f"Fitted to {source} by twillight fit."})
     atomic_write(out, fabric.to_toml().encode())
     errors = ", ".join(f"{key} {number(value)}" for key, value in fitted.errors.items())

@@ -31,8 +31,7 @@ class MergedTask(NamedTuple):
 
     ledger: Ledger
     receipt: Receipt
-    places: list[str]
-    """Paths of its sound products, relative to the folder."""
+    places: list[str]  # paths of its sound products, relative to the folder
 
 
 def merge(

@@ -56,10 +56,8 @@ Add = Annotated[
 ]
 NOTHING: Final[list[str]] = []
 
-Local = Annotated[Path, Parameter(converter=_local)]
-"""A path of this machine."""
-Whole = Annotated[int, Parameter(converter=_whole)]
-"""An integer, never rounded."""
+Local = Annotated[Path, Parameter(converter=_local)]  # a path of this machine
+Whole = Annotated[int, Parameter(converter=_whole)]  # an integer, never rounded
 Place = Annotated[Any, Parameter(converter=_place)]
 """A path; `Any`, because one of object storage is no `pathlib.Path` to pydantic, which cyclopts may call."""
 Out = Annotated[Place, Parameter(help="Folder of all products, or an address such as s3://bucket/x.")]

@@ -25,12 +25,10 @@ _MOST_WORKERS: Final = 100_000  # of a simulated schedule
 class Facts(NamedTuple):
     """Knowledge of the ledger about a plan."""
 
-    why: dict[str, str]
-    """Why each task that is not done would run, by its id."""
+    why: dict[str, str]  # why each task that is not done would run, by its id
     seconds: dict[str, float]
     """Duration of every task: measured, or estimated and scaled by what was measured of its kind."""
-    measured: int
-    """Number of tasks with a measured duration."""
+    measured: int  # number of tasks with a measured duration
 
     def left(self, tasks: Sequence[Task]) -> list[Task]:
         """Return the tasks that would run."""

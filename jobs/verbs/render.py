@@ -34,7 +34,6 @@ from weaves.fabric import load_fabric
 from weaves.validation import validated
 
 _WHERE: Final = "render"
-
 _MOST_FRAMES: Final = 100_000
 _RATE: Final = 24  # frames a second of a film
 _LAYERS: Final = {"normal": "XYZ", "uv": "UV", "sigma": ("major", "minor")}
@@ -90,7 +89,6 @@ def render(
 
 
 def _loaded(scene: Scene, options: SceneOptions, method: str) -> tuple[Loaded, PictureMethod]:
-    """Load a scene, and a method prepared for its fabrics."""
     # Torch, which help need not wait for.
     from pipeline.models.fallback import Fallback
     from pipeline.models.named import TRUTH, named_method
@@ -181,14 +179,12 @@ class _Film:
             self._pool.shutdown(cancel_futures=True)
 
     def _shown(self, frame: int) -> Bytes8:
-        """Return a frame as it is shown."""
         codes = np.zeros((self.size[1], self.size[0], 3), np.uint8)
         for part in self._parts(frame, layers=False):
             codes[shown_at(part)] = displayed(part.planes["rgb"], self.tone, self.exposure)
         return codes
 
     def _write_exr(self, out: Path, method: str) -> None:
-        """Write the first frame with its layers."""
         planes: dict[str, Plane] = {}
         for part in self._parts(0, layers=True):
             for name, plane in part.planes.items():
@@ -204,7 +200,6 @@ class _Film:
         write_exr(out, channels, self._about(method), half)
 
     def _about(self, method: str) -> dict[str, str | int | float]:
-        """Return what the file says of itself."""
         model = method.partition(":")[0]
         own = f", {model} {versions.MODELS[model]}" if model in versions.MODELS else ""
         fabrics = (f"{number} {fabric.name}" for number, (_, fabric) in enumerate(self.loaded.cloths.values(), 1))

@@ -118,7 +118,6 @@ def savings(path: Path, general: Recipe, add: Sequence[str] = ()) -> str:
 
 
 def _rows(general: Recipe, effort: float) -> dict[str, int]:
-    """Return the rows of each split, a fabric."""
     rows = general.dataset.rows
     train = min(rows.train, max(_FEWEST_ROWS, round(effort * rows.train)))
     return {"train": train, "validation": rows.validation, "test": min(rows.test, _TEST_ROWS)}

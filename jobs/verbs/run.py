@@ -58,8 +58,6 @@ class Part(NamedTuple):
 
 
 def _verb(*stages: Stage) -> Callable[..., None]:
-    """Return the function of the verb that runs some stages of a recipe."""
-
     def verb(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
         work(recipe, stages, out, on, add)
 
@@ -67,8 +65,6 @@ def _verb(*stages: Stage) -> Callable[..., None]:
 
 
 def _divisible(stage: Stage) -> Callable[..., None]:
-    """Return the function of the verb of a stage that may be done in parts."""
-
     def verb(recipe: RecipeName, *, part: Share = "", add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
         if part:
             _work_part(recipe, stage, Part.read(part), out, on, add)

@@ -130,7 +130,6 @@ def method_of(fabric: Fabric) -> Fallback:
 
 
 def _print_fabric(fabric: Fabric) -> None:
-    """Print the drawdown of a fabric, and the numbers of its yarns."""
     ends, picks = fabric.weave.repeat
     print_lines(f"{fabric.name}: {fabric.weave.name}, {ends} ends × {picks} picks (██ warp over, last pick first)", "")
     print_lines(fabric.weave.text(), "")

@@ -114,7 +114,6 @@ def _true(fabric: Fabric, queries: Queries, options: TruthOptions) -> Float64:
 def _measured(
     subject: Record, method: Method, fabric: Fabric, inputs: ExtremeInputs, truth: Float64
 ) -> tuple[Float64, list[Record]]:
-    """Return a method's answers and the measurements of them alone."""
     near, far = (_evaluated(method, fabric, queries) for queries in (inputs.queries, inputs.far))
     wide, wider = (_evaluated(method, fabric, inputs.queries.take(inputs.size == size)) for size in FOOTPRINTS[-2:])
     every, grazing = np.concatenate([near, far]), inputs.grazing

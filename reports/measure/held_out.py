@@ -30,16 +30,8 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Answers, Queries
 from reports.catalogue import AddedMetric, enter
 from reports.error import COLOUR_WEIGHTS, Error, colour_error, component_errors, most_error
+from reports.measure import timing
 from reports.measure.memory import peak_memory
-from reports.measure.timing import (
-    Contender,
-    affordable,
-    milliseconds,
-    quartiles,
-    thread_counts,
-    time_side_by_side,
-    timed,
-)
 from reports.options import TimingOptions
 from reports.record import TRUTH, Metric, Record
 from weaves.fabric import Fabric
@@ -102,7 +94,7 @@ def measure_truth(rows: HeldOutFabric) -> Record:
     """
     size = np.linalg.norm(rows.truth.mean, axis=1)
     relative = np.linalg.norm(rows.truth.standard_error, axis=1)[size > 0] / size[size > 0]
-    low, median, high = quartiles(relative)
+    low, median, high = timing.quartiles(relative)
     subject = Record(method=TRUTH, fabric=rows.fabric.name, scene="queries")
     return subject.of("truth_relative_error", median, len(relative), low=low, high=high)
 
@@ -132,37 +124,37 @@ def measure_timing(
         if not covered:
             continue
         subject = Record(method=method.name, setting=method.setting)
-        entries.append((subject, affordable(Contender(method.predict, covered))))
+        entries.append((subject, timing.affordable(timing.Contender(method.predict, covered))))
         stored = float(np.mean([method.bytes_stored(cloth) for cloth, _ in covered]))
         records.append(subject.of("bytes_stored", stored, len(covered)))
         memory = peak_memory(partial(method.predict, *covered[0]))
         records += [subject.of("peak_memory", memory, 3)] if memory is not None else []
         records += _preparing(subject, method, [cloth for cloth, _ in covered], edits)
-    exact = affordable(Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), sample))
+    exact = timing.affordable(timing.Contender(lambda cloth, queries: estimate(cloth, queries, truth, 0), sample))
     entries.append((Record(method=TRUTH), exact))
     return records + _times(entries, options, lambda share: progress(0.3 + 0.7 * share))
 
 
 def _times(
-    entries: Sequence[tuple[Record, Contender]], options: TimingOptions, progress: Callable[[float], None]
+    entries: Sequence[tuple[Record, timing.Contender]], options: TimingOptions, progress: Callable[[float], None]
 ) -> list[Record]:
     """Return the times of all contenders on every number of threads, all of them in turns."""
     runs = [
         (subject.model_copy(update={"threads": threads}), contender._replace(threads=threads))
         for subject, contender in entries
-        for threads in thread_counts(options.threads)
+        for threads in timing.thread_counts(options.threads)
     ]
     contenders, repeats = [contender for _, contender in runs], options.timing_repeats
-    timings = time_side_by_side(contenders, repeats, options.warm_up, progress=progress)
+    timings = timing.time_side_by_side(contenders, repeats, options.warm_up, progress=progress)
     records = []
-    for (subject, contender), timing in zip(runs, timings, strict=True):
+    for (subject, contender), cost in zip(runs, timings, strict=True):
         about = subject.model_copy(update={"note": f"{len(contender.queries[0][1].u)} queries a fabric"})
-        records.append(timed(about, "time", timing.samples))
-        records.append(subject.of("processor_time", 1e-3 * timing.processor, repeats))
+        records.append(timing.timed(about, "time", cost.samples))
+        records.append(subject.of("processor_time", 1e-3 * cost.processor, repeats))
         if contender.threads == 1:
-            records.append(subject.of("waited", timing.waited, repeats))
-        if math.isfinite(timing.joules):
-            records.append(subject.of("energy", 1e6 * timing.joules, repeats))
+            records.append(subject.of("waited", cost.waited, repeats))
+        if math.isfinite(cost.joules):
+            records.append(subject.of("energy", 1e6 * cost.joules, repeats))
     return records
 
 
@@ -190,7 +182,7 @@ def _preparing(subject: Record, method: Method, fabrics: Sequence[Fabric], edits
         new = fabric.model_copy(update={"name": f"{fabric.name}, edit {edit}", "warp": warp})
         if not method.covers(new):
             return []
-        times.append(milliseconds(partial(method.prepare, new)))
+        times.append(timing.milliseconds(partial(method.prepare, new)))
         if sum(times) > _LONGEST_EDITS:
             break
-    return [timed(subject, "prepare_time", times)]
+    return [timing.timed(subject, "prepare_time", times)]

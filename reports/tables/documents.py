@@ -86,7 +86,6 @@ def _ratio(row: Any) -> str:
 
 
 def _trainings(errors: pd.DataFrame) -> str:
-    """Return a sentence on how often networks were trained."""
     counts = sorted({int(count) for count in errors["seeds"] if count})
     if not counts or counts[-1] == 1:
         return "Each network was trained once."

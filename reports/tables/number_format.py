@@ -72,21 +72,6 @@ def percent(value: float, digits: int = 1) -> str:
     return NONE if missing(value) else f"{100 * value:.{digits}f} %".replace("-", "−")
 
 
-def share(value: float) -> str:
-    """Return ``4.0e-03``, or 0."""
-    return NONE if missing(value) else "0" if value == 0 else f"{value:.1e}"
-
-
-def outwards(value: float) -> str:
-    """Return ``−0.0300``."""
-    return NONE if missing(value) else f"{value:+.4f}".replace("-", "−")
-
-
-def memory(value: float) -> str:
-    """Return bytes that a call adds."""
-    return f"below {size(UNSURE)}" if value < UNSURE else size(value)
-
-
 def fixed_to(value: float, digits: int) -> str:
     """Return ``1,696``, or ``31.4``."""
     return NONE if missing(value) else f"{value:,.{digits}f}"
@@ -149,9 +134,9 @@ FORMATS: Final[dict[str, Callable[[float], str]]] = {
     "bytes": size,
     "seconds": seconds,
     "times": times,
-    "share": share,
-    "outwards": outwards,
-    "memory": memory,
+    "share": lambda value: NONE if missing(value) else "0" if value == 0 else f"{value:.1e}",
+    "outwards": lambda value: NONE if missing(value) else f"{value:+.4f}".replace("-", "−"),
+    "memory": lambda value: f"below {size(UNSURE)}" if value < UNSURE else size(value),
 }
 """Formats of the catalogue, and of columns of `tables.toml`."""
 

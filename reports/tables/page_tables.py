@@ -180,7 +180,6 @@ def _ratio(column: Column) -> Column:
 
 
 def _fronts(tradeoff: pd.DataFrame, values: Values) -> list[ResultTable]:
-    """Return what is on the front by role, the fastest first."""
     columns, tables = columns_for("front", values).values(), []
     for role, part in parts_of(tradeoff, "role"):
         front = part[part["front"]].sort_values("ns", kind="stable")

@@ -203,7 +203,6 @@ def _woven(pattern: PatternData, ends: int, picks: int, where: str) -> Bools:
 
 
 def _threads(pattern: PatternData, axis: str, count: int, table: Mapping[int, str], remarks: list[str]) -> DraftThreads:
-    """Return the colours and lengths of the threads of the ``"warp"`` or ``"weft"``."""
     yarns = getattr(pattern, axis)
     named = getattr(pattern, f"{axis}_colors")
     spacing = _mean(yarns.spacing, getattr(pattern, f"{axis}_spacing"), count)

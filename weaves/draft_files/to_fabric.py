@@ -23,7 +23,6 @@ from weaves.validation import validated
 from weaves.yarn import NARROWEST_YARN
 
 LONG_REPEAT: Final = 128  # threads of a longer repeat are searched for a shorter one, of which the last is not whole
-
 MOST_SOURCE: Final = 2000  # most letters of a fabric's `source`
 
 
@@ -31,8 +30,7 @@ class Imported(NamedTuple):
     """A fabric from a draft file, with what was read and assumed."""
 
     fabric: Fabric
-    read: tuple[str, ...]
-    """Sentences on what the file states."""
+    read: tuple[str, ...]  # sentences on what the file states
     assumed: tuple[str, ...]  # sentences on what it does not state, or what could not be used
 
 

@@ -24,7 +24,6 @@ MOST_USED: Final = MIB
 """Most letters of the sections that are read; others, such as pictures of single programs, are left out before."""
 
 MOST_LINE_LETTERS: Final = 8192  # most letters of a line
-
 MOST_ENTRIES: Final = 16 * MOST_THREADS  # most lines of the sections that are read
 
 Thread = Annotated[int, Field(ge=1, le=MOST_THREADS)]

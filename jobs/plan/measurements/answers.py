@@ -26,10 +26,8 @@ class OfAnswers(Measurement):
     kind: Literal["answers"] = "answers"
     form: EntryForm
     sha256: str
-    fabrics: tuple[tuple[Coloured, Role], ...]
-    """All fabrics, in the order of the questions."""
-    named: int
-    """Number of fabrics that the recipe names, the first ones; the others are random."""
+    fabrics: tuple[tuple[Coloured, Role], ...]  # all fabrics, in the order of the questions
+    named: int  # number of fabrics that the recipe names, the first ones; the others are random
     dataset: HeldOutRows
     errors: ErrorOptions
     file: Place

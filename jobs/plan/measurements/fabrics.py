@@ -15,19 +15,8 @@ from pipeline.models.domain import PHYSICS
 from pipeline.scenes.options import View
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
+from reports import options
 from reports.catalogue import AddedMetric
-from reports.options import (
-    EXTREME_PRECISIONS,
-    EXTREME_TRUTH,
-    LATENT_PAIRS,
-    EdgeOptions,
-    ErrorOptions,
-    FrameOptions,
-    PictureOptions,
-    Role,
-    RunOptions,
-    select,
-)
 from reports.page.content import PictureFile
 from weaves.fabric import Fabric, load_fabric
 
@@ -37,17 +26,14 @@ if TYPE_CHECKING:
 
 
 class _OnHeldOut(Measurement):
-    """A measurement on the held-out queries of a fabric."""
-
     fabric: Coloured
-    role: Role
+    role: options.Role
     dataset: HeldOutRows
-    errors: ErrorOptions
-    """Number of these queries."""
+    errors: options.ErrorOptions  # number of these queries
 
     @classmethod
-    def of(cls, subjects: Subjects, fabric: Fabric, role: Role, **more: Any) -> Self:
-        rows, errors = subjects.held_out(fabric), select(ErrorOptions, subjects.recipe.bench)
+    def of(cls, subjects: Subjects, fabric: Fabric, role: options.Role, **more: Any) -> Self:
+        rows, errors = subjects.held_out(fabric), options.select(options.ErrorOptions, subjects.recipe.bench)
         return cls(fabric=fabric, role=role, dataset=rows, errors=errors, **more)
 
     def held_out(self, out: Path) -> HeldOutFabric:
@@ -60,15 +46,15 @@ class TruthNoise(_OnHeldOut):
 
     kind: Literal["truth noise"] = "truth noise"
     frames: Made
-    frame_options: FrameOptions
+    frame_options: options.FrameOptions
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a fabric."""
-        options = select(FrameOptions, subjects.recipe.bench)
+        chosen = options.select(options.FrameOptions, subjects.recipe.bench)
         for fabric, role in subjects.fabrics:
             (frames,) = TruthFrames.of(fabric, subjects.recipe)
-            yield cls.of(subjects, fabric, role, frames=frames.made, frame_options=options)
+            yield cls.of(subjects, fabric, role, frames=frames.made, frame_options=chosen)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure it."""
@@ -83,16 +69,14 @@ class OnFabric(_OnHeldOut):
 
     kind: Literal["errors"] = "errors"
     model: Trained
-    ways: RunOptions
+    ways: options.RunOptions
     frames: Made
-    frame_options: FrameOptions
+    frame_options: options.FrameOptions
     views: dict[View, Made]
-    picture_options: PictureOptions
-    shown: tuple[str, ...]
-    """Settings that pictures are made of."""
-    edge: Made | None
-    """The truth's edge, where cloth is curved."""
-    edge_options: EdgeOptions | None
+    picture_options: options.PictureOptions
+    shown: tuple[str, ...]  # settings that pictures are made of
+    edge: Made | None  # the truth's edge, where cloth is curved
+    edge_options: options.EdgeOptions | None
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -109,9 +93,9 @@ class OnFabric(_OnHeldOut):
                     model=trained,
                     ways=model.ways(bench),
                     frames=frames.made,
-                    frame_options=select(FrameOptions, bench),
+                    frame_options=options.select(options.FrameOptions, bench),
                     views=views if model.is_first else {},
-                    picture_options=select(PictureOptions, bench),
+                    picture_options=options.select(options.PictureOptions, bench),
                     shown=trained.shown(bench.picture_counts) if model.is_first else (),
                     edge=edges[0].made if edges else None,
                     edge_options=bench.edge if edges else None,
@@ -159,13 +143,12 @@ class OnUnseenPopulation(Measurement):
     """
 
     kind: Literal["errors on random fabrics"] = "errors on random fabrics"
-    role: ClassVar[Role] = "unseen"
+    role: ClassVar[options.Role] = "unseen"
     model: Trained
-    ways: RunOptions
+    ways: options.RunOptions
     fabrics: tuple[Coloured, ...]
     dataset: HeldOutRows
-    errors: ErrorOptions
-    """Number of these queries, each fabric."""
+    errors: options.ErrorOptions  # number of these queries, each fabric
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -177,7 +160,7 @@ class OnUnseenPopulation(Measurement):
                 ways=model.ways(bench),
                 fabrics=fabrics,
                 dataset=subjects.held_out(*fabrics),
-                errors=select(ErrorOptions, bench),
+                errors=options.select(options.ErrorOptions, bench),
             )
 
     @property
@@ -208,8 +191,7 @@ class ErrorsBySize(Measurement):
     kind: Literal["errors by size"] = "errors by size"
     model: Trained
     dataset: HeldOutRows
-    seed: int
-    """Seed of the points of random methods."""
+    seed: int  # seed of the points of random methods
 
     @property
     def cost(self) -> float:
@@ -260,18 +242,16 @@ class AtExtremes(Measurement):
     kind: Literal["extremes"] = "extremes"
     code: ClassVar = ("truth", "extremes")
     model: Trained
-    fabrics: tuple[tuple[Uncoloured, Role], ...]
-    """One fabric of each role."""
-    truth: TruthOptions
-    """The recipe's physics, at a fixed precision."""
+    fabrics: tuple[tuple[Uncoloured, options.Role], ...]  # one fabric of each role
+    truth: TruthOptions  # the recipe's physics, at a fixed precision
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a model and seed, on the first fabric of each role that it answers for."""
         physics = {name: getattr(subjects.recipe.dataset.truth, name) for name in PHYSICS}
-        truth = EXTREME_TRUTH.model_copy(update=physics)
+        truth = options.EXTREME_TRUTH.model_copy(update=physics)
         for model in subjects.models:
-            known: dict[Role, Fabric] = {}
+            known: dict[options.Role, Fabric] = {}
             for fabric, role in subjects.fabrics:
                 if model.on([fabric.name]):
                     known.setdefault(role, fabric)
@@ -292,7 +272,7 @@ class AtExtremes(Measurement):
         fabrics = list(self.fabrics)
         if not self.model.options.of_one_material:
             fabrics.append((lustrous(fabrics[0][0]), "unseen"))
-        precisions = EXTREME_PRECISIONS if self.model.networks else ()
+        precisions = options.EXTREME_PRECISIONS if self.model.networks else ()
         families = [[unchecked(method), *runs(method, precisions)] for method in self.model.methods(out)]
         return measure_extremes(families, fabrics, self.truth)
 
@@ -305,15 +285,14 @@ class Latents(Measurement):
     code: ClassVar = ("truth", "bench")
     seconds: ClassVar = 10.0
     model: Trained
-    presets: tuple[Uncoloured, ...]
-    """Presets of the pairs."""
+    presets: tuple[Uncoloured, ...]  # presets of the pairs
     queries: QueryOptions
     truth: TruthOptions
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a model that blends latents, trained with its first seed."""
-        names = sorted({name for first, second, _ in LATENT_PAIRS for name in (first, second)})
+        names = sorted({name for first, second, _ in options.LATENT_PAIRS for name in (first, second)})
         dataset = subjects.recipe.dataset
         for model in subjects.first_models:
             if subjects.recipe.bench.latents and model.recipe.options.blends:

@@ -29,8 +29,7 @@ class Measurement(Task):
     stage: ClassVar[Stage] = "bench"
     code: ClassVar[tuple[str, ...]] = ("bench",)
     """Its code among `pipeline.versions` and ``bench``, beside that of its models and of their ways to run."""
-    seconds: ClassVar[float] = 1.0
-    """Estimated seconds on one core."""
+    seconds: ClassVar[float] = 1.0  # estimated seconds on one core
     endings: ClassVar[tuple[str, ...]] = ()
     """Of the files of a kind that makes files for others, not Records: pictures of the truth, for example."""
 

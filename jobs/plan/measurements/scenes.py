@@ -31,10 +31,8 @@ class SceneCloth(TaskPart):
     """A cloth of a scene and how it is laid out."""
 
     fabric: Fabric
-    yarns: tuple[float, float]
-    """Yarn spacings in one unit of u and of v."""
-    turn: float
-    """Angle from u to the weft, in degrees."""
+    yarns: tuple[float, float]  # yarn spacings in one unit of u and of v
+    turn: float  # angle from u to the weft, in degrees
 
 
 class _Shot(Measurement):
@@ -44,14 +42,10 @@ class _Shot(Measurement):
     code: ClassVar = ("truth", "fallback", "scenes", "bench", "scene_bench")  # answers of the fallback are stored
     endings: ClassVar = (".npz", ".exr")
     scene: str
-    found: Place
-    """Reference to the scene in the recipe: its name, or a path."""
-    files: tuple[str, ...]
-    """Hashes of its files; none for a scene of the package, which has a version."""
-    cloths: dict[str, SceneCloth]
-    """Cloths by their names in the scene."""
-    step: tuple[float, float, float]
-    """Step of the camera from frame to frame."""
+    found: Place  # reference to the scene in the recipe: its name, or a path
+    files: tuple[str, ...]  # hashes of its files; none for a scene of the package, which has a version
+    cloths: dict[str, SceneCloth]  # cloths by their names in the scene
+    step: tuple[float, float, float]  # step of the camera from frame to frame
     options: ShotOptions
 
     @classmethod
@@ -128,14 +122,11 @@ class _OnShot(Measurement):
     shots: ClassVar[type[_Shot]]
     code: ClassVar = ("fallback", "bench", "scene_bench")
     scene: str
-    shot: Made
-    """Frames of the scene with the truth's answers."""
+    shot: Made  # frames of the scene with the truth's answers
     model: Trained
     options: SceneErrorOptions
-    shown: tuple[str, ...]
-    """Settings that pictures are made of."""
-    extent: tuple[int, int]
-    """Width and height of a frame in pixels."""
+    shown: tuple[str, ...]  # settings that pictures are made of
+    extent: tuple[int, int]  # width and height of a frame in pixels
     frames: int
 
     @classmethod
@@ -206,15 +197,11 @@ class FrameTime(Measurement):
     code: ClassVar = ("fallback", "bench")
     seconds: ClassVar = 10.0
     scene: str
-    shot: Made
-    """Frames of the scene with the truth's answers."""
-    models: tuple[Trained, ...]
-    """The models that answer for its cloths."""
-    footprint: RoundFootprint
-    """Round footprint that replaces an ellipse where a method answers round footprints only."""
+    shot: Made  # frames of the scene with the truth's answers
+    models: tuple[Trained, ...]  # the models that answer for its cloths
+    footprint: RoundFootprint  # round footprint that replaces an ellipse where a method answers round footprints only
     options: RepeatOptions
-    seed: int
-    """Seed of the order of the queries."""
+    seed: int  # seed of the order of the queries
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:

@@ -30,10 +30,8 @@ _EXPORT = 2.5  # seconds in which a network is exported to another runtime and c
 class HeldOutRows(TaskPart):
     """Held-out rows of a data set that a measurement reads."""
 
-    fingerprint: str
-    """Fingerprint of the whole data set."""
-    rows: tuple[str, ...]
-    """Ids of the tasks that make the rows."""
+    fingerprint: str  # fingerprint of the whole data set
+    rows: tuple[str, ...]  # ids of the tasks that make the rows
     folder: Place
 
     @property
@@ -60,10 +58,8 @@ class Trained(TaskPart):
     """A model, and the networks that were trained of it."""
 
     options: ModelOptions
-    networks: tuple[Made, ...] = ()
-    """Its trained networks; none where nothing is trained."""
-    seed: Annotated[int, PLACE] = 0
-    """Seed of their training, which the ids of the networks depend on."""
+    networks: tuple[Made, ...] = ()  # its trained networks; none where nothing is trained
+    seed: Annotated[int, PLACE] = 0  # seed of their training, which the ids of the networks depend on
 
     @property
     def title(self) -> str:

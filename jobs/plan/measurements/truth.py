@@ -52,12 +52,10 @@ class TruthPicture(_OfFabric):
 
     kind: Literal["truth picture"] = "truth picture"
     scene: View
-    extent: tuple[int, int]
-    """Width and height in pixels."""
+    extent: tuple[int, int]  # width and height in pixels
     view: ViewOptions
     truth: TruthOptions
-    seed: int
-    """Seed of the truth's points."""
+    seed: int  # seed of the truth's points
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:
@@ -81,14 +79,8 @@ class TruthPicture(_OfFabric):
         """Render it."""
         from reports.measure.pictures import render_truth
 
-        options = PictureOptions(
-            views=(self.scene,),
-            sphere_size=self.extent,
-            plane_size=self.extent,
-            view=self.view,
-            truth=self.truth,
-            seed=self.seed,
-        )
+        sizes = {"sphere_size": self.extent, "plane_size": self.extent}
+        options = PictureOptions(views=(self.scene,), view=self.view, truth=self.truth, seed=self.seed, **sizes)
         render_truth(self.fabric, self.scene, options, out / self.products[0])
 
 
@@ -145,8 +137,7 @@ class LivePage(_OfFabric):
 
     kind: Literal["live page"] = "live page"
     endings: ClassVar = (".html",)
-    pixels: int
-    """Along each side of the pictures of the truth and of other methods."""
+    pixels: int  # along each side of the pictures of the truth and of other methods
 
     @classmethod
     def of(cls, fabric: Fabric, recipe: Recipe) -> list[Self]:

@@ -33,9 +33,7 @@ from weaves.draft_files.write import wif_text
 from weaves.errors import BadInput
 
 _TEXELS: Final = 16  # of a map of the geometry, across a yarn
-
 _LISTING: Final = "questions.json"  # lists the fabrics, and all files with their hashes
-
 _TEMPLATE: Final = Path(__file__).with_name("questions.md")
 
 
@@ -94,7 +92,6 @@ def _about(recipe: Recipe) -> dict[str, Any]:
 
 
 def _readme(recipe: Recipe, count: int) -> str:
-    """Return what an entrant reads."""
     columns = [(f"`{field.name}`", field.metadata[b"meaning"].decode()) for field in QUESTION_COLUMNS]
     fabrics = [
         (f"`{fabric.name}`", role, f"{fabric.weave.name}, {' × '.join(map(str, fabric.weave.repeat))}")

@@ -81,7 +81,6 @@ def licence_id(given: str | None) -> str:
 
 
 def _licence_url(licence: str) -> str:
-    """Return the address of a licence's text."""
     return f"https://spdx.org/licenses/{licence}.html"
 
 

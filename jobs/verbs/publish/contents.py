@@ -17,12 +17,9 @@ from cyclopts import Parameter
 from pipeline.shards.manifest import Manifest, Role, ShardEntry
 from weaves.errors import BadInput
 
-MOST_FILES: Final = 90
-"""Most Parquet files, if each role and split has one at least."""
-
+MOST_FILES: Final = 90  # most Parquet files, if each role and split has one at least
 ROLES: Final[tuple[Role, ...]] = ("seen", "population", "unseen", "unseen_population")
-POPULATIONS: Final[tuple[Role, ...]] = ("population", "unseen_population")
-"""Roles of random fabrics."""
+POPULATIONS: Final[tuple[Role, ...]] = ("population", "unseen_population")  # roles of random fabrics
 _SPLITS: Final = ("train", "validation", "test")
 _AUTHORS: Final = ("The Twillight authors",)
 _FORMS: Final = {
@@ -40,10 +37,8 @@ class PublishedPart(NamedTuple):
     file: str
     role: Role
     split: str
-    fabrics: tuple[str, ...]
-    """Names of its fabrics, in the order of their rows."""
-    shards: tuple[ShardEntry, ...]
-    """Its shards, in the order of their rows."""
+    fabrics: tuple[str, ...]  # names of its fabrics, in the order of their rows
+    shards: tuple[ShardEntry, ...]  # its shards, in the order of their rows
 
     @property
     def rows(self) -> int:
@@ -155,11 +150,9 @@ class About(NamedTuple):
 
     manifest: Manifest
     parts: list[PublishedPart]
-    licence: str
-    """SPDX identifier."""
+    licence: str  # SPDX identifier
     citation: Citation
-    truth_version: int
-    """Version of the ground truth that answered the rows; 0 if the shards do not name it."""
+    truth_version: int  # version of the ground truth that answered the rows; 0 if the shards do not name it
 
     @property
     def id(self) -> str:

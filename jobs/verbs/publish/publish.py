@@ -9,28 +9,35 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Final
 
+import tomli_w
 from cyclopts import Parameter
 from filelock import FileLock, Timeout
 
+from jobs.plan.dataset import DataSet
+from jobs.recipe.load import load_recipe
 from jobs.terminal import print_lines, size, tracked
 from jobs.verbs.parameters import Local
 from jobs.verbs.publish.card import LOADER, card, citation_file, croissant, licence_id
-from jobs.verbs.publish.contents import About, Citation, PublishedPart, own_shards, parts_of
-from jobs.verbs.publish.recipe import recipe_files
+from jobs.verbs.publish.contents import POPULATIONS, About, Citation, PublishedPart, own_shards, parts_of
 from pipeline.atomic import atomic_write
 from pipeline.fingerprint import file_sha256, fingerprint
 from pipeline.shards.check import check_shard
+from pipeline.shards.generate import ShardTask
 from pipeline.shards.manifest import FILE as MANIFEST
 from pipeline.shards.manifest import Manifest, Published, PublishedFile
 from pipeline.shards.pieces import join_shards
 from pipeline.shards.store import read_about
-from weaves.errors import BadInput, WorkFailed
+from weaves.errors import BadInput, WorkFailed, brief
 
 _DEFAULT_TITLE: Final = "ground truth of the appearance of woven cloth"
 _LOCK: Final = ".lock"
 _UNCITED: Final = Citation()
+_RECIPE: Final = "recipe.toml"
+_MODELS: Final = ((), ("neumip",), ("curved",), ("point_sampled",))
+"""Models whose presence decides which splits a recipe has: those of one material need rows of unseen fabrics."""
 
 
 def publish(
@@ -50,7 +57,7 @@ def publish(
     target = _free(to, dataset)
     manifest = Manifest.load(dataset)
     _refuse_unfinished(dataset, manifest)
-    recipe, first = recipe_files(manifest, dataset), own_shards(manifest)[0]
+    recipe, first = _recipe_files(manifest, dataset), own_shards(manifest)[0]
     truth = int(read_about(dataset / first.file).get("task", {}).get("version", 0))
     citation = replace(citation, title=citation.title or f"Twillight {manifest.name}: {_DEFAULT_TITLE}")
     about = About(manifest, parts_of(manifest), identifier, citation, truth)
@@ -167,3 +174,57 @@ def _remove_others(staging: Path, wanted: set[str]) -> None:
                 path.rmdir()
         elif str(path.relative_to(staging)) not in wanted:
             path.unlink()
+
+
+def _recipe_files(manifest: Manifest, folder: Path) -> dict[str, str]:
+    """Return the recipe that generates a data set and the files of its fabrics, by their paths.
+
+    `folder` is that of the data set, for messages. BadInput if no recipe of this version has its rows.
+    """
+    fabrics = _fabric_files(manifest)
+    present = {(shard.fabric, shard.split, shard.start, shard.rows) for shard in own_shards(manifest)}
+    with TemporaryDirectory(prefix="twillight-") as name:
+        for path, text in fabrics.items():
+            atomic_write(Path(name) / path, text.encode(), durable=False)
+        for models in _MODELS:
+            text = _recipe(manifest, models)
+            atomic_write(Path(name) / _RECIPE, text.encode(), durable=False)
+            try:
+                planned = DataSet(load_recipe(Path(name) / _RECIPE)).shards
+            except BadInput as error:
+                if models:  # which do not know these queries
+                    continue
+                key = f"{error.key} = {brief(error.value)}" if error.key else "its fabrics"
+                raise BadInput(str(folder), "", f"is of another version ({key})", "generate it again") from error
+            parts = [part.shard for part in planned if isinstance(part.shard, ShardTask)]
+            if {(part.fabric.name, part.split, part.start, part.rows) for part in parts} == present:
+                return {**fabrics, _RECIPE: text}
+    raise BadInput(str(folder), "", "its rows are not those of a recipe of this version", "generate it again")
+
+
+def _fabric_files(manifest: Manifest) -> dict[str, str]:
+    files = {f"fabrics/{name}.toml": manifest.fabrics[name].to_toml() for name in manifest.names("seen", "unseen")}
+    for role in POPULATIONS:
+        if population := manifest.names(role):
+            tables = {name: manifest.fabrics[name].model_dump(mode="json", exclude_none=True) for name in population}
+            files[f"{role}.toml"] = tomli_w.dumps(tables)
+    return files
+
+
+def _recipe(manifest: Manifest, models: Sequence[str]) -> str:
+    """Return a recipe for the data set, with models that decide which splits it has."""
+    named = {role: [f"fabrics/{name}.toml" for name in manifest.names(role)] for role in ("seen", "unseen")}
+    recipe = {
+        "name": manifest.name,
+        "about": "Generates the rows of this data set.",
+        "dataset": _without_none(manifest.about) | named,
+        "models": [{"model": model} for model in models],
+    }
+    return tomli_w.dumps(recipe)
+
+
+def _without_none(value: Any) -> Any:
+    """Return tables without the keys that have no value: TOML has none."""
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list) else value
