@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[1]
 # Processes that tests start, also those in copies of the tree, read the kernels that this tree has compiled.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / "pipeline" / "compiled" / "__pycache__"))
 
-# Examples depend on the test alone: what passes once passes again.
-settings.register_profile("fixed", derandomize=True)
+# Examples depend on the test alone, on no load: what passes once passes again.
+settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.load_profile("fixed")
 
 STARTED = {"cpp", "programs", "webgl", "llvm", "switch"}

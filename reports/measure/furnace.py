@@ -32,6 +32,7 @@ DIRECTIONS: Final = 256
 """Directions of light for each patch: an integral of a highlight of alpha = .1 is good to about 1 %."""
 
 _AZIMUTHS = (0.4, 2.1)
+_PLACES = 4
 
 
 def furnace_queries(repeat: tuple[int, int]) -> Queries:
@@ -41,7 +42,7 @@ def furnace_queries(repeat: tuple[int, int]) -> Queries:
     z = np.maximum(z, 1e-3)
     sine, turn = np.sqrt(1.0 - z * z), 2.0 * math.pi * turn
     wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1)
-    places = np.random.default_rng(0).random((4, 2)) * repeat
+    places = np.random.default_rng(0).random((_PLACES, 2)) * repeat
     patches = list(itertools.product(places.tolist(), _FOOTPRINTS, _ANGLES, _AZIMUTHS))
     centre = np.array([[*place, sigma] for place, sigma, _, _ in patches])
     theta, phi = np.radians([p[2] for p in patches]), np.array([p[3] for p in patches])

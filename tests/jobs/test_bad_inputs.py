@@ -379,7 +379,7 @@ WHOLE |= {"described scene": ["cloths", "cloths.denim"]}
 
 
 @pytest.mark.parametrize("subject", WHOLE)
-@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data(), values)
 def test_a_file_with_any_value_at_any_key_is_read_or_one_sentence(place, subject, data, value):
     base, read = BASES[subject]
@@ -414,7 +414,7 @@ READERS = {
 
 
 @pytest.mark.parametrize("subject", [slow(subject) if subject == "method" else subject for subject in READERS])
-@settings(deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 8), st.binary(max_size=8)), min_size=1, max_size=4))
 def test_a_file_with_any_other_bytes_is_read_or_one_sentence(place, subject, changes):
     file, read = READERS[subject]

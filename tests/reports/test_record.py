@@ -2,7 +2,7 @@ import json
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -41,7 +41,6 @@ def written(tmp_path_factory):
     return path, {file: file.read_bytes() for file in (path, machine_path(path))}
 
 
-@settings(deadline=None)
 @given(st.data())
 def test_every_flip_of_records_or_of_their_machine_is_refused(written, data):
     path, files = written

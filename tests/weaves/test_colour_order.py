@@ -24,7 +24,7 @@ def test_threads_have_their_own_colours_and_a_fabric_without_an_order_no_such_ke
     assert hash(coloured(picks=[["navy", 1]])) == hash(coloured(picks=[["navy", 1]])) != hash(denim)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.lists(st.tuples(st.sampled_from(["white", "navy"]), st.integers(1, 5)), min_size=1, max_size=6))
 def test_a_sequence_repeats_after_its_smallest_repeat(runs):
     order = ColourOrder.model_validate({"palette": PALETTE, "ends": runs})

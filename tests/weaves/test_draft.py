@@ -2,7 +2,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from pydantic import ValidationError
@@ -42,7 +42,6 @@ def test_floats_agree_with_a_walk_and_the_loom_weaves_the_drawing_with_as_few_sh
     )
 
 
-@settings(deadline=None)
 @given(hnp.arrays(np.bool_, hnp.array_shapes(min_dims=2, max_dims=2, max_side=4)))
 def test_cloth_hangs_together_unless_some_yarns_lie_on_all_others(matrix):
     """By the definition: every choice of yarns is tried."""
@@ -78,7 +77,6 @@ def test_drawing_has_pick_0_at_the_bottom_and_drafts_are_read_only_copies_that_s
     assert pickle.loads(pickle.dumps(draft)) == draft and hash(pickle.loads(pickle.dumps(draft))) == hash(draft)
 
 
-@settings(deadline=None)
 @given(matrices, st.integers(-9, 9), st.integers(-9, 9), st.integers(1, 2), st.integers(1, 2))
 def test_canonical_form_ignores_shift_mirror_and_repetition(matrix, ends, picks, times_x, times_y):
     draft = Draft(matrix)

@@ -77,7 +77,7 @@ def test_a_share_of_solid_cloth_changes_nothing_but_widths():
         assert b.model_copy(update=dict(zip(("warp", "weft"), same, strict=True))) == a
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seed=SEEDS)
 def test_irregular_cloth_hangs_together_and_has_short_floats(seed):
     for fabric in population_fabrics(Population(count=2, seed=seed, families=("irregular",))):
@@ -89,7 +89,7 @@ def test_irregular_cloth_hangs_together_and_has_short_floats(seed):
         assert max(floats.top_length.max(), floats.under_length.max()) <= 4 and fabric.weave.hangs_together()
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS, other=SEEDS)
 def test_drafts_for_unseen_cloth_are_in_no_population_of_the_default_families(seed, other):
     """Also with shifts and mirror images: `canonical` is equal for them."""

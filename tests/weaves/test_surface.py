@@ -147,7 +147,7 @@ def test_height_is_exact_for_any_bend(bend):
 TIMES, STEPS = st.integers(-1000, 1000), st.integers(0, 2**16)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.sampled_from(sorted(CLOTHS)), st.tuples(TIMES, TIMES), st.tuples(STEPS, STEPS))
 def test_translation_by_repeats_changes_nothing(name, times, steps):
     """Positions are multiples of 2^-13, which stay exact under the translation: equal to the last bit."""

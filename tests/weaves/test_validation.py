@@ -85,13 +85,13 @@ def test_other_models_complain_in_the_same_words():
         assert words in refusal(validated, Population, table, "random.toml")
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.dictionaries(words, trees, max_size=5))
 def test_any_table_is_a_fabric_or_one_sentence(tree):
     accepted(validated, Fabric, tree, "cloth.toml")
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.sampled_from([None, "warp", "draft", "weft"]), words, trees)
 def test_any_single_change_of_a_good_fabric_is_a_fabric_or_one_sentence(table, key, tree):
     changed = {**GOOD, key: tree} if table is None else {**GOOD, table: {**GOOD[table], key: tree}}
@@ -99,7 +99,7 @@ def test_any_single_change_of_a_good_fabric_is_a_fabric_or_one_sentence(table, k
         assert fabric.weave.repeat
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.one_of(st.text(), st.text(alphabet='ab=[]{}".#\n0123456789', max_size=60)))
 def test_any_text_is_toml_or_one_sentence(tmp_path_factory, text):
     path = tmp_path_factory.mktemp("any") / "cloth.toml"
@@ -107,7 +107,6 @@ def test_any_text_is_toml_or_one_sentence(tmp_path_factory, text):
     accepted(read_toml, path)
 
 
-@settings(deadline=None)
 @given(st.text())
 def test_any_name_is_a_preset_or_one_sentence(name):
     if fabric := accepted(load_fabric, name):

@@ -34,7 +34,7 @@ def plans(draw):
 
 
 @given(plans(), st.integers(1, 3), st.randoms(use_true_random=False))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_tasks_start_as_if_all_were_sorted_at_every_end(drawn, slots, random):
     tasks, done = drawn
     todo = [task for task in tasks if task.id not in done]

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jobs.run.ledger import NEVER_MADE, Ledger, reasons
@@ -99,7 +99,6 @@ def test_a_receipt_says_in_short_what_its_task_depended_on(done):
     assert [receipt.task for receipt in done.receipts([task.id for task in tasks])] == [TASK.id]
 
 
-@settings(deadline=None)
 @given(st.data())
 def test_every_flipped_byte_of_a_receipt_is_found(data):
     files = {"y": Product(sha256="ab" * 32, bytes=12)}

@@ -110,7 +110,7 @@ def test_footprints_and_bent_cloth_are_known_as_far_as_training_saw_them():
         assert domain.out_of_domain(DENIM, strange).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(sigma=st.floats(0.01, 100.0), high=st.floats(0.2, 16.0))
 def test_what_is_asked_lies_within_what_was_taught(sigma, high):
     """Whatever is not strange is asked at most 2 % of the range's logarithm beyond it; nothing else is changed."""
@@ -123,7 +123,7 @@ def test_what_is_asked_lies_within_what_was_taught(sigma, high):
         assert asked is queries
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     low=st.floats(0.05, 1.0),
     factor=st.floats(1.0, 20.0),

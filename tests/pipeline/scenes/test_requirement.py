@@ -15,7 +15,7 @@ def required(options, count=4000, margin=1.25):
     return Requirement.of("made up", 2, asked, EDGES, NAMES, margin)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     low=st.floats(0.05, 1.0),
     factor=st.floats(1.5, 20.0),

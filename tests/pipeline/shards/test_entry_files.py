@@ -14,7 +14,7 @@ COUNT = 40
 RIGHT = np.random.default_rng(0).random((COUNT, 4)).astype(np.float32)
 ENDINGS = (".csv", ".parquet")
 
-bounded = settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+bounded = settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def columns(names=COMPONENTS):

@@ -13,7 +13,7 @@ LEVEL = 1e-4
 SHAPED = QueryOptions(behind=0.3, stretch=8.0, curvature=(0.01, 0.5))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(start=st.integers(0, 10**9), count=st.integers(1, 50), seed=st.integers(0, 2**64 - 1))
 def test_a_row_does_not_depend_on_its_neighbours(start, count, seed):
     for options in (QueryOptions(), SHAPED):

@@ -239,7 +239,7 @@ def test_a_fiberworks_file_by_hand_and_a_weavepoint_file_without_yarns_per_inch(
 small = st.sampled_from([name for name in VALID if SAMPLES[name].stat().st_size < 20_000])
 
 
-@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(small, st.data())
 def test_a_damaged_file_is_a_draft_or_one_sentence(read, name, data):
     content = bytearray(SAMPLES[name].read_bytes())
@@ -252,7 +252,7 @@ def test_a_damaged_file_is_a_draft_or_one_sentence(read, name, data):
 words = st.sampled_from(["[WIF]", "[WARP]", "[TIEUP]", *"=1,%;\n[] \0", "color", "nan"])
 
 
-@settings(deadline=None, max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(words, max_size=60), st.sampled_from([".wif", ".dtx"]))
 @example(["[WIF]", "\n", "[WARP]", "\n", "color", "=", ","], ".wif")
 def test_any_words_are_a_draft_or_one_sentence(read, pieces, suffix):
