@@ -122,17 +122,17 @@ def test_radiance_and_pywincalc_read_the_same_numbers(basis, tmp_path, monkeypat
         return subprocess.run(command, env=environment, check=True, capture_output=True, text=text, **options).stdout
 
     if basis == KLEMS_FULL:
-        hemisphere = pywincalc.BSDFHemisphere.create(pywincalc.BSDFBasisType.KLEMS_FULL)
+        hemisphere = pywincalc.BSDFHemisphere.create(pywincalc.BSDFBasisType.FULL)
         about = {"environment": pywincalc.nfrc_shgc_environments(), "bsdf_hemisphere": hemisphere}
         layers = [pywincalc.parse_bsdf_xml_file("layer.xml")]
         system = pywincalc.GlazingSystem(solid_layers=layers, width_meters=1, height_meters=1, **about)
         front = system.optical_method_results("PHOTOPIC").system_results.front
         shares = front.reflectance.direct_hemispherical, front.transmittance.direct_hemispherical
         assert shares == pytest.approx(layer.hemispherical("visible")[:, 0, 0], rel=1e-4)
-    else:  # Radiance makes Klems patches of it by samples
+    else:  # Radiance makes Klems patches of it by random samples, too few of them for light that goes straight through
         Path("klems.xml").write_text(program("bsdf2klems", "layer.xml"))
-        converted, read = (read_bsdf(Path(name)).bands["visible"] for name in ("klems.xml", "layer.xml"))
-        assert np.abs(converted - read).mean() < 0.02 * read.mean()
+        converted, read = (read_bsdf(Path(name)).bands["visible"][0] for name in ("klems.xml", "layer.xml"))
+        assert np.abs(converted - read).mean() < 0.002 * read.mean()
     errors = [line.split()[-1] for line in program("checkBSDF", "layer.xml").splitlines()[-3:]]
     assert [float(error) for error in errors] == [0.0, 0.0, 0.0]
     # Radiance sees the room from +z, so the fabric is turned around y.
