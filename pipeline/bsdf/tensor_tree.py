@@ -162,9 +162,7 @@ def _parsed(where: str, text: str) -> list[Any]:
             try:
                 stack[-1].append(float(token))
             except ValueError as error:
-                raise BadInput(
-                    where, "ScatteringData", one_line(error, 60), "numbers in matching braces are needed"
-                ) from error
+                raise BadInput(where, "ScatteringData", one_line(error, 60), "numbers are needed") from error
     if len(stack) != 1 or len(stack[0]) != 1 or not isinstance(stack[0][0], list):
         raise BadInput(where, "ScatteringData", "braces without a match", "one tree in braces is needed")
     return stack[0][0]
@@ -177,6 +175,8 @@ def _dense(where: str, node: list[Any], rank: int, level: int) -> Float64:
         own = round(len(node) ** (1.0 / rank)) if node else 0
         if not node or own**rank != len(node) or own & (own - 1):
             raise BadInput(where, "values of a grid", len(node), f"a power of {2**rank} is needed")
+        if not np.isfinite(node).all():
+            raise BadInput(where, "ScatteringData", "not a finite number", "finite numbers are needed")
         grid = np.array(node).reshape((own,) * rank)
         for axis in range(rank):
             grid = np.repeat(grid, max(side // own, 1), axis)

@@ -95,6 +95,7 @@ def test_klems_patches_have_the_light_of_a_tree():
         ("{{1}", "braces without a match"),
         ("1", "braces without a match"),
         ("{}", "values of a grid = 0"),
+        ("{nan}", "not a finite number"),
         ("{x}", "could not convert string to float: 'x'"),
     ],
 )

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.truth.footprint.mixture import COARSE_LINE, FINE_LINE, axes, deviations, line_points, narrow_axis
@@ -17,7 +17,6 @@ def points(correlation, line):
     return places[:count].astype(np.float64), shares[:count].astype(np.float64)
 
 
-@settings(deadline=None)  # the first example compiles
 @given(major=st.floats(1e-2, 1e2), ratio=st.floats(1.0, 50.0), angle=st.floats(-math.pi, math.pi), swap=st.booleans())
 def test_deviations_and_correlation_are_those_of_the_turned_covariance(major, ratio, angle, swap):
     sides = (major / ratio, major) if swap else (major, major / ratio)
