@@ -17,7 +17,7 @@ TRAINING: Final = 4  # the training loop and the files that it writes
 MODELS: Final[dict[str, int]] = {"curved": 2, "point_sampled": 6, "prefiltered": 2, "selvage": 10, "soft_nodes": 9}
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
-BOUND: Final = 2  # how the energy bound changes the answers of a network (`pipeline.models.bounded`)
+BOUND: Final = 3  # how the energy bound changes the answers of a network (`pipeline.models.bounded`)
 
 FALLBACK: Final = 10
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""

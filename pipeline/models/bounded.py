@@ -57,20 +57,25 @@ class Bounded(Around):
         bounds = row_by_row(
             queries,
             queries.wi[:, 2] < 0.0,
-            lambda part: in_chunks(part, partial(read_behind, _with_open_back(table)), 5)[:, :4],
+            lambda part: _read_behind(table, part)[:, :4],
             lambda part: in_chunks(part, lambda rows: read_queries(table, rows).bounds),
         )
         return limited(result, bounds)
+
+    def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
+        """Return the transparency of N footprints by the soft nodes, float32 (N,); another one could exceed the bound."""
+        return _read_behind(self._tables.of(fabric), looks._replace(wi=-looks.wo))[:, 4]
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the method's bytes and those of the table."""
         return self.method.bytes_stored(fabric) + nbytes(self._tables.of(fabric))
 
 
-def _with_open_back(table: SoftNodeTable) -> SoftNodeTable:
-    """Return a table of the front with which `read_behind` answers without shadows of the light."""
+def _read_behind(table: SoftNodeTable, queries: Queries) -> Float32:
+    """Return what a table of the front answers from behind without shadows of the light, as `read_behind` does."""
     low = np.full_like(table.mean, _BELOW)
-    return table._replace(behind_mean=low, behind_sharpness=table.sharpness, behind_grid=np.zeros_like(table.grid))
+    open_back = {"behind_mean": low, "behind_sharpness": table.sharpness, "behind_grid": np.zeros_like(table.grid)}
+    return in_chunks(queries, partial(read_behind, table._replace(**open_back)), 5)
 
 
 def limited(components: Float32, bounds: Float32) -> Float32:

@@ -105,7 +105,8 @@ def bounded(fabric, queries):
     bright = FakeMethod(lambda asked: np.full((len(asked.u), 4), 1e3, np.float32))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(nodes, "_GRID_BYTES", 1 << 17)  # as in `methods.soft_table`
-        return Bounded(bright).predict(fabric, queries), points(fabric, queries)[1]
+        method = Bounded(bright)
+        return method.predict(fabric, queries), float(method.transparency(fabric, queries.take(slice(1)))[0])
 
 
 def _by_rows(queries, *parts):
