@@ -63,7 +63,7 @@ class Bounded(Around):
         return limited(result, bounds)
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
-        """Return the transparency of N footprints by the soft nodes, float32 (N,); another one could exceed the bound."""
+        """Return the transparency of N footprints by the soft nodes, float32 (N,); any other could exceed the bound."""
         return _read_behind(self._tables.of(fabric), looks._replace(wi=-looks.wo))[:, 4]
 
     def bytes_stored(self, fabric: Fabric) -> int:
