@@ -74,8 +74,8 @@ class Bounded(Around):
 def _read_behind(table: SoftNodeTable, queries: Queries) -> Float32:
     """Return what a table of the front answers from behind without shadows of the light, as `read_behind` does."""
     low = np.full_like(table.mean, _BELOW)
-    open_back = {"behind_mean": low, "behind_sharpness": table.sharpness, "behind_grid": np.zeros_like(table.grid)}
-    return in_chunks(queries, partial(read_behind, table._replace(**open_back)), 5)
+    open_back = table._replace(behind_mean=low, behind_sharpness=table.sharpness, behind_grid=np.zeros_like(table.grid))
+    return in_chunks(queries, partial(read_behind, open_back), 5)
 
 
 def limited(components: Float32, bounds: Float32) -> Float32:
