@@ -17,7 +17,6 @@ ROOT = Path(__file__).parents[1]
         ("fits/fit_calibration.py --fabrics 1 --rows 4 --estimator node_table", "transparency, QUADRATURE_CURVED: too"),
         ("fits/fit_node_table_error.py --fabrics 1 --queries 4 --points 256", "SMOOTH: fitted"),
         ("fits/fit_quadrature.py --rows 1", "SAFETY: fitted"),
-        ("fits/fit_soft_nodes.py --fabrics 1 --queries 4 --constant EVEN", "EVEN (soft_nodes/nodes.py): x 0.67"),
         ("fits/fit_selvage_errors.py --presets denim --random 0 --rows 32", "case 3: errors"),
         ("scale/measure_driver.py --tasks 3", "| 3 |"),
         ("scale/measure_requests.py --tasks 3", "| resume | 11 |"),
