@@ -19,7 +19,6 @@ ROOT = Path(__file__).parents[1]
         ("fits/fit_quadrature.py --rows 1", "SAFETY: fitted"),
         ("fits/fit_selvage_errors.py --presets denim --random 0 --rows 32", "case 3: errors"),
         ("scale/measure_driver.py --tasks 3", "| 3 |"),
-        ("scale/measure_requests.py --tasks 3", "| resume | 11 |"),
         ("scale/measure_rows.py --rows 1000", "| 1,000 | read |"),
     ],
     ids=lambda words: words.split()[0],
