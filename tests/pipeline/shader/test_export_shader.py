@@ -10,7 +10,6 @@ import pytest
 from pipeline.analytic.soft_horizons import AZIMUTHS
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.seen_areas import SEEN_ANGLES
-from pipeline.shader import languages
 from pipeline.shader.descriptor import Buffer, Descriptor, Networks, PlacedLayer
 from pipeline.shader.languages import LANGUAGES
 from pipeline.truth.conventions import COMPONENTS
@@ -52,12 +51,6 @@ def test_tables_are_those_of_the_fabric(exported):
     assert (horizons[:, 0] == table.mean[:, block, lane]).all()
     assert (horizons[:, 1] == table.sharpness[:, block, lane]).all()
     assert (node[20:].reshape(SEEN_ANGLES, AZIMUTHS) == table.areas[..., block, lane].T).all()
-
-
-def test_slangc_of_the_search_path_is_found(monkeypatch):
-    monkeypatch.setattr(languages, "find_spec", lambda name: None)
-    monkeypatch.setattr(shutil, "which", lambda name: f"/opt/{name}")
-    assert str(languages.slangc()) == "/opt/slangc"
 
 
 @pytest.mark.external

@@ -5,7 +5,7 @@ import pytest
 
 from reports.measure.memory import UNSURE, peak_memory
 
-SIZE = 128 * 2**20
+SIZE = 48 * 2**20
 SCRIPT = f"""
 import numpy as np
 from reports.measure.memory import peak_memory
