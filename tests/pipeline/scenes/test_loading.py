@@ -134,7 +134,7 @@ def test_a_toml_scene_names_its_file_cloths_and_way(tmp_path):
 def test_unknown_scenes_and_cloths_are_named(tmp_path):
     assert "did you mean 'drape'?" in refusal(load_scene, "drappe")
     assert "no such file" in refusal(load_scene, tmp_path / "no.toml")
-    assert "does not exist" in refusal(load, load_scene(tmp_path / "no.xml"), OPTIONS)
+    assert "does not exist" in refusal(load_scene, tmp_path / "no.xml")
     path = written(tmp_path, BALL + SUN + CAMERA)
     scene = Scene(name="a", source=path, cloths={"denim": Cloth(), "voile": Cloth()})
     assert "cloths.voile" in refusal(load, scene, OPTIONS)

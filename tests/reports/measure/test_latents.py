@@ -12,7 +12,7 @@ from reports.measure.latents import SHARES, between, measure_edits, measure_path
 from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import Fabric, load_fabric
 
-TRUTH = TruthOptions(estimator="quadrature", parallax=False, relative_error=0.1)
+TRUTH = TruthOptions(estimator="node_table")
 ASKED = QueryOptions(sigma=(0.3, 1.0), max_angle=60.0)
 
 
