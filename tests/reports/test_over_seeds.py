@@ -67,17 +67,3 @@ def test_a_table_is_that_of_means_with_ranges_and_nonlinear_numbers_have_means_o
     # A second training of which something else is known gives no range.
     known = ratios([*RECORDS, trained("b", 1, metric="extreme_error")]).set_index("method")
     assert math.isnan(known["ratio_most"]["b"]) and known["ratio_most"]["a"] == pytest.approx(0.1)
-    # The worst of two fabrics is 5 in either training; that of the mean errors would be 3.
-    errors = {("denim", 0): 5.0, ("denim", 1): 1.0, ("basket", 0): 1.0, ("basket", 1): 5.0}
-    records = [trained("a", seed, fabric=fabric, value=value) for (fabric, seed), value in errors.items()]
-    table = worst([*records, Record(method="points", fabric="denim", value=0.5)]).set_index("method")
-    assert table.loc["a", ["worst", "worst_least", "worst_most"]].tolist() == [5.0, 5.0, 5.0]
-    assert table["worst"]["points"] == 0.5
-
-
-@over_seeds(["method", "setting"], ["worst"], {"worst": max})
-def worst(records):
-    """The largest value of each method over fabrics."""
-    values = {one.method: [r.value for r in records if r.method == one.method] for one in records}
-    lines = [(method, "", max(found)) for method, found in values.items()]
-    return pd.DataFrame(lines, columns=["method", "setting", "worst"])

@@ -99,8 +99,6 @@ def test_a_bounce_widens_the_footprint_and_a_rare_direction_no_more_than_an_even
         wanted = math.hypot(PIXEL * 0.06, widened) / 2.0
         found = Footprints.of(jacobian(met))
         np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=1e-3)
-    import drjit as dr
-
     cone = _Cone(scalar, dr)
     cone.meet(scalar.RayDifferential3f(), dr.zeros(scalar.SurfaceInteraction3f))
     cone.scatter(1e-9, False)
@@ -152,16 +150,6 @@ def test_a_scene_without_cloth_is_that_of_before_while_cloth_is_in_memory(llvm, 
     after = np.asarray(llvm.render(scene, integrator=path(llvm, kind)))
     assert kept is not None and before.mean() > 0.01
     np.testing.assert_allclose(after, before, rtol=1e-5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["denim", "gauze"])
-def test_cloth_in_an_even_sky_makes_no_light(mi, name):
-    """Radiance is at most that of the sky: scattered light below 1, and what comes through gaps adds up to it."""
-    cloth = {**floor(mi, 0.8), "bsdf": {"type": "twillight", "fabric": name, "yarns": 10.0}}
-    scene = mi.load_dict({"type": "scene", "cloth": cloth, "sky": {"type": "constant"}, "sensor": sensor(mi, 4, 8)})
-    seen = np.asarray(mi.render(scene, integrator=path(mi, max_depth=3), spp=8))[..., :3].mean()
-    assert 0.1 < seen < 1.0
 
 
 @pytest.mark.parametrize(("uv", "words"), [(False, "needs uv coordinates"), (True, "needs vertex normals")])

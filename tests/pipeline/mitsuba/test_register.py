@@ -1,5 +1,4 @@
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -11,9 +10,9 @@ from pipeline.mitsuba.worn import PIXEL
 from pipeline.models.named import named_method
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
-from pipeline.scenes.picture import picture
 from pipeline.scenes.shipped import SHIPPED
 from tests.pipeline.mitsuba.conftest import NEEDS_LLVM
+from tests.pipeline.scenes.test_picture import whole
 from tests.presets import slow
 from tests.refusals import refusal
 
@@ -35,12 +34,7 @@ def sunlit(name, variant, sky=False):
 
 
 def own_picture(loaded, size):
-    result = np.empty((*size[::-1], 3))
-    with ThreadPoolExecutor(1) as pool:
-        for part in picture(loaded, named_method(METHOD, "test", "method"), pool, size):
-            left, top, width, height = part.window
-            result[top : top + height, left : left + width] = part.planes["rgb"]
-    return result
+    return whole(loaded, named_method(METHOD, "test", "method"), size=size)[0]["rgb"]
 
 
 def traced(loaded, size, samples=1, seed=0, depth=2):

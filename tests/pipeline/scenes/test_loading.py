@@ -13,7 +13,7 @@ from pipeline.scenes.frame import render
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.scene import Cloth, Scene
-from weaves.errors import BadInput
+from tests.refusals import refusal
 
 ROOT = Path(__file__).parents[3]
 OPTIONS = SceneOptions(variant="scalar_rgb", environment_directions=4, environment_samples=1)
@@ -85,17 +85,9 @@ def written(folder, body):
     return path
 
 
-def refused(call):
-    with pytest.raises(BadInput) as caught:
-        call()
-    sentence = str(caught.value)
-    assert "\n" not in sentence and len(sentence) < 400
-    return sentence
-
-
 @pytest.mark.parametrize("body", BROKEN, ids=range(len(BROKEN)))
 def test_every_fault_is_one_sentence(body, tmp_path):
-    sentence = refused(lambda: load(load_scene(written(tmp_path, body)), OPTIONS))
+    sentence = refusal(lambda: load(load_scene(written(tmp_path, body)), OPTIONS))
     named = next((name for name in ("a.ply", "b.ply", "a.serialized") if name in body), "scene.xml")
     assert BROKEN[body] in sentence and named in sentence and ".cpp" not in sentence
 
@@ -136,16 +128,16 @@ def test_a_toml_scene_names_its_file_cloths_and_way(tmp_path):
     assert loaded.cloths["trousers"][1].name == "denim"
     assert gbuffer.mask.shape == (12, 16) and 20 < len(gbuffer.pixel) == gbuffer.mask.sum()
     path.write_text(path.read_text().replace("turn", "trun"))
-    assert "trun" in refused(lambda: load_scene(path))
+    assert "trun" in refusal(load_scene, path)
 
 
 def test_unknown_scenes_and_cloths_are_named(tmp_path):
-    assert "did you mean 'drape'?" in refused(lambda: load_scene("drappe"))
-    assert "no such file" in refused(lambda: load_scene(tmp_path / "no.toml"))
-    assert "does not exist" in refused(lambda: load(load_scene(tmp_path / "no.xml"), OPTIONS))
+    assert "did you mean 'drape'?" in refusal(load_scene, "drappe")
+    assert "no such file" in refusal(load_scene, tmp_path / "no.toml")
+    assert "does not exist" in refusal(load_scene, tmp_path / "no.xml")
     path = written(tmp_path, BALL + SUN + CAMERA)
     scene = Scene(name="a", source=path, cloths={"denim": Cloth(), "voile": Cloth()})
-    assert "cloths.voile" in refused(lambda: load(scene, OPTIONS))
+    assert "cloths.voile" in refusal(load, scene, OPTIONS)
 
 
 @pytest.mark.parametrize(("x", "inside"), [(0.0, True), (0.999, True), (1.001, True), (1.3, False)])
@@ -154,7 +146,7 @@ def test_a_camera_inside_the_cloth_is_refused(x, inside, tmp_path):
     path = written(tmp_path, BALL + SUN + CAMERA.replace("0,0,4", f"{x},0.01,0").replace("0,0,0", "-9,0,0"))
     loaded = load(load_scene(path), OPTIONS)
     if inside:
-        assert "inside the cloth" in refused(lambda: render(loaded))
+        assert "inside the cloth" in refusal(render, loaded)
     else:
         assert len(render(loaded).gbuffers["denim"].pixel)
 
@@ -166,7 +158,7 @@ def test_a_bent_mesh_without_normals_has_no_curvature(tmp_path):
     )
     facets = '<boolean name="face_normals" value="true"/>'
     path = written(tmp_path, MESH.format("bent.obj").replace("<bsdf", f"{facets}<bsdf") + SUN + CAMERA)
-    assert "needs vertex normals, which tell its curvature" in refused(lambda: load(load_scene(path), OPTIONS))
+    assert "needs vertex normals, which tell its curvature" in refusal(load, load_scene(path), OPTIONS)
     load(load_scene(path), OPTIONS.model_copy(update={"curvature": "none"}))
     path.write_text(path.read_text().replace(facets, ""))
     load(load_scene(path), OPTIONS)
@@ -178,10 +170,10 @@ def test_a_bent_mesh_without_normals_has_no_curvature(tmp_path):
 def test_uv_that_do_not_vary_are_refused_and_shear_where_that_is_an_option(tmp_path):
     path = written(tmp_path, MESH.format("bare.obj") + SUN + CAMERA)
     (tmp_path / "bare.obj").write_text(TRIANGLE.replace("f 1 2 3", "vt 0 0\nf 1/1 2/1 3/1"))
-    assert "needs uv coordinates" in refused(lambda: load(load_scene(path), OPTIONS))
+    assert "needs uv coordinates" in refusal(load, load_scene(path), OPTIONS)
     (tmp_path / "bare.obj").write_text(TRIANGLE.replace("f 1 2 3", "vt 0 0\nvt 1 0.5\nvt 0 1\nf 1/1 2/2 3/3"))
     loaded = load(load_scene(path), OPTIONS)
     assert len(render(loaded).gbuffers["denim"].pixel)
     strict = OPTIONS.model_copy(update={"largest_shear": 10.0})
-    sentence = refused(lambda: render(load(load_scene(path), strict)))
+    sentence = refusal(render, load(load_scene(path), strict))
     assert f"sheared by {np.degrees(np.arctan(0.5)):.1f} degrees" in sentence

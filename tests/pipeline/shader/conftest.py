@@ -111,6 +111,14 @@ WIDTHS = {"evaluate": (12, 8), "scatter": (16, 16)}
 """Columns of the rows of each entry point, and of its results."""
 
 
+def in_groups(queries, entry):
+    """Return the number of groups of 64, rows that fill them, and room for the results."""
+    groups, (columns, results) = -(-len(queries) // 64), WIDTHS[entry]
+    rows, answers = np.zeros((64 * groups, columns), np.float32), np.zeros((64 * groups, results), np.float32)
+    rows[: len(queries), : queries.shape[1]] = queries
+    return groups, rows, answers
+
+
 class _Buffer(ctypes.Structure):
     _fields_ = (("data", ctypes.c_void_p), ("count", ctypes.c_size_t))
 
@@ -137,9 +145,7 @@ def programs(exported, tmp_path_factory):
         entries = ctypes.CDLL(str(library))
 
         def call(buffers, queries, entry="evaluate"):
-            count, (columns, results) = -(-len(queries) // 64), WIDTHS[entry]
-            rows, answers = np.zeros((64 * count, columns), np.float32), np.zeros((64 * count, results), np.float32)
-            rows[: len(queries), : queries.shape[1]] = queries
+            count, rows, answers = in_groups(queries, entry)
             arrays = [*(np.ascontiguousarray(values) for values in buffers.values()), rows, answers]
             buffer = (_Buffer * len(arrays))(*(_Buffer(a.ctypes.data, a.size) for a in arrays))
             groups = _Groups((0, 0, 0), (count, 1, 1))

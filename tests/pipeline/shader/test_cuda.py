@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.shader.tables import EVERY
-from tests.pipeline.shader.conftest import ALIKE, ALLOWED, WIDTHS, apart, check_answers, read
+from tests.pipeline.shader.conftest import ALIKE, ALLOWED, apart, check_answers, in_groups, read
 
 pytestmark = pytest.mark.external  # slangc, nvcc and a GPU
 
@@ -29,9 +29,7 @@ def cuda(exported, tmp_path_factory):
     program = ctypes.CDLL(str(library))
 
     def call(buffers, queries, entry="evaluate"):
-        groups, (columns, results) = -(-len(queries) // 64), WIDTHS[entry]
-        rows, answers = np.zeros((64 * groups, columns), np.float32), np.zeros((64 * groups, results), np.float32)
-        rows[: len(queries), : queries.shape[1]] = queries
+        groups, rows, answers = in_groups(queries, entry)
         arrays = [*(np.ascontiguousarray(values) for values in buffers.values()), rows]
         fours = [name in ("nodes", "grid") for name in buffers] + [False]  # four values in an element
         sizes = [-(-a.size // 4) if four else a.size for a, four in zip(arrays, fours, strict=True)]

@@ -17,16 +17,6 @@ FEW = ("gingham", "polyester_lining")
 UNSEEN = ("gauze", "silk_charmeuse", "crepe")
 
 
-def hemisphere(count):
-    """Return directions in front, (N, 3), and the solid angle of each: a rule of Gauss in z, even in azimuth."""
-    z, weights = np.polynomial.legendre.leggauss(count)
-    z, turn = 0.5 + 0.5 * z, 2.0 * np.pi * (np.arange(count) + 0.5) / count
-    level = np.sqrt(1.0 - z**2)
-    x, y = np.outer(level, np.cos(turn)), np.outer(level, np.sin(turn))
-    directions = np.stack([x, y, np.repeat(z[:, None], count, axis=1)], axis=-1).reshape(-1, 3)
-    return directions, np.repeat(0.5 * weights * 2.0 * np.pi / count, count)
-
-
 CASES = [(name, 2, ()) if name in KINDS else slow(name, 2, ()) for name in preset_names()]
 CASES += [(name, 2, (EVERY,)) if name in FEW else slow(name, 2, (EVERY,)) for name in preset_names()]
 CASES += [("gingham", level, ()) for level in (1, 4)]
@@ -98,41 +88,6 @@ def test_rays_that_turn_meet_what_they_meet_in_python(cpp, rims):
     buffers = {name: getattr(columns, name) for name in ("integers", "numbers", "nodes", "grid")}
     differ = (np.abs(cpp(buffers, rows_of(queries)) - expected) / np.ptp(expected, axis=0)).max(axis=1)
     assert turned.sum() > 1000 and (differ > 1e-3).mean() < 0.01
-
-
-@pytest.mark.parametrize("name", UNSEEN)
-def test_diffuse_components_make_no_light(cpp, exported, name):
-    buffers, rng = read(exported(name)).buffers, np.random.default_rng(5)
-    wi, solid = hemisphere(64)
-    diffuse = []
-    for deviation in (0.01, 0.15, 0.4, 5.0):
-        wo = hemisphere(8)[0][rng.integers(64)]
-        fixed = (*rng.uniform(0.0, 8.0, 2), deviation, 0.7 * deviation, 0.3)
-        rows = np.column_stack([np.tile(fixed, (len(wi), 1)), wi, np.tile(wo, (len(wi), 1))])
-        energy = solid @ cpp(buffers, rows)
-        diffuse.append(energy[2:4].sum())
-        # The rule has 64 x 64 directions: a kink of a clipped cosine costs it some 1e-3.
-        assert diffuse[-1] <= energy[6:8].sum() < 1.002
-        assert energy[4:6].sum() < 0.5
-    assert min(diffuse[1:]) > 0.01  # a small footprint may see a gap
-
-
-@pytest.mark.parametrize("name", FEW)
-def test_transmitted_light_is_less_than_what_arrives(cpp, exported, name):
-    """Diffuse light of both sides and light straight through, for unit colours that sum to 1."""
-    cloth, rng = read(exported(name, kinds=(EVERY,))), np.random.default_rng(6)
-    front, solid = hemisphere(48)
-    for side in (1.0, -1.0):
-        for deviation, curvature in ((0.02, 0.0), (0.3, 0.0), (4.0, 0.0), (0.3, 0.7 if side > 0.0 else 0.0)):
-            wo = hemisphere(8)[0][rng.integers(64)] * (1.0, 1.0, side)
-            shares = []
-            for light in (1.0, -1.0):
-                fixed = np.tile((*rng.uniform(0.0, 4.0, 2), deviation, 0.8 * deviation, -0.2), (len(front), 1))
-                wi = front * (1.0, 1.0, light)
-                rows = np.column_stack([fixed, wi, np.tile(wo, (len(wi), 1)), np.full(len(wi), curvature)])
-                shares.append(solid @ cpp(cloth.buffers, rows)[:, :4].sum(axis=1))
-            # The rule has 48 x 48 directions: a kink of a clipped cosine costs it some 1e-3.
-            assert min(shares) > 0.005 and max(shares) < 1.3
 
 
 def test_light_and_viewer_behind_answer_nothing_without_their_tables(programs, exported, neumip):

@@ -23,12 +23,6 @@ def records(made_up):
     return named(made_up)
 
 
-def slower(records, method, factor):
-    """Records in which one method takes longer."""
-    factors = {(method, "time"): factor}
-    return [r.model_copy(update={"value": factors.get((r.method, r.metric), 1) * r.value}) for r in records]
-
-
 def test_rows_hold_the_numbers_of_the_records(records):
     block = readme_block(records, MACHINE, "", "file")
     # Points have an MSE of 1e-3 / k on denim, twice that on basket, and cost 400 k; the others are points with k = 9.
@@ -66,11 +60,11 @@ def test_several_unseen_fabrics_have_an_interval_and_trainings_a_mean_and_a_rang
 
 
 def test_a_fresh_run_changes_no_byte_while_times_are_within_a_quarter(records):
+    factors = {("neumip", "time"): 1.2, ("woven", "time"): 1.3}
+    slower = [r.model_copy(update={"value": factors.get((r.method, r.metric), 1) * r.value}) for r in records]
     old = readme_block(records, MACHINE, "", "file")
-    assert readme_block(slower(records, "woven", 1.2), MACHINE, old, "file") == old
-    changed = readme_block(slower(records, "woven", 1.3), MACHINE, old, "file")
     expected = [line.replace("4.3×", "5.6×") if "`woven`" in line else line for line in old.splitlines()]
-    assert changed.splitlines() == expected
+    assert readme_block(slower, MACHINE, old, "file").splitlines() == expected
     assert [documents.kept_time("2×", fresh) for fresh in (2.5, 1.6, 2.6, 1.5)] == ["2×", "2×", "2.6×", "1.5×"]
     assert [documents.kept_time("–", 3.21), documents.kept_time("12×", 11.8)] == ["3.2×", "12×"]
     assert [documents.two_decimals(value) for value in (-0.004, 0.0, -0.123)] == ["0.00", "0.00", "−0.12"]

@@ -15,6 +15,7 @@ from reports.measure.scene.scene_errors import measure_scene, time_scene, write_
 from reports.measure.scene.shot import read_shot, shoot
 from reports.measure.timing import CallTiming
 from reports.options import ImageOptions, RepeatOptions, SceneBenchOptions
+from reports.record import Record
 from tests.pipeline.models.stand_ins import FakeMethod
 from tests.refusals import refusal
 
@@ -154,6 +155,11 @@ def test_a_better_method_scores_better_and_what_covers_not_all_is_left_out(frame
     assert all(measured["x 1.3"][name].low < measured["x 1.3"][name].high for name in INTERVALS)
     assert min(good["psnr_floor"], bad["psnr_floor"]) > bad["psnr"]
     assert min(good["truth_noise"], bad["truth_noise"]) > 0
+
+
+def test_a_missing_metric_fails_nothing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyfvvdp", None)
+    assert scene_errors.fovvideovdp(Record(method="woven"), np.ones((3, 8, 8)), np.ones((3, 8, 8))) == []
 
 
 def test_pictures_hold_their_frames_and_differences(frames, measured, folder):
