@@ -1,5 +1,4 @@
 import shlex
-import shutil
 import subprocess
 import sys
 from importlib.metadata import version
@@ -45,23 +44,6 @@ def test_every_help_ends_with_examples_that_are_understood(twillight, verb):
     assert code == 0 and shown == [f"twillight {verb} {tokens}".strip() for tokens in VERBS[verb]["examples"]]
     for call in shown:
         app.parse_args(shlex.split(call)[1:], exit_on_error=False, print_error=False)
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_shells_complete_verbs_and_options(shell, tmp_path):
-    script = tmp_path / "twillight"
-    script.write_text(app.generate_completion(shell=shell))
-    complete = {
-        "bash": 'source "$0"; COMP_WORDS=($1); COMP_CWORD=$2; _twillight; printf "%s\\n" "${COMPREPLY[@]}"',
-        "fish": 'source $argv[1]; complete -C "$argv[2]"',
-    }
-    if shell not in complete or not (program := shutil.which(shell)):
-        assert all(f"{word}" in script.read_text() for word in ("publish", "--licence"))
-        return
-    for line, word in (("twillight pub", "publish"), ("twillight publish --lic", "--licence")):
-        call = [program, "-c", complete[shell], script, line, str(line.count(" "))]
-        done = subprocess.run(call, capture_output=True, text=True, check=True)
-        assert [row.split("\t")[0] for row in done.stdout.splitlines()] == [word]
 
 
 def test_list_plan_and_status_compute_nothing_and_pictures_of_show_agree_with_the_geometry(twillight, tmp_path):
