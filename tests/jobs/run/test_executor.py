@@ -9,11 +9,10 @@ import pytest
 from rich.console import Console
 
 from jobs.run import executor
-from jobs.run.cluster import Scheduler
 from jobs.run.ledger import Ledger
 from jobs.run.outcome import work
 from tests.jobs import fake_stages as fake
-from weaves.errors import BadInput, WorkFailed
+from weaves.errors import WorkFailed
 
 
 @pytest.fixture
@@ -123,19 +122,6 @@ def test_tasks_side_by_side_in_a_process_share_it_only_if_they_may(tmp_path, mon
     assert not any(outcome.reason for outcome in outcomes)
     pids = {event["name"]: event["pid"] for event in fake.events(tmp_path)}
     assert pids["generate 0"] == pids["generate 1"] == os.getpid() and len({*pids.values()}) == 3
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        *(({"workers": count}, "--workers") for count in (-3, 1025, 10**6)),
-        ({"scheduler": Scheduler("nonsense://")}, "no dask scheduler answers"),
-        ({"scheduler": Scheduler("tls://127.0.0.1:1", key="nowhere.pem")}, r"--tls-key: nowhere\.pem: is no file"),
-    ],
-)
-def test_a_number_of_workers_or_a_scheduler_that_cannot_be_used_is_bad_input(tmp_path, plan, options, words):
-    with pytest.raises(BadInput, match=words):
-        fake.run(plan, tmp_path, **options)
 
 
 @pytest.mark.external

@@ -14,7 +14,7 @@ import torch
 
 import pipeline.shards.evaluate
 from pipeline.fingerprint import IDENTITY
-from pipeline.models.card import read_card, read_weights, write_model
+from pipeline.models.card import write_model
 from pipeline.models.domain import Domain
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.model import Woven, WovenNetwork
@@ -137,15 +137,3 @@ def test_rows_it_was_not_taught_are_named_before_anything_is_computed_and_can_be
     code, text, complaint, table = evaluate("--model", folder, "--skip-bad", queries=queries)
     assert (code, complaint) == (0, "") and "1 bad row has no answer; see result.bad.csv" in text
     assert table["diffuse_warp"].null_count == 1 and "3000" in (tmp_path / "result.bad.csv").read_text()
-
-
-def test_a_model_of_another_version_with_other_weights_or_a_damaged_file_is_named(evaluate, folder):
-    card = read_card(folder)
-    write_model(folder, read_weights(folder, card), card | {"version": {"model": 99}})
-    assert "version = 99: this is version 1 of woven" in evaluate("--model", folder)[2]
-    write_model(folder, safetensors.torch.save({"a": torch.zeros(2)}), card)
-    assert "do not fit together" in evaluate("--model", folder)[2]
-    for name, content in (("model.safetensors", b"\x80\x04pickle"), ("card.json", b"{")):
-        (folder / name).write_bytes(content)
-        code, _, complaint, _ = evaluate("--model", folder)
-        assert code == 2 and name in complaint

@@ -19,7 +19,6 @@ from reports.images.exr import read_exr
 from reports.images.tiles import displayed
 from reports.measure.scene.shot import read_shot, shoot
 from reports.options import ShotOptions
-from tests.pipeline.truth.cloths import woven
 from weaves.draft import Matrix
 from weaves.fabric import load_fabric
 from weaves.families import Satin
@@ -103,14 +102,6 @@ def test_swatches_of_many_different_cells_are_made_of_points():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["truth", "point_sampled:2", "prefiltered"])
-def test_two_runs_give_the_same_bytes(render, tmp_path, method):
-    for name in ("a.exr", "b.exr"):
-        assert render("sphere", "--method", method, "--out", name, "--size", "16x12", "--directions", "4")[0] == 0
-    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
-
-
-@pytest.mark.slow
 def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
     own, denim = "own.exr", "denim.exr"
     assert render("dinner_table", "--out", own, *SMALL)[0] == 0
@@ -120,21 +111,6 @@ def test_fabrics_replace_those_of_the_cloths_in_their_order(render, tmp_path):
     changed = np.abs(after.stack(*"RGB") - before.stack(*"RGB")).max(axis=-1) > 0
     number = before.channels["fabric.id"]
     assert changed[(number == 1) | (number == 2)].mean() > 0.9 and not changed[(number == 0) | (number > 2)].any()
-
-
-@pytest.mark.slow
-def test_all_bounces_make_white_cloth_brighter(render, tmp_path):
-    """Silk of albedo .85 lacks a sixth of its light with one bounce; the file says which it has."""
-    (tmp_path / "white.toml").write_text(woven("silk_charmeuse", specular=(0.0,) * 3, diffuse=(0.85,) * 3).to_toml())
-    light = {}
-    for number in ("1", "all"):
-        assert render("sphere", "--fabric", "white.toml", "--bounces", number, "--out", "a.exr", *FAST)[0] == 0
-        exr = read_exr(tmp_path / "a.exr")
-        light[number] = exr.stack(*"RGB")[exr.channels["A"] == 1].mean()
-        assert str(exr.attributes["bounces"]) == number
-    assert 1.1 < light["all"] / light["1"] < 1.5
-    code, _, complaint = render("sphere", "--bounces", "2", "--out", "a.exr", *FAST)
-    assert code == 2 and "--bounces" in complaint and '1, "all"' in complaint
 
 
 def test_a_folder_holds_the_frames_and_the_tone_changes_them(render, tmp_path):
