@@ -189,25 +189,19 @@ def test_a_storage_that_does_not_answer_ends_with_a_sentence(switch, call, monke
         assert code == 1 and "the object storage cannot be reached" in told
 
 
-def after_first_receipt(switch, action):
-    """Call a function, in a thread, as soon as the first receipt is written."""
-    switch.paths.clear()
-
-    def watch():
-        while not any(re.fullmatch(r"PUT .*/ledger/.*\.json", path) for path in list(switch.paths)):
-            time.sleep(0.05)
-        action()
-
-    thread = threading.Thread(target=watch, daemon=True)
-    thread.start()
-    return thread
-
-
 @pytest.mark.slow
 def test_a_run_ends_when_its_storage_fails_for_too_long_and_goes_on_later(switch, call, monkeypatch):
     generate = "generate", "s3://products/ends", "--workers", "1"
     monkeypatch.setattr(patience, "MOST_SECONDS", 5.0)  # of the driver; workers would wait for ten minutes
-    thread = after_first_receipt(switch, lambda: switch.set("fail"))
+
+    def fail_after_the_first_receipt():
+        while not any(re.fullmatch(r"PUT .*/ledger/.*\.json", path) for path in list(switch.paths)):
+            time.sleep(0.05)
+        switch.set("fail")
+
+    switch.paths.clear()
+    thread = threading.Thread(target=fail_after_the_first_receipt, daemon=True)
+    thread.start()
     code, _, told = call(*generate)
     thread.join()
     last = told.strip().splitlines()[-1]

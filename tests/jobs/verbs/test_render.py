@@ -24,7 +24,7 @@ from weaves.fabric import load_fabric
 from weaves.families import Satin
 
 SMALL = ("--size", "32x24", "--directions", "4")
-FAST = ("--size", "16x12", "--directions", "4", "--method", "soft_nodes")
+FAST = ("--size", "16x12", "--directions", "4", "--bounces", "1")
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def test_a_picture_is_the_frame_of_the_benchmark(render, tmp_path):
 
 
 def test_the_layers_of_an_exr_sum_to_its_colour_and_say_what_they_are(render, tmp_path):
-    assert render("dinner_table", "--method", "point_sampled:2", "--out", "a.exr", *SMALL)[0] == 0
+    assert render("dinner_table", "--method", "point_sampled:2", "--out", "a.exr", *FAST)[0] == 0
     exr = read_exr(tmp_path / "a.exr")
     parts = [exr.stack(*(f"{name}.{channel}" for channel in "RGB")) for name in ("backdrop", *COMPONENTS)]
     np.testing.assert_allclose(sum(parts), exr.stack(*"RGB"), atol=1e-6)
@@ -73,6 +73,7 @@ def test_the_layers_of_an_exr_sum_to_its_colour_and_say_what_they_are(render, tm
     about = exr.attributes
     assert about["fabrics"] == "1 polyester_lining, 2 basket, 3 silk_charmeuse, 4 denim"
     assert (about["scene"], about["method"], about["samples"]) == ("dinner_table", "point_sampled:2", 1)
+    assert str(about["bounces"]) == "1"
     assert about["fallback_share"] == 0 and about["versions"].startswith("truth ")
 
 
@@ -136,7 +137,7 @@ def test_a_film_has_the_frames_that_are_asked_for_and_needs_its_library(render, 
 def test_a_stopped_picture_leaves_what_was_there(render, tmp_path, monkeypatch):
     (tmp_path / "a.png").write_bytes(b"before")
     monkeypatch.setattr(jobs.verbs.render, "displayed", Mock(side_effect=KeyboardInterrupt))
-    code, _, complaint = render("plane", "--out", "a.png", "--method", "soft_nodes", *SMALL)
+    code, _, complaint = render("plane", "--out", "a.png", *FAST)
     assert code == 130 and complaint == "stopped; a.png is as it was before\n"
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"] and (tmp_path / "a.png").read_bytes() == b"before"
 
