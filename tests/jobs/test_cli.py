@@ -12,11 +12,9 @@ import jobs.verbs.run
 import jobs.verbs.show
 from jobs.cli import VERBS, app
 from jobs.recipe.load import load_recipe
-from pipeline.shards.manifest import Manifest
 from pipeline.truth import invariants
 from pipeline.truth.invariants import exact, worst
 from reports.images.exr import read_exr
-from tests.jobs import made_up
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
@@ -85,27 +83,6 @@ def test_every_end_is_one_sentence(twillight, tmp_path, monkeypatch, error, code
     assert len(crashes) == isinstance(error, ZeroDivisionError)
     for crash in crashes:
         assert "twillight run quick" in crash.read_text() and "Traceback" in crash.read_text()
-
-
-@pytest.fixture
-def dataset(tmp_path):
-    """A data set of one shard with made-up answers."""
-    recipe = made_up.write_recipe(tmp_path, "made-up", "point_sampled", rows={"train": 64, "test": 64})
-    (task, *_) = made_up.finished(recipe, tmp_path / "out", ["generate"])
-    return (tmp_path / "out" / task.products[0]).parent
-
-
-def test_check_of_a_data_set_finds_it_sound_cut_or_empty(twillight, dataset):
-    code, text, _ = twillight("check", str(dataset))
-    assert code == 0 and "1 shards with 64 rows are sound" in text
-    (shard,) = dataset.glob("*.parquet")
-    shard.write_bytes(shard.read_bytes()[: shard.stat().st_size // 2])
-    code, _, told = twillight("check", str(dataset))
-    assert code == 2 and "Traceback" not in told
-    assert all(shard.name in line for line in told.splitlines()) and "whole" in told
-    Manifest.load(dataset).without({shard.name}).save(dataset)
-    code, text, told = twillight("check", str(dataset))
-    assert code == 2 and "sound" not in text and "lists no shards" in told
 
 
 def test_check_of_a_fabric_shows_its_invariants_and_fails_if_one_is_broken(twillight, tmp_path, monkeypatch):

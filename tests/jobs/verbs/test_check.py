@@ -8,6 +8,7 @@ from jobs.plan.dataset import Shard
 from jobs.plan.page import Page
 from jobs.plan.training import Training
 from jobs.run.ledger import Ledger
+from pipeline.shards.manifest import Manifest
 from pipeline.shards.store import read_table, write_columns
 from tests.jobs import made_up
 from tests.jobs.made_up import flip
@@ -103,6 +104,19 @@ def test_a_page_of_other_measurements_is_outdated_and_values_that_were_never_rig
     made_up.finish(shard, Ledger(run.out))
     code, _, told = run()
     assert code == 2 and f"{path}: odd: column diffuse_warp spans [-1.0" in told
+
+
+def test_a_folder_of_a_data_set_is_sound_cut_or_empty(run, call):
+    path = run.out / run.of(Shard).products[0]
+    code, said, _ = call("check", path.parent)
+    assert code == 0 and "4 shards with 224 rows are sound" in said
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    code, _, told = call("check", path.parent)
+    assert code == 2 and "whole" in told and all(path.name in line for line in told.splitlines())
+    manifest = Manifest.load(path.parent)
+    manifest.without({shard.file for shard in manifest.shards}).save(path.parent)
+    code, said, told = call("check", path.parent)
+    assert code == 2 and "sound" not in said and "lists no shards" in told
 
 
 def test_many_faults_are_counted(run):
