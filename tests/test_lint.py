@@ -82,16 +82,17 @@ def test_a_budget_that_is_exceeded_is_named(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "code",
+    ("code", "more"),
     [
-        "from jobs.cli import main; main(['--help'])",
-        "from jobs.plan.plan import plan; from jobs.recipe.load import load_recipe",
+        ("from jobs.cli import main; main(['--help']); import jobs.plan.plan, jobs.recipe.load", ()),
+        ("from jobs.cli import main; main(['list'])", ("scipy",)),
+        ("import twillight", ("scipy",)),
     ],
-    ids=["help", "plan"],
+    ids=["help and plan", "list", "door"],
 )
-def test_help_and_plans_load_no_heavy_library(code):
+def test_help_plans_lists_and_the_door_load_no_heavy_library(code, more):
     """`twillight --help` answers in under 0.5 s because nothing heavy is imported; numpy alone takes 0.1 s."""
-    heavy = sorted(set(architecture.HOMES) - {"cyclopts", "rich"})
+    heavy = sorted({*architecture.HOMES, *more} - {"cyclopts", "rich"})
     check = f"import sys; print('loaded:', *(name for name in {heavy} if name in sys.modules))"
     done = subprocess.run([sys.executable, "-c", f"{code}; {check}"], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

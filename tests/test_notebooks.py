@@ -19,7 +19,6 @@ from weaves.fabric import load_fabric
 pytestmark = pytest.mark.external  # kernels of notebooks
 
 ROOT = Path(__file__).parents[1]
-NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 
 def true_rows(names, splits, rows=200):
@@ -31,7 +30,9 @@ def true_rows(names, splits, rows=200):
 
 
 def executed(path, folder):
+    """Execute a notebook, which is kept without results, in a folder; return it with them."""
     notebook = nbformat.read(path, as_version=4)
+    assert not any(cell.outputs or cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
     where = {"metadata": {"path": folder}}
     NotebookClient(notebook, kernel_name="python3", timeout=1800, startup_timeout=300, resources=where).execute()
     return notebook
@@ -51,15 +52,6 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
     monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")  # no warning about the places of its settings
     return tmp_path
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebooks_are_valid_and_kept_without_results(path):
-    notebook = nbformat.read(path, as_version=4)
-    nbformat.validate(notebook)
-    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert all(not cell.outputs and cell.execution_count is None for cell in code)
 
 
 def test_a_fabric_from_draft_to_picture(folder):

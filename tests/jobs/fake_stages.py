@@ -4,7 +4,6 @@ import io
 import json
 import os
 import signal
-import sys
 import time
 from pathlib import Path
 from typing import ClassVar, NamedTuple
@@ -143,15 +142,3 @@ def log(out, event, name):
 
 def events(out):
     return [json.loads(line) for line in (out / "log.jsonl").read_text().splitlines()]
-
-
-def timed():
-    """Two shards and what needs them, then a task that runs alone for a minute."""
-    shards = [task(f"shard {index}") for index in range(2)]
-    return [*shards, task("net", FakeTraining, needs=shards), task("long", FakeTiming, needs=shards, seconds=60)]
-
-
-if __name__ == "__main__":
-    from tests.jobs import fake_stages  # so that its classes have the name by which other processes import them
-
-    run(fake_stages.timed(), Path(sys.argv[1]), Console(stderr=True), workers=2)

@@ -55,7 +55,7 @@ def make(task, out):
         for path in paths[1:]:
             link(paths[0], path)
     elif isinstance(task, Training):
-        write_model(out / task.folder, task.id.encode() * 20, {"steps_taken": 1, "of": task.id})
+        write_model(out / task.folder, task.id.encode() * 20, {"steps_taken": task.training.steps, "of": task.id})
     elif isinstance(task, Page):
         (out / task.folder / "figures").mkdir(exist_ok=True)
         for name in ("records.json", "figures/a.png"):
@@ -68,6 +68,13 @@ def make(task, out):
             path.write_text(json.dumps({"file": path.name, "date": now, "values": [0.5] * 20}))
 
 
+def finish(task, ledger):
+    """Write the receipt of a task whose products are there; return what they are."""
+    files = {Path(path).name: Product.of(ledger.out / path) for path in task.products}
+    ledger.finish(task, files, 1.5)
+    return files
+
+
 def execute(tasks, ledger, *, stages=STAGES, manifests=(), **rest):
     """Do the unfinished tasks one after the other in this process, as `jobs.run.executor.execute` would."""
     summary = RunSummary([], [], [], [])
@@ -76,8 +83,7 @@ def execute(tasks, ledger, *, stages=STAGES, manifests=(), **rest):
             summary.before.append(task)
         elif task.stage in stages:
             make(task, ledger.out)
-            files = {Path(path).name: Product.of(ledger.out / path) for path in task.products}
-            ledger.finish(task, files, 1.5)
+            files = finish(task, ledger)
             for manifest in manifests:
                 manifest.add(task, files)
             summary.ran.append(task)

@@ -50,18 +50,12 @@ truth = { estimator = "owen", relative_error = 0.2, min_count = 64, max_count = 
 """
 
 
-def write_smallest(folder, name, dataset=None, model=None, variant=None, bench=None):
-    """Write the smallest recipe with a name, and other values of its tables; return its path.
-
-    A variant of the network, with other values, takes the place of the points.
-    """
+def write_smallest(folder, name, dataset=None, model=None):
+    """Write the smallest recipe with a name, and other values of its tables; return its path."""
     content = {"name": name} | tomllib.loads(SMALLEST)
-    network = content["models"][0]
-    for table, changes in ((content["dataset"], dataset), (network, model), (content["bench"], bench)):
+    for table, changes in ((content["dataset"], dataset), (content["models"][0], model)):
         for key, value in (changes or {}).items():
             table[key] = table.get(key, {}) | value if isinstance(value, dict) else value
-    if variant:
-        content["models"][1] = network | variant
     return write_toml(folder, content)
 
 

@@ -18,9 +18,6 @@ from jobs.cli import app
 from jobs.run.cluster import Scheduler
 from tests.jobs import fake_stages as fake
 from tests.jobs.dask_processes import ENVIRONMENT
-from tests.jobs.small_recipes import write_smallest
-
-pytestmark = [pytest.mark.external, pytest.mark.slow]  # clusters of dask
 
 TEXT = (Path(__file__).parents[2] / "jobs" / "CLUSTER.md").read_text(encoding="utf-8")
 
@@ -64,6 +61,8 @@ SERVICES = {
 """Modules that are not installed, and what the snippets import from them."""
 
 
+@pytest.mark.external
+@pytest.mark.slow
 @pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```$", TEXT, re.M | re.S), ids=["slurm", "k8s", "aws"])
 def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, monkeypatch, code):
     for name, members in SERVICES.items():
@@ -74,14 +73,6 @@ def test_a_snippet_runs_tasks_on_the_cluster_that_it_makes(tmp_path, monkeypatch
     exec(code.replace("import subprocess\n", ""), {"subprocess": started})
     (summary,) = summaries
     assert len(summary.ran) == 6 and not summary.failed
-
-
-PART = f"""#!{sys.executable}
-import sys
-from jobs.entry import main
-if __name__ == "__main__":  # workers are started from it
-    sys.exit(main())
-"""
 
 
 def command_of(index):
@@ -104,41 +95,19 @@ ARRAYS = {"SLURM_ARRAY_TASK_ID": 1, "AWS_BATCH_JOB_ARRAY_INDEX": 0, "JOB_COMPLET
 """Variables with the number of a job in its array, and the first number."""
 
 
-@pytest.fixture(scope="module")
-def small(tmp_path_factory):
-    """Return a folder with a recipe, its products by an undivided run, and `twillight`."""
-    folder = tmp_path_factory.mktemp("small")
-    write_smallest(folder, "full", {"shard_rows": 64})
-    (folder / "twillight").write_text(PART)
-    (folder / "twillight").chmod(stat.S_IRWXU)
-    environment = ENVIRONMENT | {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}
-    environment.pop("OMP_NUM_THREADS", None)
-    subprocess.run(["twillight", "generate", "full.toml", "--out", "whole"], cwd=folder, env=environment, check=True)
-    return folder, environment
-
-
-@pytest.mark.parametrize("index", ARRAYS)
-def test_all_jobs_of_an_array_at_once_and_a_closing_command_are_an_undivided_run(small, tmp_path, index):
-    """One job is there twice, as after a restart whose end was not noticed."""
-    folder, environment = small
-    out, line = tmp_path / "out", command_of(index).replace(" full ", " full.toml ").replace("/1000", "/3")
-    line = re.sub(r"--out \S+", f"--out {out}", line)
-    if index == "SLURM_ARRAY_TASK_ID":
-        assert "--array=1-1000 " in line
-    jobs = [
-        subprocess.Popen(["sh", "-c", line], cwd=folder, env=environment | {index: str(ARRAYS[index] + number)})
-        for number in (0, 1, 2, 1)
-    ]
-    assert [job.wait(timeout=600) for job in jobs] == [0] * len(jobs)
-    assert not list(out.rglob(".tmp-*")) and not list(out.glob("datasets/*/manifest.json"))
-    command = ["twillight", "generate", "full.toml", "--out", str(out)]
-    closing = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True)
-    assert "nothing to do: 7 tasks done" in closing.stdout
-
-    def products(out):
-        return {path.name: path.read_bytes() for path in out.glob("datasets/*/*")}
-
-    assert products(out) == products(folder / "whole") and len(products(out)) == 8
+@pytest.mark.parametrize(("index", "first"), ARRAYS.items())
+def test_a_job_of_an_array_does_its_thousandth(tmp_path, index, first):
+    """Parts at the same time, one of them twice, are an undivided run: tests/faults/test_kills.py."""
+    line = command_of(index)
+    assert index != "SLURM_ARRAY_TASK_ID" or "--array=1-1000 " in line
+    (tmp_path / "twillight").write_text('#!/bin/sh\necho "$@"\n')
+    (tmp_path / "twillight").chmod(stat.S_IRWXU)
+    environment = {"PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
+    for number in (1, 17, 1000):
+        job = environment | {index: str(first + number - 1)}
+        called = subprocess.run(["sh", "-c", line], env=job, capture_output=True, text=True, check=True).stdout.split()
+        app.parse_args(called, exit_on_error=False, print_error=False)
+        assert called[:2] == ["generate", "full"] and called[-2:] == ["--part", f"{number}/1000"]
 
 
 SRUN = """#!/bin/sh
@@ -161,6 +130,8 @@ if __name__ == "__main__":  # workers are started from it
 """
 
 
+@pytest.mark.external
+@pytest.mark.slow
 def test_the_job_of_slurm_runs_tasks(tmp_path):
     (script,) = re.findall(r"^```sh\n(#!/bin/bash\n[^`]*?dask worker.*?)^```$", TEXT, re.M | re.S)
     folder = tmp_path / "bin"

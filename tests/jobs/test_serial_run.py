@@ -1,7 +1,6 @@
 """A run of the smallest recipe, from a fabric to its page, task after task in this process: no cluster, no scene."""
 
 import numpy as np
-import pytest
 
 from jobs.cli import main
 from jobs.plan.plan import plan
@@ -30,28 +29,3 @@ def test_a_recipe_becomes_a_page(tmp_path, here, capsys, monkeypatch):
     assert made and "<table" in (folder / "index.html").read_text(encoding="utf-8")
     capsys.readouterr()
     assert main(command) == 0 and f"nothing to do: {len(tasks)} tasks done" in capsys.readouterr().out
-
-
-RAYS = {"parallax": True}
-SAMPLED = RAYS | {"estimator": "owen", "relative_error": 0.2, "min_count": 64, "max_count": 64}
-BENT = {"queries": {"curvature": [0.01, 0.5], "behind": 0.5}}
-SMALL_CURVED = {"model": "curved", "silhouette_rows": 64}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("dataset", "model"), [({}, {}), (BENT, SMALL_CURVED)], ids=["neumip", "curved"])
-def test_a_page_compares_a_network_of_view_rays_with_its_variant_without_an_offset(
-    tmp_path, here, capsys, monkeypatch, dataset, model
-):
-    monkeypatch.setattr(page, "render", lambda plot, *data: PLOT)
-    bench = dict.fromkeys(("truth", "frame_truth"), SAMPLED) | {"edge": {"rows": 4, "truth": SAMPLED}}
-    changes = {"dataset": {"truth": RAYS, **dataset}, "model": model, "bench": bench}
-    recipe = write_smallest(tmp_path, "rays", **changes, variant={"name": "flat", "offset": False})
-    assert main(["run", str(recipe), "--out", str(tmp_path / "out")]) == 0, capsys.readouterr().err
-    folder = tmp_path / "out" / "report" / "rays"
-    records = read_records([folder / "records.json"])
-    errors = {record.method: record.value for record in records if record.metric == "mse"}
-    name = model.get("model", "neumip")
-    assert errors.keys() >= {name, "flat"} and errors[name] != errors["flat"]
-    assert f"{name}: each fabric by itself" in (text := (folder / "index.html").read_text(encoding="utf-8"))
-    assert text.count("no offset") == 1

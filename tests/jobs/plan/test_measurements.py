@@ -13,9 +13,7 @@ from jobs.recipe.load import load_recipe
 from reports.catalogue import AddedMetric
 from reports.options import StudyName
 from reports.record import read_records
-from reports.truth import finding, path_traced, sampling, stability
-from reports.truth.path_traced import Traced
-from reports.truth.sampling import VarianceSaving
+from reports.truth import finding, stability
 from weaves.errors import WorkFailed
 
 ANY = TypeAdapter(Annotated[Union[KINDS], Field(discriminator="kind")])  # noqa: UP007
@@ -57,34 +55,18 @@ def test_every_study_is_in_a_shipped_recipe():
         assert callable(module.measure) and module.RECORDS
 
 
-@pytest.mark.parametrize(
-    ("module", "row"),
-    [
-        (sampling, VarianceSaving("lobes", "denim", 8.0, 5.0, 900.0, 2100.0, 100)),
-        (path_traced, Traced("soft_nodes:2", "drape", "4", 2.5e-3, 1.5, 4, 3.2)),
-    ],
-)
-def test_a_study_records_what_its_module_yields(tmp_path, monkeypatch, module, row):
-    monkeypatch.setattr(module, "measure", lambda: iter([row]))
-    study = Study(study=module.__name__.rpartition(".")[2])
-    (tmp_path / "records").mkdir()
-    study.run(tmp_path, lambda share: None)
-    assert module.RECORDS.from_records(read_records([tmp_path / study.records])) == [row]
-
-
-@pytest.mark.parametrize("value", [1.0, 1.1])
-def test_an_unstable_expression_fails_the_study(tmp_path, monkeypatch, value):
-    row = finding.judge("x", "corner", "float32", {"x": np.arange(1)}, [value], [1.0], 1e-6)
+def test_a_study_records_what_its_module_yields_and_fails_on_an_unstable_expression(tmp_path, monkeypatch):
     monkeypatch.setattr(stability, "expressions", lambda: ["x"])
-    monkeypatch.setattr(stability, "judged", lambda expression: [row])
     monkeypatch.setattr(stability, "places", list)
     monkeypatch.setattr(stability, "footprints", list)
     (tmp_path / "records").mkdir()
     study = Study(study="stability")
-    if value == 1.0:
+    good, bad = (
+        finding.judge("x", "corner", "float32", {"x": np.arange(1)}, [value], [1.0], 1e-6) for value in (1.0, 1.1)
+    )
+    monkeypatch.setattr(stability, "judged", lambda expression: [good])
+    study.run(tmp_path, lambda share: None)
+    assert finding.RECORDS.from_records(read_records([tmp_path / study.records])) == [good]
+    monkeypatch.setattr(stability, "judged", lambda expression: [bad])
+    with pytest.raises(WorkFailed, match=r"x in float32, corner: worst error 1\.0e-01"):
         study.run(tmp_path, lambda share: None)
-        (found,) = finding.RECORDS.from_records(read_records([tmp_path / study.records]))
-        assert found.worst == pytest.approx(value - 1.0)
-    else:
-        with pytest.raises(WorkFailed, match=r"x in float32, corner: worst error 1\.0e-01"):
-            study.run(tmp_path, lambda share: None)

@@ -34,7 +34,7 @@ def plans(draw):
 
 
 @given(plans(), st.integers(1, 3), st.randoms(use_true_random=False))
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_tasks_start_as_if_all_were_sorted_at_every_end(drawn, slots, random):
     tasks, done = drawn
     todo = [task for task in tasks if task.id not in done]
@@ -84,10 +84,3 @@ def test_tasks_start_as_if_all_were_sorted_at_every_end(drawn, slots, random):
             else:
                 ready.lose(task)
         start(True)
-
-
-def test_the_longest_chain_is_the_most_urgent():
-    short, long = Step(name="short"), Step(name="long")
-    after = Step(name="after", after=(long.id, "done before"))
-    seconds = {short.id: 5, long.id: 1, after.id: 30}
-    assert chains([short, long, after], seconds) == {short.id: 5, long.id: 31, after.id: 30}

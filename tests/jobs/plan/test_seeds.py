@@ -45,8 +45,6 @@ def test_more_seeds_add_trainings_change_none_and_are_named(one, three, files):
     assert "3 trainings with the seeds 0 to 2" in note.about
     trained = {seed: task.id for seed, (task,) in of(three, Training).items()}
     assert note.fingerprint == trained[0] and not any("trainings with" in note.about for note in one[-1].models)
-    for seed, same in of(three, OnFabric).items():
-        assert (same[0].model.seed, *same[0].model.needs) == (seed, trained[seed])
 
 
 def test_each_training_of_one_material_has_every_seed(one, files):

@@ -1,7 +1,7 @@
 """Methods from outside in recipes; the tests of what their code may be are in tests/pipeline/models/added."""
 
-from importlib.metadata import EntryPoint
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -9,7 +9,10 @@ from jobs.plan.plan import plan
 from jobs.plan.training import Training
 from jobs.recipe import added
 from jobs.recipe.load import load_recipe
+from pipeline.models.added import apart
 from pipeline.models.added.added_code import GROUP
+from pipeline.models.added.guarded import MethodFailed
+from reports.record import Record, read_records
 from tests.jobs.identities import assert_changed, ids
 from tests.refusals import refusal
 from weaves.errors import BadInput
@@ -126,15 +129,6 @@ def test_a_recipe_alone_runs_no_code(files, model, theirs, monkeypatch, tmp_path
         load_recipe(files.write())
 
 
-def test_an_installed_method_enters_if_the_recipe_names_it(files, planned, theirs, monkeypatch):
-    assert "--add: theirs: no method of this name; none is installed" in refusal(planned, "theirs")
-    point = EntryPoint("theirs", theirs, GROUP)
-    monkeypatch.setattr(added, "entry_points", lambda group: [point] if group == GROUP else [])
-    assert not ids(planned(), "theirs") and ids(planned("theirs"), "theirs")
-    files.text += HERE
-    assert ids(planned(), "theirs")
-
-
 @pytest.mark.parametrize(
     ("name", "add", "more", "sentence"),
     [
@@ -172,7 +166,33 @@ def test_a_metric_is_measured_of_every_model_on_every_fabric(planned, tmp_path):
             planned(metric)
 
 
-def test_an_installed_package_has_its_version(files, planned, tmp_path, monkeypatch):
+def test_a_method_that_fails_is_left_out_of_the_times_of_all_methods_and_ends_its_own_tasks(
+    planned, theirs, tmp_path, monkeypatch
+):
+    def measured(task):
+        names = [model.options.name for model in task.models]
+        if "theirs" in names:
+            raise MethodFailed("theirs", "too late")
+        return [Record(method=name) for name in names]
+
+    tasks = {task.title: task for task in planned(theirs)}
+    times, own = tasks["timing of all methods"], tasks["errors of theirs, denim"]
+    monkeypatch.setattr(apart, "run_apart", lambda write, *given, limits, progress: write(*given, progress))
+    monkeypatch.setattr(type(times), "measure", lambda task, *rest: measured(task))
+    monkeypatch.setattr(type(own), "measure", Mock(side_effect=MethodFailed("theirs", "too late")))
+    (tmp_path / "records").mkdir()
+    with pytest.raises(MethodFailed, match=r"^theirs: too late$"):
+        own.run(tmp_path, None)
+    times.run(tmp_path, None)
+    *others, left_out = read_records([tmp_path / times.records])
+    assert [one.method for one in others] == ["woven", "neumip", "point_sampled"]
+    assert (left_out.method, left_out.metric, left_out.note) == ("theirs", "not_run", "too late")
+
+
+def test_an_installed_method_enters_if_it_is_named_and_has_the_version_of_its_package(
+    files, planned, tmp_path, monkeypatch
+):
+    assert "--add: theirs: no method of this name; none is installed" in refusal(planned, "theirs")
     site = tmp_path / "site"
     about = site / "their_distribution-1.2.dist-info"
     (site / "their_package").mkdir(parents=True)
@@ -182,6 +202,7 @@ def test_an_installed_package_has_its_version(files, planned, tmp_path, monkeypa
     (about / "top_level.txt").write_text("their_package\n")
     (about / "entry_points.txt").write_text(f"[{GROUP}]\ntheirs = their_package:Theirs\n")
     monkeypatch.syspath_prepend(site)
+    assert not ids(planned(), "theirs") and ids(planned("theirs"), "theirs")
     files.text += HERE
     (found,) = [model.options for model in load_recipe(files.write()).models if model.options.model == "added"]
     assert (found.source, found.distribution, found.folder) == ("their_package:Theirs", "their-distribution 1.2", "")

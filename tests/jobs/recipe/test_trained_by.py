@@ -7,7 +7,9 @@ from jobs.plan.dataset import DataSet
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
+from jobs.verbs import run
 from pipeline.shards.manifest import Manifest
+from tests.jobs import made_up
 from tests.jobs.identities import assert_changed, ids
 from tests.refusals import refusal
 from weaves.errors import BadInput
@@ -41,7 +43,6 @@ GENERAL = TRAINER[: TRAINER.index("\n[[models]]")].replace("curvature = [0.01, 0
 GENERAL = GENERAL.replace('"bent"', '"sheer"').replace('"voile"', '"organza"')
 GENERAL += '\n[[models]]\nmodel = "woven"\nname = "woven_sheer"\ntransmission = true\n'
 
-FINE = '\n[[models]]\nmodel = "neumip"\nname = "fine"\nrecipe = "twin.toml"\n'
 SHEER = '\n[[models]]\nname = "woven_sheer"\nrecipe = "sheer.toml"\n'
 
 
@@ -121,18 +122,14 @@ def test_it_is_measured_where_it_was_taught_and_the_page_says_where_not(asks, fi
     assert set(trained.values()) < set(titles["timing of all methods"].needs)
 
 
-def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files, tmp_path, here):
+def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(tmp_path, monkeypatch):
     """The other recipe has the same rows of denim and of the twill: one task, two files, and a manifest in each."""
-    for old, new in (
-        ("train = 2500", "train = 150"),
-        ("validation = 100", "validation = 70"),
-        ("test = 500", "test = 70"),
-        ("count = 3", "count = 0"),
-        ("relative_error = 0.05", 'estimator = "owen"\nrelative_error = 0.5\nmax_count = 256'),
-    ):
-        files.recipe = files.recipe.replace(old, new)
-    twin = files.recipe.replace('name = "tiny"', 'name = "twin"').replace('"own.toml"]', '"voile"]')
-    tasks = plan(asks(twin.replace('model = "neumip"', 'model = "neumip"\nname = "fine"'), FINE, "twin"))
+    monkeypatch.setattr(run, "execute", made_up.execute)
+    fine, unseen = {"model": "neumip", "name": "fine"}, ["twill_4_4"]
+    made_up.write_recipe(tmp_path, "twin", fine, seen=["denim", "voile"], unseen=unseen)
+    models = "neumip", {"name": "fine", "recipe": "twin.toml"}
+    path = made_up.write_recipe(tmp_path, "tiny", *models, seen=["denim", "basket"], unseen=unseen)
+    tasks = plan(load_recipe(path))
     products = [path for task in tasks for path in task.products]
     assert len({task.id for task in tasks}) == len(tasks) and len(set(products)) == len(products)
     rows = [task for task in tasks if task.stage == "generate"]
@@ -140,7 +137,7 @@ def test_rows_of_both_recipes_are_made_once_and_lie_in_both_folders(asks, files,
     assert {task.shard.fabric.name for task in rows if task.products in shared} == {"denim", "twill_4_4"}
     assert all(a.startswith("datasets/tiny-") and b.startswith("datasets/twin-") for a, b in shared)
     out = tmp_path / "out"
-    assert main(["generate", str(files.path), "--out", str(out)]) == 0
+    assert main(["generate", str(path), "--out", str(out)]) == 0
     assert all(Ledger(out).state(task) == "done" for task in rows)
     assert all((out / a).read_bytes() == (out / b).read_bytes() for a, b in shared)
     for name, splits in (("tiny", {"train", "validation", "test"}), ("twin", {"train", "validation"})):

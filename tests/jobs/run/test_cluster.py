@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import urllib.request
 from http.server import HTTPServer, SimpleHTTPRequestHandler
 from itertools import product
@@ -108,39 +107,6 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_task(tmp_path, pro
     summary = fake.run(tasks, tmp_path, shown, scheduler=processes.given, manifests=[before])
     assert len(summary.ran) == 8 and len({event["pid"] for event in fake.events(tmp_path)}) == 1
     assert shown.file.getvalue().count("gets no task: it has numba 0.1") == 1
-
-
-@pytest.mark.slow
-def test_a_cluster_that_grows_and_shrinks_loses_no_task(tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
-    shards = [fake.task(f"shard {index}", seconds=0.3) for index in range(18)]
-    tasks = [*shards, fake.task("net", fake.FakeTraining, needs=shards)]
-    seen = []
-    quiet = {"dashboard_address": ":0", "silence_logs": 50}
-    with LocalCluster(n_workers=0, threads_per_worker=1, host="127.0.0.1", **quiet) as cluster:
-        adaptive = cluster.adapt(minimum=0, maximum=3, interval="100ms", wait_count=2, target_duration="300ms")
-
-        def count():
-            return len(cluster.scheduler_info["workers"])
-
-        def wait_for(condition):
-            limit = time.monotonic() + 300.0
-            while not condition() and time.monotonic() < limit:
-                time.sleep(0.05)
-
-        def change(task):
-            if len(seen) == 2:
-                wait_for(lambda: count() > 1)
-            if len(seen) == 10:
-                adaptive.maximum = 1
-                wait_for(lambda: count() == 1)
-            seen.append(count())
-
-        given = Scheduler(cluster.scheduler_address)
-        summary = fake.run(tasks, tmp_path, scheduler=given, manifests=[fake.Heard(change)])
-    assert len(summary.ran) == len(tasks) and not summary.failed and not summary.waiting
-    assert all((tmp_path / task.products[0]).read_text() == f"{task.title}\n" * 100 for task in tasks)
-    assert seen[2] > 1 and seen[10] == 1
 
 
 def test_a_port_that_listens_and_never_answers_is_bad_input(tmp_path):

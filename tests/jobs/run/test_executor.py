@@ -2,25 +2,17 @@
 
 import io
 import os
-import subprocess
-import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import dask.config
-import psutil
 import pytest
 from rich.console import Console
 
 from jobs.run import executor
-from jobs.run.cluster import Scheduler
 from jobs.run.ledger import Ledger
 from jobs.run.outcome import work
 from tests.jobs import fake_stages as fake
-from weaves.errors import BadInput, WorkFailed
-
-ROOT = Path(__file__).parents[3]
+from weaves.errors import WorkFailed
 
 
 @pytest.fixture
@@ -132,19 +124,6 @@ def test_tasks_side_by_side_in_a_process_share_it_only_if_they_may(tmp_path, mon
     assert pids["generate 0"] == pids["generate 1"] == os.getpid() and len({*pids.values()}) == 3
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        *(({"workers": count}, "--workers") for count in (-3, 1025, 10**6)),
-        ({"scheduler": Scheduler("nonsense://")}, "no dask scheduler answers"),
-        ({"scheduler": Scheduler("tls://127.0.0.1:1", key="nowhere.pem")}, r"--tls-key: nowhere\.pem: is no file"),
-    ],
-)
-def test_a_number_of_workers_or_a_scheduler_that_cannot_be_used_is_bad_input(tmp_path, plan, options, words):
-    with pytest.raises(BadInput, match=words):
-        fake.run(plan, tmp_path, **options)
-
-
 @pytest.mark.external
 def test_a_run_on_processes_of_this_machine(tmp_path, monkeypatch):
     """Kernels first; a worker that dies, tasks that fail alone, and at the end tasks with a process each."""
@@ -194,24 +173,3 @@ def test_a_worker_that_is_replaced_slowly_is_not_given_up(tmp_path):
         tasks = [fake.task(f"victim {index}", dies=True) for index in range(2)]
         summary = fake.run(tasks, tmp_path, workers=1)
     assert len(summary.ran) == 2
-
-
-@pytest.mark.external
-def test_a_killed_driver_leaves_no_process_and_the_next_run_goes_on(tmp_path, here):
-    """It is killed while a task runs alone; tests/faults/test_kills.py has random moments, and compares all bytes."""
-    command = [sys.executable, "-m", "tests.jobs.fake_stages", str(tmp_path)]
-    driver = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stderr=subprocess.DEVNULL)
-    log, deadline = tmp_path / "log.jsonl", time.monotonic() + 300
-    while not log.exists() or '"long"' not in log.read_text():
-        assert time.monotonic() < deadline and driver.poll() is None
-        time.sleep(0.02)
-    children = psutil.Process(driver.pid).children(recursive=True)
-    driver.kill()
-    driver.wait()
-    assert children and not psutil.wait_procs(children, timeout=300)[1]
-    assert [event["event"] for event in fake.events(tmp_path) if event["name"] == "long"] == ["start"]
-    *shards, net, long = fake.timed()
-    more = fake.task("more", fake.FakeTraining, needs=shards)
-    summary = fake.run([*shards, net, more], tmp_path)
-    assert titles(summary.before) == ["shard 0", "shard 1", "net"] and titles(summary.ran) == ["more"]
-    assert Ledger(tmp_path).state(long) == "missing"

@@ -42,7 +42,7 @@ def test_two_data_sets_of_one_recipe_are_sound_and_each_copy_of_a_shared_shard_i
     assert ledger.adopt(shared) and second.read_bytes() == content and faults(recipe, tasks, ledger) == []
 
 
-def test_a_manifest_of_either_data_set_is_compared_and_a_folder_or_a_larger_file_is_damaged(trade):
+def test_a_manifest_of_either_data_set_is_compared_and_a_larger_file_is_damaged(trade):
     """One that a killed run left behind its receipts is outdated."""
     recipe, tasks, ledger = trade
     first, second = sorted(ledger.out.glob("datasets/*/manifest.json"))
@@ -60,15 +60,11 @@ def test_a_manifest_of_either_data_set_is_compared_and_a_folder_or_a_larger_file
     second.unlink()
     places = [str(path.relative_to(ledger.out)) for path in (first, second)]
     assert kinds(faults(recipe, tasks, ledger)) == [("damaged", places[0]), ("missing", places[1])]
-    _, tasks, ledger = trade
-    one, other = (task for task in tasks if task.stage == "train")
-    (ledger.out / one.products[0]).unlink()
-    (ledger.out / one.products[0]).mkdir()
-    with (ledger.out / other.products[0]).open("ab") as file:
+    training = next(task for task in tasks if task.stage == "train")
+    with (ledger.out / training.products[0]).open("ab") as file:
         file.write(b"x")
-    assert {fault.kind for fault in task_faults(one, ledger)} == {"damaged"}
-    assert kinds(task_faults(other, ledger)) == [("damaged", other.products[0])]
-    assert ledger.discard(other) == [other.products[0]]
+    assert kinds(task_faults(training, ledger)) == [("damaged", training.products[0])]
+    assert ledger.discard(training) == [training.products[0]]
 
 
 def test_products_of_an_earlier_version_are_outdated_and_what_a_stopped_task_leaves_is_known(tmp_path, monkeypatch):

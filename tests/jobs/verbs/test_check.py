@@ -8,6 +8,7 @@ from jobs.plan.dataset import Shard
 from jobs.plan.page import Page
 from jobs.plan.training import Training
 from jobs.run.ledger import Ledger
+from pipeline.shards.manifest import Manifest
 from pipeline.shards.store import read_table, write_columns
 from tests.jobs import made_up
 from tests.jobs.made_up import flip
@@ -100,9 +101,22 @@ def test_a_page_of_other_measurements_is_outdated_and_values_that_were_never_rig
     columns = {name: table.column(name).to_numpy().copy() for name in table.schema.names[1:]}
     columns["diffuse_warp"][3] = -1.0
     write_columns(path, "components", shard.shard.fabric.name, columns, {})
-    Ledger(run.out).finish(shard, {path.name: made_up.Product.of(path)}, 1.0)
+    made_up.finish(shard, Ledger(run.out))
     code, _, told = run()
     assert code == 2 and f"{path}: odd: column diffuse_warp spans [-1.0" in told
+
+
+def test_a_folder_of_a_data_set_is_sound_cut_or_empty(run, call):
+    path = run.out / run.of(Shard).products[0]
+    code, said, _ = call("check", path.parent)
+    assert code == 0 and "4 shards with 224 rows are sound" in said
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    code, _, told = call("check", path.parent)
+    assert code == 2 and "whole" in told and all(path.name in line for line in told.splitlines())
+    manifest = Manifest.load(path.parent)
+    manifest.without({shard.file for shard in manifest.shards}).save(path.parent)
+    code, said, told = call("check", path.parent)
+    assert code == 2 and "sound" not in said and "lists no shards" in told
 
 
 def test_many_faults_are_counted(run):
@@ -130,16 +144,15 @@ def test_a_measurement_of_time_is_taken_again_and_shown(run, twillight):
     assert (run.out / page.products[0]).read_bytes() != found[page.products[0]] and run()[0] == 0
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(40, marks=pytest.mark.slow)])
-def test_five_flips_a_round_in_files_of_all_kinds_are_found_and_repaired(run, count):
-    """Each file is named, and all come back."""
+def test_five_flips_a_round_in_files_of_all_kinds_are_found_and_repaired(run):
+    """Each file is named, and all come back; tests/faults/test_flips.py has more of them."""
     chance = random.Random(1)
     kinds = ["datasets/*/*.parquet", "datasets/*/manifest.json", "ledger/*.json", "models/*/model.safetensors"]
     kinds += ["models/*/card.json", "records/*", "report/*/index.html", "report/*/files.json", "report/*/figures/*"]
     expected = made_up.contents(run.out)
     times = {path for task in run.tasks if task.slots == "all" or isinstance(task, Page) for path in task.products}
     times |= {f"ledger/{task.id}.json" for task in run.tasks if task.stage == "bench" or isinstance(task, Page)}
-    for _ in range(count):
+    for _ in range(4):
         struck = {chance.choice(sorted(run.out.glob(kind))) for kind in chance.sample(kinds, 5)}
         for path in struck:
             flip(path, chance)

@@ -7,7 +7,6 @@ from jobs.plan.dataset import DataSet
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
 from jobs.run.manifest_file import ManifestFile
-from jobs.run.receipt import Product
 from pipeline.shards.manifest import Manifest
 from tests.jobs import made_up
 
@@ -70,7 +69,7 @@ def test_other_bytes_of_one_task_and_manifests_of_unlike_data_sets_are_refused(p
     shutil.copytree(tmp_path / "a", tmp_path / "other")
     path = tmp_path / "other" / task.products[0]
     path.write_bytes(b"made with another version that was not told apart")
-    Ledger(tmp_path / "other").finish(task, {path.name: Product.of(path)}, 1.0)
+    made_up.finish(task, Ledger(tmp_path / "other"))
     told = parts.refused("a", "other", "--out", "c")
     assert f"{path.name} of generate {task.title} has other bytes in each" in told
     assert not list((tmp_path / "c").glob("datasets/*/*"))

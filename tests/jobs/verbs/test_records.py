@@ -47,22 +47,6 @@ def test_other_machines_are_refused_unless_asked_for_and_of_several_pages_one_is
     assert code == 0 and "0 of 2 measurements differ" in text
 
 
-def test_what_is_not_there_is_one_sentence(call, write, tmp_path):
-    a = write("a")
-    (tmp_path / "broken.json").write_text("[1]")
-    (tmp_path / "old.json").write_text('[{"method": "woven", "metric": "mean_error", "value": 1.0}]')
-    lone = write("lone") / "report/quick" / OF_A_PAGE
-    record.machine_path(lone).unlink()
-    for other, words in (
-        (tmp_path / "broken.json", "holds no records"),
-        (tmp_path / "old.json", "of this version (0.metric: 'mean_error' is no metric of reports.catalogue)"),
-        (lone, "missing or damaged"),
-    ):
-        for pair in ((a, other), (other, a)):
-            code, text, told = call("compare", *pair)
-            assert (code, text) == (2, "") and told.count("\n") == 1 and words in told, told
-
-
 def test_records_of_two_machines_are_joined_and_shown(call, refused, write, tmp_path):
     pages, out = [write("a", time=50.0, cores=2), write("b", time=20.0, cores=64)], tmp_path / "all.json"
     code, text, told = call("records", "merge", *pages, "--out", out)

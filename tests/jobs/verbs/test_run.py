@@ -14,7 +14,6 @@ from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.plan import KINDS
 from jobs.plan.training import Training
 from jobs.run import executor, outcome
-from jobs.run.ledger import Ledger
 from jobs.verbs.run import Part
 from tests.jobs import made_up
 from weaves.errors import BadInput, WorkFailed
@@ -82,11 +81,8 @@ def test_a_task_of_a_part_that_fails_leaves_the_others_and_is_told(recipe, tmp_p
     assert "generate 2 2 0" in call("status", recipe, "--out", tmp_path / "out")[1]
 
 
-def test_a_part_is_refused_beside_a_run_that_is_none_or_without_locks(recipe, tmp_path, call, monkeypatch):
+def test_a_part_is_refused_without_locks(recipe, tmp_path, call, monkeypatch):
     part = "generate", recipe, "--out", tmp_path / "out", "--part", "1/2"
-    with Ledger(tmp_path / "out").store.held():
-        code, _, told = call(*part)
-    assert code == 1 and "another run is at work in this folder" in told
     for name, expected in (("lockf", 1), ("flock", 2)):
         monkeypatch.setattr(fcntl, name, Mock(side_effect=OSError(errno.ENOLCK, "No locks available")))
         code, _, told = call(*part)

@@ -1,5 +1,7 @@
 """Answers as a file: the numbers of the method that gave them, its place on the page, and what is refused."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,8 @@ from reports.record import Record, read_records
 from reports.tables.number_format import percent
 from reports.tables.page_tables import page_frames, result_tables
 from tests.jobs import made_up
+from tests.jobs.test_bad_inputs import KINDS
+from tests.refusals import ends, refusal
 
 
 @pytest.fixture
@@ -143,8 +147,6 @@ def test_bad_entries_are_refused_before_anything_is_written(recipe, entry, refus
 
     write_answers(folder / "answers.parquet", np.full((255, 4), 0.1, np.float32))
     assert "the id 255 is missing: 1 of 256 questions have no answer" in sentence()
-    write_answers(folder / "answers.parquet", np.full((256, 4), np.nan, np.float32))
-    assert "row 0, column specular_warp = nan" in sentence() and "255 more bad rows" in sentence()
     (folder / "answers.csv").touch()
     assert "one of them is needed" in sentence()
     for path in folder.glob("answers.*"):
@@ -162,6 +164,19 @@ def test_bad_entries_are_refused_before_anything_is_written(recipe, entry, refus
     (folder / "entry.toml").unlink()
     assert "entry.toml" in sentence()
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["entry.toml", "answers.parquet", "answers.csv"])
+def test_a_broken_file_of_an_entry_is_one_sentence(name, recipe, entry):
+    for kind, write in KINDS.items():
+        folder = entry()
+        if name == "answers.csv":
+            (folder / "answers.parquet").unlink()
+        (folder / name).unlink(missing_ok=True)
+        write(folder / name)
+        with ends():
+            assert folder.name in refusal(load_recipe, recipe, [str(folder / "entry.toml")]), kind
+        shutil.rmtree(folder)
 
 
 def test_questions_change_with_what_is_right_and_not_with_how_exactly_it_is_known(tmp_path):

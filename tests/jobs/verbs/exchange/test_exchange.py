@@ -1,7 +1,6 @@
 import re
 
 import numpy as np
-import pytest
 import trimesh
 
 from pipeline.shader import tables
@@ -129,15 +128,3 @@ def test_a_page_of_a_fabric_is_written_whole_and_one_of_a_large_repeat_refused_b
     monkeypatch.setattr(view, "content", lambda fabric, truth, progress: progress(1.0) or found)
     code, said, _ = twillight("view", "gingham", "--out", "a/x.html")
     assert code == 0 and "5 views" in said and [path.name for path in (tmp_path / "a").iterdir()] == ["x.html"]
-
-
-@pytest.mark.parametrize(
-    ("flags", "allowed"),
-    [
-        (["--points", "3"], "--points = 3: a power of two from 1 to 256 is needed"),
-        (["--solar", "denim"], "--solar = 'denim': has to be the cloth 'voile' in other colours"),
-    ],
-)
-def test_a_bsdf_that_cannot_be_written_gets_one_sentence(twillight, flags, allowed, tmp_path):
-    code, _, complaint = twillight("export", "voile", "--bsdf", "shade.xml", *flags)
-    assert code == 2 and allowed in complaint and not (tmp_path / "shade.xml").exists()

@@ -1,8 +1,4 @@
-import errno
-import filecmp
 import json
-import shutil
-from unittest.mock import Mock
 
 import MaterialX
 import numpy as np
@@ -89,16 +85,19 @@ def test_normals_are_slopes_of_the_height_and_both_conventions_differ_in_green_a
     assert np.median(np.abs(towards_top - slope)[inside]) < 0.05
 
 
-def test_sizes_are_stated(folder, about, tmp_path, capsys):
+def test_sizes_are_stated_and_changed_files_kept(about, tmp_path, capsys):
     assert about["yarns_per_cm"] == [20.0, 20.0] and about["yarns_per_cm_source"] == "default"
     assert about["size_cm"] == [0.1, 0.1]
-    own = load_fabric("voile").model_copy(update={"yarns_per_cm": (18.0, 16.0)})
-    (tmp_path / "draft.toml").write_text(own.to_toml(), encoding="utf-8")
-    assert call(str(tmp_path / "draft.toml"), "--maps", str(tmp_path / "own"), "--size", "64") == 0
+    fabric = load_fabric("voile").model_copy(update={"yarns_per_cm": (18.0, 16.0)})
+    (tmp_path / "draft.toml").write_text(fabric.to_toml(), encoding="utf-8")
+    own = (str(tmp_path / "draft.toml"), "--maps", str(tmp_path / "own"), "--size", "64")
+    assert call(*own) == 0
     assert "assumed" not in capsys.readouterr().out
     found = json.loads((tmp_path / "own" / "maps.json").read_text(encoding="utf-8"))
     assert found["yarns_per_cm"] == [18.0, 16.0] and found["yarns_per_cm_source"] == "fabric"
     assert found["size_cm"] == pytest.approx([found["yarns"][0] / 18.0, found["yarns"][1] / 16.0])
+    (tmp_path / "own" / "opacity.png").write_bytes(b"painted over")
+    assert call(*own) == 2 and "opacity.png: was changed" in capsys.readouterr().err
 
 
 def test_packed_maps_hold_the_single_ones(folder):
@@ -160,31 +159,6 @@ def test_the_sample_is_read_by_other_libraries(folder):
     lengths = np.linalg.norm(mesh.visual.uv[mesh.edges[:, 0]] - mesh.visual.uv[mesh.edges[:, 1]], axis=-1)
     # A map shows a millimetre: texture coordinates are millimetres, and no yarn is stretched.
     np.testing.assert_allclose(lengths / 1000.0, mesh.edges_unique_length[mesh.edges_unique_inverse], rtol=0.05)
-
-
-def test_maps_of_before_are_replaced_and_other_files_stay(folder, tmp_path, capsys):
-    (made := tmp_path / "made" / ".git").mkdir(parents=True)
-    (made / "config").write_text("[core]", encoding="utf-8")
-    (made := made.parent).joinpath("note.txt").write_text("dear", encoding="utf-8")
-    for name in ("denim", "gauze"):
-        assert call(name, "--maps", str(made), "--size", "64") == 0
-    assert (made / "maps.json").read_bytes() == (folder / "maps.json").read_bytes()
-    assert {path.name for path in made.iterdir()} == {path.name for path in folder.iterdir()} | {".git", "note.txt"}
-    assert (made / ".git" / "config").is_file() and list(tmp_path.iterdir()) == [made]
-    (made / "opacity.png").write_bytes(b"painted over")
-    capsys.readouterr()
-    assert call("denim", "--maps", str(made), "--size", "64") == 2
-    assert "opacity.png: was changed" in capsys.readouterr().err
-    assert (made / "opacity.png").read_bytes() == b"painted over"
-
-
-def test_a_full_disk_leaves_the_maps_of_before(folder, tmp_path, monkeypatch, capsys):
-    made = tmp_path / "made"
-    shutil.copytree(folder, made)
-    full = OSError(errno.ENOSPC, "No space left on device")
-    monkeypatch.setattr(maps, "write_texture", Mock(side_effect=full))
-    assert call("denim", "--maps", str(made), "--size", "64") == 1 and "No space left" in capsys.readouterr().err
-    assert not filecmp.dircmp(folder, made).diff_files and len([*made.iterdir()]) == len([*folder.iterdir()])
 
 
 @pytest.mark.parametrize("library", ["MaterialX", "pygltflib"])

@@ -4,10 +4,7 @@ from functools import partial
 
 import pytest
 
-from pipeline.fingerprint import IDENTITY
-from pipeline.models.card import write_model
 from pipeline.models.domain import Domain
-from pipeline.models.woven import WovenOptions
 from pipeline.shader import export_shader as verb
 from pipeline.shader import languages, soft_nodes, tables
 from tests.pipeline.shader.conftest import CLOTH, neumip_folder
@@ -43,21 +40,11 @@ def test_models_that_cannot_be_exported_are_refused_in_a_sentence(refusal, monke
     neumip = neumip_folder(tmp_path / "neumip", load_fabric(CLOTH), texels_per_yarn=2)
     shader = ("--shader", "x", "--model")
     assert "was not trained on denim" in refusal("denim", *shader, neumip)
-    old = neumip_folder(tmp_path / "old", load_fabric(CLOTH), version=99, texels_per_yarn=2)
-    assert "version = 99" in refusal(CLOTH, *shader, old)
-    damaged = neumip_folder(tmp_path / "damaged", load_fabric(CLOTH), texels_per_yarn=2)
-    (tmp_path / "damaged" / "model.safetensors").write_bytes(b"\0")
-    assert "damaged" in refusal(CLOTH, *shader, damaged)
     assert "has no soft nodes" in refusal(CLOTH, *shader, neumip, "--level", "4")
-    options = WovenOptions().model_dump(mode="json", context=IDENTITY)
-    write_model(tmp_path / "woven", b"", {"options": options, "version": {"model": 1}})
-    refusal(CLOTH, *shader, str(tmp_path / "woven"))
     monkeypatch.setattr(verb, "no_onnx", lambda: "not installed: onnxscript")
     assert "not installed: onnxscript" in refusal(CLOTH, *shader, neumip, "--language", "onnx")
     monkeypatch.setattr(verb, "load_model", lambda _: [object()])
-    assert "has no shader; soft_nodes and the folder of a trained neumip" in refusal(
-        CLOTH, *shader, str(tmp_path / "woven")
-    )
+    assert "has no shader; soft_nodes and the folder of a trained neumip" in refusal(CLOTH, *shader, neumip)
     assert not (tmp_path / "x").exists()
 
 
