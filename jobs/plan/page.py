@@ -46,9 +46,9 @@ class Page(Task):
     def planned(cls, subjects: Subjects, benches: Sequence[Measurement]) -> Page:
         """Return the page of all measurements."""
         recipe = subjects.recipe
-        shots = [task for task in benches if isinstance(task, SceneShot)]
-        firsts = zip(recipe.models, subjects.first_models, strict=True)
-        models = [_note(recipe, model, first.trainings, shots) for model, first in firsts]
+        shots = [task for task in benches if isinstance(task, SceneShot) and not task.larger]
+        firsts = {name: trainings[0] for name, trainings in subjects.trainings.items()}
+        models = [_note(recipe, model, firsts.get(model.options.name, {}), shots) for model in recipe.models]
         forms = [entry.form for entry in recipe.entries]
         models += [ModelNote(form.name, form.about, per_material=form.each_fabric, kind=ADDED_MODEL) for form in forms]
         return cls(

@@ -26,9 +26,6 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     fabrics.OnUnseenPopulation,
     fabrics.Latents,
     scenes.SceneShot,
-    scenes.OnScene,
-    scenes.LargerShot,
-    scenes.LargerPicture,
     scenes.FrameTime,
     fabrics.AtExtremes,
     timing.TimeOfMethods,
@@ -38,7 +35,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     truth.LivePage,
     truth.Study,
 )
-"""The kinds of measurement, each after those that it reads."""
+"""The kinds of measurement, each after those that it reads; `SceneShot` plans those in its frames too."""
 
 
 def plan(recipe: Recipe) -> list[Task]:

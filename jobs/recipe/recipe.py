@@ -131,11 +131,6 @@ class ModelRecipe(Frozen):
         trainings = [self.training.model_copy(update={"seed": seed}) for seed in seeds]
         return [self.model_copy(update={"seeds": 1, "training": training}) for training in trainings]
 
-    def measured(self, bench: BenchOptions) -> BenchOptions:
-        """Return the measurements of this model: only networks are run in several ways."""
-        runtimes = (bench.runtimes if self.runtimes is None else self.runtimes) if self.learns else ()
-        return bench.model_copy(update={"runtimes": runtimes})
-
 
 class RecipeFile(Frozen):
     """A recipe's TOML file, key by key."""

@@ -52,7 +52,7 @@ class TimeOfMethods(Measurement):
         """Yield the one of the recipe, of models trained with their first seed: times do not depend on the weights."""
         bench = subjects.recipe.bench
         yield cls(
-            models=tuple(TimedModel(ways=model.ways(bench), **dict(model.whole)) for model in subjects.first_models),
+            models=tuple(TimedModel(ways=model.run_options(bench), **dict(model)) for model in subjects.first_models),
             dataset=subjects.held_out(*(fabric for fabric, _ in subjects.fabrics)),
             options=select(TimingOptions, bench),
         )

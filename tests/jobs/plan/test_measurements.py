@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydantic import Field, TypeAdapter
 
+from jobs.plan.measurements.scenes import OnScene
 from jobs.plan.measurements.truth import Study
 from jobs.plan.plan import KINDS, plan
 from jobs.recipe.entry import Entry, EntryForm
@@ -18,7 +19,7 @@ from reports.truth.path_traced import Traced
 from reports.truth.sampling import VarianceSaving
 from weaves.errors import WorkFailed
 
-ANY = TypeAdapter(Annotated[Union[KINDS], Field(discriminator="kind")])  # noqa: UP007
+ANY = TypeAdapter(Annotated[Union[(*KINDS, OnScene)], Field(discriminator="kind")])  # noqa: UP007
 
 
 @pytest.fixture(scope="module")
@@ -27,19 +28,19 @@ def tasks():
     recipes = [load_recipe(name) for name in ("smoke", "standard", "curved", "mitsuba")]
     words = {"name": "theirs", "title": "theirs", "definition": "Theirs.", "unit": "1"}
     words |= {"better": "lower", "format": "percent", "stated": "1"}
-    recipes[0] = replace(recipes[0], metrics=(AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words),))
+    metrics = (AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words),)
     filled = dict.fromkeys(("name", "authors", "version", "machine", "training"), "theirs") | {"source": ""}
     filled |= {"questions": "0" * 16, "nanoseconds": 1, "threads": 1, "tries": 1, "each_fabric": False}
     entry = Entry(EntryForm(**filled, bytes_stored=0, multiply_adds=0), "0" * 64, "/records/answers.csv")
-    recipes[0] = replace(recipes[0], entries=(entry,))
     first, *others = recipes[0].models
-    recipes[0] = replace(recipes[0], models=(first.model_copy(update={"seeds": 2}), *others))
+    models = (first.model_copy(update={"seeds": 2}), *others)
+    recipes[0] = replace(recipes[0], metrics=metrics, entries=(entry,), models=models)
     return [task for recipe in recipes for task in plan(recipe) if task.stage == "bench"]
 
 
 def test_every_kind_is_planned_and_read_back_from_its_own_dump(tasks):
     """Its identity has what it needs and no path; so no result outlives what it was made from."""
-    assert {type(task) for task in tasks} == set(KINDS)
+    assert {type(task) for task in tasks} == {*KINDS, OnScene}
     for task in tasks:
         again = ANY.validate_json(task.model_dump_json())
         assert type(again) is type(task) and again.id == task.id
