@@ -27,6 +27,8 @@ class Page(Task):
     """The task that writes the page of a recipe."""
 
     stage: ClassVar[Stage] = "report"
+    group: ClassVar = "page"
+    cost: ClassVar = 15.0
 
     recipe: str
     about: str
@@ -67,11 +69,6 @@ class Page(Task):
         )
 
     @property
-    def group(self) -> str:
-        """Page."""
-        return "page"
-
-    @property
     def title(self) -> str:
         """Recipe."""
         return f"page of {self.recipe}"
@@ -96,11 +93,6 @@ class Page(Task):
         from reports.page.files import read_files
 
         return (*(f"{self.folder}/{name}" for name in read_files(out / self.folder)), *reversed(self.products))
-
-    @property
-    def cost(self) -> float:
-        """Estimated seconds on one core."""
-        return 15.0
 
     def versions(self) -> dict[str, int]:
         """Return the version of the benchmark."""
@@ -147,7 +139,7 @@ def _note(
         kind = f"{about}; "
     if trainings:
         first = next(iter(trainings.values()))
-        what = "each fabric by itself" if model.of_one_material else f"{len(first.fabrics)} fabrics at once"
+        what = "each fabric by itself" if model.options.of_one_material else f"{len(first.fabrics)} fabrics at once"
         about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
         if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"
@@ -161,13 +153,13 @@ def _note(
         name=options.name,
         about=about,
         fingerprint=" ".join(task.id for task in trainings.values()),
-        per_material=model.of_one_material,
+        per_material=model.options.of_one_material,
         kind=options.model,
     )
 
 
 def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]) -> str:
-    if not model.of_one_material:
+    if not model.options.of_one_material:
         return ""
     fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]
     scenes = [f"in the scene {shot.scene}" for shot in shots if not trainings.keys() >= set(shot.fabrics)]

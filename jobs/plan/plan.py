@@ -43,7 +43,7 @@ def plan(recipe: Recipe) -> list[Task]:
     datasets = {id(member): DataSet(member) for member in recipe.together}
     own = datasets[id(recipe)]
     rows, trained = list(own.shards), {}
-    for model in (model for model in recipe.models if model.learns):
+    for model in (model for model in recipe.models if model.options.learns):
         dataset = datasets[id(recipe.trainer_of(model))]
         trained[model.options.name] = Training.planned(dataset, model)
         # Of another recipe's rows those that its model learns from; they are the same for every seed.

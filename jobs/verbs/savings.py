@@ -143,7 +143,7 @@ def _costs(
     shards = [task for task in tasks if task.stage == "generate"]
     trainings = [task for task in tasks if isinstance(task, Training)]
     cards = [read_card(ledger.out / task.folder) for task in trainings]
-    needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.fabrics)]
+    needed = [task for task in trainings if not model.options.of_one_material or worn.issuperset(task.fabrics)]
     return {
         ("queries generated", "1"): Value(sum(task.rows for task in shards)),
         ("generation", "s"): Value(sum(ledger.seconds(task) for task in shards)),

@@ -283,7 +283,7 @@ class Latents(Measurement):
     kind: Literal["latents"] = "latents"
     timed: ClassVar = True
     code: ClassVar = ("truth", "bench")
-    seconds: ClassVar = 10.0
+    cost: ClassVar = 10.0
     model: Trained
     presets: tuple[Uncoloured, ...]  # presets of the pairs
     queries: QueryOptions

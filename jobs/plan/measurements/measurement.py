@@ -29,7 +29,6 @@ class Measurement(Task):
     stage: ClassVar[Stage] = "bench"
     code: ClassVar[tuple[str, ...]] = ("bench",)
     """Its code among `pipeline.versions` and ``bench``, beside that of its models and of their ways to run."""
-    seconds: ClassVar[float] = 1.0  # estimated seconds on one core
     endings: ClassVar[tuple[str, ...]] = ()
     """Of the files of a kind that makes files for others, not Records: pictures of the truth, for example."""
 
@@ -83,11 +82,6 @@ class Measurement(Task):
     def made(self) -> Made:
         """The file that other measurements read."""
         return Made(task=self.id, path=self.products[0])
-
-    @property
-    def cost(self) -> float:
-        """Estimated seconds on one core."""
-        return self.seconds
 
     @property
     def threads(self) -> int:

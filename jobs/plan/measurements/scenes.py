@@ -189,7 +189,7 @@ class FrameTime(Measurement):
     kind: Literal["frame time"] = "frame time"
     timed: ClassVar = True
     code: ClassVar = ("fallback", "bench")
-    seconds: ClassVar = 10.0
+    cost: ClassVar = 10.0
     scene: str
     shot: Made  # frames of the scene with the truth's answers
     models: tuple[Trained, ...]  # the models that answer for its cloths

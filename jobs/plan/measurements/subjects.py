@@ -153,7 +153,7 @@ class Subjects:
                         fabrics=tuple(trainings),
                         seed=model.training.seed + index,
                         is_first=not index,
-                        runtimes=own if model.learns and not index else (),
+                        runtimes=own if model.options.learns and not index else (),
                     )
                 )
         return models

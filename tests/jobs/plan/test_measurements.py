@@ -19,7 +19,7 @@ from reports.truth.path_traced import Traced
 from reports.truth.sampling import VarianceSaving
 from weaves.errors import WorkFailed
 
-ANY = TypeAdapter(Annotated[Union[(*KINDS, OnScene)], Field(discriminator="kind")])  # noqa: UP007
+ANY = TypeAdapter(Annotated[Union[(*KINDS, OnScene)], Field(discriminator="kind")])
 
 
 @pytest.fixture(scope="module")
