@@ -294,8 +294,8 @@ class Latents(Measurement):
         """Yield one a model that blends latents, trained with its first seed."""
         names = sorted({name for first, second, _ in options.LATENT_PAIRS for name in (first, second)})
         dataset = subjects.recipe.dataset
-        for model in subjects.first_models:
-            if subjects.recipe.bench.latents and model.options.blends:
+        for model in subjects.models if subjects.recipe.bench.latents else ():
+            if model.is_first and model.options.blends:
                 presets = tuple(map(load_fabric, names))
                 yield cls(model=model, presets=presets, queries=dataset.queries, truth=dataset.truth)
 

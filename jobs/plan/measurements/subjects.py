@@ -158,11 +158,6 @@ class Subjects:
                 )
         return models
 
-    @property
-    def first_models(self) -> list[Trained]:
-        """The models, each trained with its first seed."""
-        return [model for model in self.models if model.is_first]
-
     def answering(self, fabrics: Sequence[str]) -> list[Trained]:
         """Return the models of all seeds that answer for all of some fabrics, with the networks that do."""
         return [trained for model in self.models if (trained := model.on(fabrics))]
@@ -174,8 +169,8 @@ class Subjects:
 
     @cached_property
     def _test_rows(self) -> Mapping[str, Sequence[str]]:
-        rows: dict[str, list[str]] = {fabric.name: [] for fabric in self.recipe.fabrics}
+        rows: dict[str, list[str]] = {}
         for part in self.dataset.shards:
             if part.shard.split == "test":
-                rows[part.shard.fabric.name].append(part.id)
+                rows.setdefault(part.shard.fabric.name, []).append(part.id)
         return rows

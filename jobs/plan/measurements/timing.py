@@ -38,9 +38,9 @@ class TimeOfMethods(Measurement):
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield the one of the recipe, of models trained with their first seed: times do not depend on the weights."""
-        bench = subjects.recipe.bench
+        bench, firsts = subjects.recipe.bench, (model for model in subjects.models if model.is_first)
         yield cls(
-            models=tuple(TimedModel(ways=model.run_options(bench), **dict(model)) for model in subjects.first_models),
+            models=tuple(TimedModel(ways=model.run_options(bench), **dict(model)) for model in firsts),
             dataset=subjects.held_out(*(fabric for fabric, _ in subjects.fabrics)),
             options=select(TimingOptions, bench),
         )

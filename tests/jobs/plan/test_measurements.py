@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from pydantic import Field, TypeAdapter
 
-from jobs.plan.measurements.scenes import OnScene
-from jobs.plan.measurements.truth import Study
+from jobs.plan.measurements import scenes, truth
 from jobs.plan.plan import KINDS, plan
 from jobs.recipe.entry import Entry, EntryForm
 from jobs.recipe.load import load_recipe
@@ -19,7 +18,7 @@ from reports.truth.path_traced import Traced
 from reports.truth.sampling import VarianceSaving
 from weaves.errors import WorkFailed
 
-ANY = TypeAdapter(Annotated[Union[(*KINDS, OnScene)], Field(discriminator="kind")])
+ANY = TypeAdapter(Annotated[Union[(*KINDS, scenes.OnScene)], Field(discriminator="kind")])
 
 
 @pytest.fixture(scope="module")
@@ -28,19 +27,19 @@ def tasks():
     recipes = [load_recipe(name) for name in ("smoke", "standard", "curved", "mitsuba")]
     words = {"name": "theirs", "title": "theirs", "definition": "Theirs.", "unit": "1"}
     words |= {"better": "lower", "format": "percent", "stated": "1"}
-    metrics = (AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words),)
+    metric = AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words)
     filled = dict.fromkeys(("name", "authors", "version", "machine", "training"), "theirs") | {"source": ""}
     filled |= {"questions": "0" * 16, "nanoseconds": 1, "threads": 1, "tries": 1, "each_fabric": False}
     entry = Entry(EntryForm(**filled, bytes_stored=0, multiply_adds=0), "0" * 64, "/records/answers.csv")
     first, *others = recipes[0].models
-    models = (first.model_copy(update={"seeds": 2}), *others)
-    recipes[0] = replace(recipes[0], metrics=metrics, entries=(entry,), models=models)
+    own = {"entries": (entry,), "metrics": (metric,), "models": (first.model_copy(update={"seeds": 2}), *others)}
+    recipes[0] = replace(recipes[0], **own)
     return [task for recipe in recipes for task in plan(recipe) if task.stage == "bench"]
 
 
 def test_every_kind_is_planned_and_read_back_from_its_own_dump(tasks):
     """Its identity has what it needs and no path; so no result outlives what it was made from."""
-    assert {type(task) for task in tasks} == {*KINDS, OnScene}
+    assert {type(task) for task in tasks} == {*KINDS, scenes.OnScene}
     for task in tasks:
         again = ANY.validate_json(task.model_dump_json())
         assert type(again) is type(task) and again.id == task.id
@@ -67,7 +66,7 @@ def test_every_study_is_in_a_shipped_recipe():
 )
 def test_a_study_records_what_its_module_yields(tmp_path, monkeypatch, module, row):
     monkeypatch.setattr(module, "measure", lambda: iter([row]))
-    study = Study(study=module.__name__.rpartition(".")[2])
+    study = truth.Study(study=module.__name__.rpartition(".")[2])
     (tmp_path / "records").mkdir()
     study.run(tmp_path, lambda share: None)
     assert module.RECORDS.from_records(read_records([tmp_path / study.records])) == [row]
@@ -81,7 +80,7 @@ def test_an_unstable_expression_fails_the_study(tmp_path, monkeypatch, value):
     monkeypatch.setattr(stability, "places", list)
     monkeypatch.setattr(stability, "footprints", list)
     (tmp_path / "records").mkdir()
-    study = Study(study="stability")
+    study = truth.Study(study="stability")
     if value == 1.0:
         study.run(tmp_path, lambda share: None)
         (found,) = finding.RECORDS.from_records(read_records([tmp_path / study.records]))

@@ -4,7 +4,6 @@ import pytest
 
 from jobs.cli import main
 from jobs.plan.dataset import DataSet
-from jobs.plan.measurements.timing import TimeOfMethods
 from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.run.ledger import Ledger
@@ -164,10 +163,10 @@ def test_models_taught_elsewhere_need_test_rows_alone_and_may_come_by_way_of_a_t
 
 def test_ways_to_run_are_this_recipes_to_say(asks, files):
     files.recipe = files.recipe.replace("frames = 4", 'frames = 4\nruntimes = ["onnx", "eager-bf16"]')
-    every, none = asks(), asks(entry=OTHER + "runtimes = []\n")
-    timed = [task for recipe in (every, none) for task in plan(recipe) if isinstance(task, TimeOfMethods)]
+    every, none = plan(asks()), plan(asks(entry=OTHER + "runtimes = []\n"))
+    timed = [task for task in (*every, *none) if task.group == "timing of all methods"]
     assert [task.models[-1].ways.runtimes for task in timed] == [("onnx", "eager-bf16"), ()]
-    assert_changed(plan(every), plan(none), "errors of curved|timing|^report")
+    assert_changed(every, none, "errors of curved|timing|^report")
 
 
 @pytest.mark.parametrize(
