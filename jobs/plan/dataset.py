@@ -31,6 +31,7 @@ class Shard(Task):
 
     stage: ClassVar[Stage] = "generate"
     shares_process: ClassVar[bool] = True
+    needs: ClassVar = ()
 
     shard: AnyShardTask  # rows of one fabric, and how they are answered
     role: str  # role of the fabric in the data set (`pipeline.shards.manifest`)
@@ -52,11 +53,6 @@ class Shard(Task):
     def products(self) -> tuple[str, ...]:
         """The same shard in every folder."""
         return tuple(f"{folder}/part-{self.id}.parquet" for folder in self.folders)
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Nothing."""
-        return ()
 
     @property
     def cost(self) -> float:

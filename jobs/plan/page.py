@@ -27,6 +27,8 @@ class Page(Task):
     """The task that writes the page of a recipe."""
 
     stage: ClassVar[Stage] = "report"
+    group: ClassVar = "page"
+    cost: ClassVar = 15.0
 
     recipe: str
     about: str
@@ -46,9 +48,9 @@ class Page(Task):
     def planned(cls, subjects: Subjects, benches: Sequence[Measurement]) -> Page:
         """Return the page of all measurements."""
         recipe = subjects.recipe
-        shots = [task for task in benches if isinstance(task, SceneShot)]
-        firsts = zip(recipe.models, subjects.first_models, strict=True)
-        models = [_note(recipe, model, first.trainings, shots) for model, first in firsts]
+        shots = [task for task in benches if isinstance(task, SceneShot) and not task.larger]
+        firsts = {name: trainings[0] for name, trainings in subjects.trainings.items()}
+        models = [_note(recipe, model, firsts.get(model.options.name, {}), shots) for model in recipe.models]
         forms = [entry.form for entry in recipe.entries]
         models += [ModelNote(form.name, form.about, per_material=form.each_fabric, kind=ADDED_MODEL) for form in forms]
         return cls(
@@ -65,11 +67,6 @@ class Page(Task):
             pictures=tuple(picture for task in benches for picture in task.pictures),
             live={task.fabric.name: task.products[0] for task in benches if isinstance(task, LivePage)},
         )
-
-    @property
-    def group(self) -> str:
-        """Page."""
-        return "page"
 
     @property
     def title(self) -> str:
@@ -96,11 +93,6 @@ class Page(Task):
         from reports.page.files import read_files
 
         return (*(f"{self.folder}/{name}" for name in read_files(out / self.folder)), *reversed(self.products))
-
-    @property
-    def cost(self) -> float:
-        """Estimated seconds on one core."""
-        return 15.0
 
     def versions(self) -> dict[str, int]:
         """Return the version of the benchmark."""
@@ -147,7 +139,7 @@ def _note(
         kind = f"{about}; "
     if trainings:
         first = next(iter(trainings.values()))
-        what = "each fabric by itself" if model.of_one_material else f"{len(first.fabrics)} fabrics at once"
+        what = "each fabric by itself" if model.options.of_one_material else f"{len(first.fabrics)} fabrics at once"
         about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
         if options.departures:
             about += f"; unlike the paper: {', '.join(options.departures)}"
@@ -161,13 +153,13 @@ def _note(
         name=options.name,
         about=about,
         fingerprint=" ".join(task.id for task in trainings.values()),
-        per_material=model.of_one_material,
+        per_material=model.options.of_one_material,
         kind=options.model,
     )
 
 
 def _left_out(recipe: Recipe, model: ModelRecipe, trainings: Mapping[str, Training], shots: Sequence[SceneShot]) -> str:
-    if not model.of_one_material:
+    if not model.options.of_one_material:
         return ""
     fabrics = [fabric.name for fabric in (*recipe.seen, *recipe.unseen) if fabric.name not in trainings]
     scenes = [f"in the scene {shot.scene}" for shot in shots if not trainings.keys() >= set(shot.fabrics)]

@@ -26,9 +26,6 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     fabrics.OnUnseenPopulation,
     fabrics.Latents,
     scenes.SceneShot,
-    scenes.OnScene,
-    scenes.LargerShot,
-    scenes.LargerPicture,
     scenes.FrameTime,
     fabrics.AtExtremes,
     timing.TimeOfMethods,
@@ -38,7 +35,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     truth.LivePage,
     truth.Study,
 )
-"""The kinds of measurement, each after those that it reads."""
+"""The kinds of measurement, each after those that it reads; `SceneShot` plans those in its frames too."""
 
 
 def plan(recipe: Recipe) -> list[Task]:
@@ -46,7 +43,7 @@ def plan(recipe: Recipe) -> list[Task]:
     datasets = {id(member): DataSet(member) for member in recipe.together}
     own = datasets[id(recipe)]
     rows, trained = list(own.shards), {}
-    for model in (model for model in recipe.models if model.learns):
+    for model in (model for model in recipe.models if model.options.learns):
         dataset = datasets[id(recipe.trainer_of(model))]
         trained[model.options.name] = Training.planned(dataset, model)
         # Of another recipe's rows those that its model learns from; they are the same for every seed.

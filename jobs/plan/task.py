@@ -49,7 +49,12 @@ class TaskPart(Frozen):
     @property
     def needs(self) -> tuple[str, ...]:
         """Ids of the tasks whose products it reads: those of its parts."""
-        return tuple(id for part in held(self, TaskPart) for id in part.needs)
+        return tuple(id for part in self.held(TaskPart) for id in part.needs)
+
+    def held(self, kind: type[_Kind]) -> Iterator[_Kind]:
+        """Yield all objects of a kind in its fields, but none inside another one."""
+        for name in type(self).model_fields:
+            yield from _held_in(getattr(self, name), kind)
 
 
 class Made(TaskPart):
@@ -142,17 +147,12 @@ Uncoloured = Annotated[Fabric, WrapSerializer(_optics)]  # a fabric whose colour
 Coloured = Annotated[Fabric, WrapSerializer(_look)]  # a fabric whose colours change the result
 
 
-def held(owner: BaseModel, kind: type[_Kind]) -> Iterator[_Kind]:
-    """Yield all objects of a kind in the fields of a task or option, but none inside another one."""
-    for name in type(owner).model_fields:
-        yield from _held_in(getattr(owner, name), kind)
-
-
 def _held_in(value: object, kind: type[_Kind]) -> Iterator[_Kind]:
     if isinstance(value, kind):
         yield value
-    elif isinstance(value, BaseModel):
-        yield from held(value, kind)
-    elif isinstance(value, Mapping | list | tuple):
+        return
+    if isinstance(value, BaseModel):
+        value = [getattr(value, name) for name in type(value).model_fields]
+    if isinstance(value, Mapping | list | tuple):
         for inner in value.values() if isinstance(value, Mapping) else value:
             yield from _held_in(inner, kind)

@@ -36,7 +36,7 @@ class Training(Task):
         """
         recipe = dataset.recipe
         groups = {"": [fabric.name for fabric in (*recipe.seen, *recipe.population)]}
-        if model.of_one_material:
+        if model.options.of_one_material:
             groups = {fabric.name: [fabric.name] for fabric in (*recipe.seen, *recipe.unseen)}
         splits = {"train", "validation", *map(set_name, model.options.extra_rows)}
         group_of = {name: key for key, names in groups.items() for name in names}

@@ -22,9 +22,9 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
     from pipeline.models.domain import Domain
     from pipeline.models.fallback import Fallback
 
-    options, alone = model.options, model.of_one_material
+    options, alone = model.options, model.options.of_one_material
     learnt_from = recipe.seen + (recipe.unseen if alone else recipe.population)
-    domain = Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from) if model.learns else None
+    domain = Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from) if options.learns else None
     method: Any = SimpleNamespace(name="", setting="", domain=domain, turns=options.turns)
     fallback = Fallback(method, options.kinds, recipe.bench.scenes.footprint)
     optics, fallback_rows = [fabric.optics() for fabric in learnt_from] if alone else [], []

@@ -89,21 +89,11 @@ class ModelRecipe(Frozen):
     """Ways to run it that are measured too; left out: those of ``bench.runtimes``."""
 
     @property
-    def of_one_material(self) -> bool:
-        """True if a trained model knows a single fabric."""
-        return self.options.of_one_material
-
-    @property
     def trained_roles(self) -> frozenset[str]:
         """Roles of the fabrics that it is trained on: each named fabric by itself, or all but the unseen ones."""
-        if not self.learns:
+        if not self.options.learns:
             return frozenset()
-        return frozenset({"seen", "unseen"} if self.of_one_material else {"seen", "population"})
-
-    @property
-    def learns(self) -> bool:
-        """True if there is anything to train."""
-        return self.options.learns
+        return frozenset({"seen", "unseen"} if self.options.of_one_material else {"seen", "population"})
 
     @model_validator(mode="before")
     @classmethod
@@ -116,11 +106,11 @@ class ModelRecipe(Frozen):
     @model_validator(mode="after")
     def _nothing_idle(self) -> ModelRecipe:
         for key, shown in {"training": "[models.training]", "seeds": "seeds"}.items():
-            if not self.learns and key in self.model_fields_set:
+            if not self.options.learns and key in self.model_fields_set:
                 raise ValueError(f"{self.options.model} has nothing to train: leave {shown} out")
         if self.training.seed + self.seeds > 2**63:
             raise ValueError(f"seeds, {self.seeds}, from training.seed, {self.training.seed}, on: above 2^63 - 1")
-        if not self.learns and self.runtimes is not None:
+        if not self.options.learns and self.runtimes is not None:
             raise ValueError(f"{self.options.model} is no network: leave runtimes out")
         return self
 
@@ -130,11 +120,6 @@ class ModelRecipe(Frozen):
         seeds = range(self.training.seed, self.training.seed + self.seeds)
         trainings = [self.training.model_copy(update={"seed": seed}) for seed in seeds]
         return [self.model_copy(update={"seeds": 1, "training": training}) for training in trainings]
-
-    def measured(self, bench: BenchOptions) -> BenchOptions:
-        """Return the measurements of this model: only networks are run in several ways."""
-        runtimes = (bench.runtimes if self.runtimes is None else self.runtimes) if self.learns else ()
-        return bench.model_copy(update={"runtimes": runtimes})
 
 
 class RecipeFile(Frozen):
@@ -211,11 +196,12 @@ class Recipe:
         named: dict[Split, int] = {"train": rows.train, "validation": rows.validation, "test": rows.test}
         population: dict[Split, int] = {"train": rows.population}
         test: dict[Split, int] = {"test": rows.test}
-        learners = [model for model in self.own_models if model.learns]  # those of other recipes read rows of their own
+        # Models that other recipes train read rows of their own.
+        learners = [model for model in self.own_models if model.options.learns]
         if self.models and not learners:
             named, population = test, {}
         # Only a model of one material learns from an unseen fabric; without one, there is nobody to read those rows.
-        unseen = named if any(model.of_one_material for model in learners) else test
+        unseen = named if any(model.options.of_one_material for model in learners) else test
         splits = {"seen": named, "population": population, "unseen": unseen, "unseen_population": test}
         for role, fabrics in self.by_role.items():
             for fabric in fabrics:

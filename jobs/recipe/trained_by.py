@@ -61,7 +61,7 @@ def check_trained_by(recipe: Recipe, where: str) -> None:
                 if (cloth := named.get(fabric.name)) and cloth.optics() != fabric.optics():
                     allowed = f"another cloth is called {fabric.name} there: rename one of them"
                     raise BadInput(where, key, trainer.name, allowed)
-            if not model.of_one_material:
+            if not model.options.of_one_material:
                 _refuse_fabrics(recipe, model, trainer, key, where)
 
 
@@ -83,7 +83,7 @@ def _taken_over(
         raise BadInput(where, f"{key}.model", entry["model"], allowed)
     for more in entry.keys() - set(_KEYS):
         raise BadInput(where, f"{key}.{more}", entry[more], f"leave it out: the recipe {trainer.name} says it")
-    if not model.learns:
+    if not model.options.learns:
         raise BadInput(where, f"{key}.recipe", entry["recipe"], f"{name} has nothing to train: leave it out")
     whole = options.model_dump() | {"training": model.training.model_dump(), "seeds": model.seeds}
     whole |= {"runtimes": entry["runtimes"]} if "runtimes" in entry else {}

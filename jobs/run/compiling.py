@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final, NamedTuple
 
-from jobs.plan.task import Task, held
+from jobs.plan.task import Task
 from pipeline.models.options import Options
 from pipeline.truth.options import TruthOptions
 
@@ -64,7 +64,7 @@ def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
 
 def _estimators(task: Task) -> Iterator[str]:
     """Yield the estimators that a task evaluates, `owen` for those with its kernels; a page evaluates none."""
-    for truth in held(task, TruthOptions) if task.stage != "report" else ():
+    for truth in task.held(TruthOptions) if task.stage != "report" else ():
         yield "owen" if truth.estimator in ("mc", "r2") else truth.estimator
     if "fallback" in task.versions():
         yield from ("node_table", "owen")  # which answer queries outside the domain of a method
@@ -72,6 +72,6 @@ def _estimators(task: Task) -> Iterator[str]:
 
 def _models(task: Task) -> Iterator[Options]:
     """Yield the models without training that a task names, with the first value of their parameter alone."""
-    for options in held(task, Options):
+    for options in task.held(Options):
         if not options.learns and options.model != "added":  # code from outside runs in a process of its own
             yield options.single()[0]

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from jobs.run.cluster import MOST_WORKERS
 from jobs.terminal import number, print_lines, print_table, progress
-from jobs.verbs.parameters import FabricName, Place, Whole, given
+from jobs.verbs.parameters import FabricName, Place, Whole, given, named_flags
 from pipeline.cores import cores
 from pipeline.shards.evaluate import Answerer, bad_list, evaluate_file, truth_answerer
 from pipeline.truth.estimator import ESTIMATORS
@@ -46,12 +46,8 @@ def _truth_options(chosen: dict[str, Any]) -> TruthOptions:
     """Return the options of the truth; BadInput if one cannot be used, named as it is spelt on the command line."""
     if "estimator" in chosen and chosen["estimator"] not in ESTIMATORS:
         raise BadInput(_WHERE, "--estimator", chosen["estimator"], nearest(chosen["estimator"], ESTIMATORS))
-    try:
+    with named_flags(_WHERE, _WHERE):
         return validated(TruthOptions, chosen, _WHERE)
-    except BadInput as error:
-        if not error.key:
-            raise
-        raise BadInput(_WHERE, _flag(error.key), error.value, error.allowed) from error
 
 
 def evaluate(
@@ -83,7 +79,7 @@ def evaluate(
         threads = one_thread()
         for name, value in (chosen | ({"seed": seed} if seed else {})).items():
             allowed = "leave it out with --model: it is an option of the ground truth"
-            raise BadInput(_WHERE, _flag(name), value, allowed)
+            raise BadInput(_WHERE, f"--{name.replace('_', '-')}", value, allowed)
         answerer = _model_answerer(model, cloth, extrapolate)
     if not 0 <= workers <= MOST_WORKERS:
         raise BadInput(_WHERE, "--workers", workers, f"must be from 0 (one per core) to {MOST_WORKERS}")
@@ -138,7 +134,3 @@ def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
         return Answerer(answer, about, lambda queries: faults_of(queries, who, kinds) | faults(queries))
     about["card"] = read_text(place(model, "--model") / CARD, 8 * MIB, "a model card")
     return Answerer(answer, about, lambda queries: domain.faults(queries, method.name) | faults(queries))
-
-
-def _flag(name: str) -> str:
-    return f"--{name.replace('_', '-')}"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -12,7 +11,7 @@ from typing import Annotated, Any, Final
 from cyclopts import Parameter
 
 from jobs.terminal import Terminal, print_lines, progress
-from jobs.verbs.parameters import NOTHING, FabricName, Local, Whole, given
+from jobs.verbs.parameters import NOTHING, FabricName, Local, Whole, given, named_flags
 from pipeline.atomic import atomic_write, refuse_unwritable
 from reports.exports.export import export
 from weaves.draft_files.read import DraftThreads, cut_out, read_draft
@@ -156,14 +155,14 @@ def gallery(
     cloths = {name: load_fabric(name) for name in fabrics or preset_names()}
     if len({cloth.name for cloth in cloths.values()}) < len(cloths):
         raise BadInput("gallery", "FABRICS", ", ".join(cloths), "two have the same name; each needs its own")
-    with _named_flags("gallery"):
+    with named_flags("gallery", "export"):
         for cloth in cloths.values():
             layout(cloth, size)  # a size that one of them cannot have ends the work before it begins
     refuse_unwritable(out / INDEX)
     cards = []
     for number, cloth in enumerate(cloths.values(), 1):
         print_lines(f"{number} of {len(cloths)}: {cloth.name}", stderr=True)
-        with _named_flags("gallery"):
+        with named_flags("gallery", "export"):
             cards.append(write_fabric(cloth, out, size, language))
         write_swatch(cloth, out / cloth.name, _PICTURE_SIZE).replace(out / cloth.name / PICTURE)
     atomic_write(out / INDEX, gallery_page(cards).encode())
@@ -171,17 +170,5 @@ def gallery(
 
 
 def _write(verb: str, name: str, kind: str, path: Path, options: Mapping[str, Any], **flags: str) -> None:
-    with _named_flags(verb, **flags):
+    with named_flags(verb, "export", **flags):
         print_lines(export(load_fabric(name), kind, path, **options))
-
-
-@contextmanager
-def _named_flags(verb: str, **flags: str) -> Iterator[None]:
-    """Name options of exports in messages as the verb does, as flags; `flags` are those that differ."""
-    try:
-        yield
-    except BadInput as error:
-        if error.where != "export":
-            raise
-        key = error.key and f"--{flags.get(error.key, error.key)}"
-        raise BadInput(verb, key, error.value, error.allowed) from error

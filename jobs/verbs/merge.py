@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from cyclopts import Parameter
 
@@ -20,10 +20,8 @@ from jobs.run.store import LEDGER
 from jobs.terminal import MOST_SENTENCES, print_lines
 from jobs.verbs.parameters import Local
 from pipeline.atomic import link
+from pipeline.shards.manifest import FILE, Manifest
 from weaves.errors import BadInput
-
-if TYPE_CHECKING:
-    from pipeline.shards.manifest import Manifest
 
 
 class MergedTask(NamedTuple):
@@ -106,8 +104,6 @@ def _refuse_conflict(first: MergedTask, second: MergedTask) -> None:
 
 def _manifests(ledgers: Sequence[Ledger], out: Path) -> dict[Path, Manifest]:
     """Return by folder in `out` the manifests of all data sets, each with the shards of all folders."""
-    from pipeline.shards.manifest import FILE, Manifest
-
     manifests: dict[Path, Manifest] = {}
     for ledger in ledgers:
         for path in sorted(ledger.out.glob(f"{DATASETS}/*/{FILE}")):

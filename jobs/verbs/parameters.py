@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -10,7 +11,7 @@ from typing import Annotated, Any, Final, Literal
 from cyclopts import Parameter, Token
 
 from jobs.run.cluster import HERE, Scheduler
-from weaves.errors import one_line
+from weaves.errors import BadInput, one_line
 
 
 def _place(type_: object, tokens: Sequence[Token]) -> Path:
@@ -35,6 +36,18 @@ def _added(type_: object, tokens: Sequence[Token]) -> list[str]:
 
 def _whole(type_: object, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)  # cyclopts itself rounds 1.5 to 2
+
+
+@contextmanager
+def named_flags(verb: str, where: str, **flags: str) -> Iterator[None]:
+    """Name options in the messages of `where` as the verb does, as flags; `flags` are those that differ."""
+    try:
+        yield
+    except BadInput as error:
+        if error.where != where:
+            raise
+        name = flags.get(error.key, error.key).replace("_", "-")
+        raise BadInput(verb, name and f"--{name}", error.value, error.allowed) from error
 
 
 def given(flags: Any) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -12,11 +12,10 @@ from jobs.recipe.load import load_recipe
 from jobs.terminal import number, print_lines, print_result, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Local, Out, RecipeName
 from pipeline.atomic import atomic_write
+from reports.machines import join, names_of, refuse_several
+from reports.record import OF_A_PAGE, Record, read_machine, read_records, write_records
 from weaves.errors import BadInput
 from weaves.reading import MIB, read_text
-
-if TYPE_CHECKING:
-    from reports.record import Record
 
 OfSeveralPages = Annotated[str, Parameter(help="Recipe, if a folder of products has several pages.")]
 
@@ -28,8 +27,6 @@ def records_file(path: Path, recipe: str = "") -> Path:
 
     BadInput if there is none, or there are several.
     """
-    from reports.record import OF_A_PAGE
-
     if path.is_file():
         return path
     if not path.is_dir():
@@ -58,8 +55,6 @@ def compare(
     BadInput if one has no Records or no machine, the machines differ without `other_machine`, or no measurement is
     shared.
     """
-    from reports.machines import refuse_several
-    from reports.record import read_machine, read_records
     from reports.tables.compare import LEVEL, NO_DIFFERENCE, difference_tables, refuse_other_machine
     from reports.tables.compare import compare as differences
     from reports.tables.sentences import busy
@@ -95,7 +90,6 @@ def results(
 
     BadInput if the recipe has no page in `out`, its Records are incomplete, or `readme` has no such block.
     """
-    from reports.record import read_machine, read_records
     from reports.tables.documents import README_BLOCK, block, readme_block, results_page, with_block
 
     name = load_recipe(recipe, add).name
@@ -127,9 +121,6 @@ def merge_records(
     BadInput if fewer than two files are given, one has no Records or no machine or holds several machines, or `out` is
     one of them, no name of a .json file, or in no folder.
     """
-    from reports.machines import join, names_of
-    from reports.record import read_machine, read_records, write_records
-
     if len(files) < 2:
         raise BadInput(_MERGE, "files", [str(path) for path in files], "two files of Records or more are needed")
     sources = [records_file(path, recipe) for path in files]

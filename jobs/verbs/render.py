@@ -14,7 +14,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from jobs.terminal import duration, print_lines, progress
-from jobs.verbs.parameters import NOTHING, Local, SceneName, Whole
+from jobs.verbs.parameters import NOTHING, Local, SceneName, Whole, named_flags
 from pipeline import versions
 from pipeline.atomic import atomic_write, refuse_unwritable
 from pipeline.cores import cores
@@ -70,10 +70,8 @@ def render(
     """
     if samples not in (squares := [side**2 for side in range(1, MOST_SAMPLES + 1)]):
         raise BadInput(_WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")
-    try:
+    with named_flags(_WHERE, _WHERE, environment_directions="directions"):
         options = validated(SceneOptions, {"environment_directions": directions, "bounces": bounces}, _WHERE)
-    except BadInput as error:
-        raise BadInput(_WHERE, "--directions", directions, error.allowed) from error
     if not -STOPS <= exposure <= STOPS:
         raise BadInput(_WHERE, "--exposure", exposure, f"must be from {-STOPS:g} to {STOPS:g} stops")
     chosen_size = size_of(size, _WHERE) if size else None

@@ -168,7 +168,7 @@ def _fallback_share(model: ModelRecipe, by_fabric: Iterable[tuple[Fabric, Querie
     """Return the fallback share of a model; None if it does not cover the fabrics."""
     trainer = general.trainer_of(model)
     known = {fabric.name for fabric in trainer.seen + trainer.unseen}
-    if model.of_one_material and not known.issuperset(fabric.name for fabric, _ in by_fabric):
+    if model.options.of_one_material and not known.issuperset(fabric.name for fabric, _ in by_fabric):
         return None
     return fallback_share(model, general, by_fabric)
 

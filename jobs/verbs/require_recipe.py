@@ -75,7 +75,7 @@ def write_recipe(
             "seen": [_beside(path, reference) for reference, _ in worn.values()],
             "shard_rows": general.dataset.shard_rows,
             "seed": general.dataset.seed,
-            "rows": _rows(general, effort if model.learns else 1.0),
+            "rows": _rows(general, effort if model.options.learns else 1.0),
             "queries": _stated(queries),
             **_truths(general, queries, [fabric for _, fabric in worn.values()]),
         },
@@ -98,11 +98,11 @@ def alone(general: Recipe, names: set[str]) -> Recipe:
 def effort_of(recipe: Recipe) -> tuple[int, int]:
     """Return the rows that a recipe generates, and the queries of one training of each model, with repetitions."""
     rows = sum(task.rows for task in plan(recipe) if task.stage == "generate")
-    learnt = sum(
-        model.training.steps * model.training.batch * (len(recipe.seen + recipe.unseen) if model.of_one_material else 1)
-        for model in recipe.models
-        if model.learns
-    )
+    learnt = 0
+    for model in recipe.models:
+        if model.options.learns:
+            networks = len(recipe.seen + recipe.unseen) if model.options.of_one_material else 1
+            learnt += networks * model.training.steps * model.training.batch
     return rows, learnt
 
 
@@ -168,7 +168,7 @@ def _model(
         options.pop("model", None)
     if settings:
         options[model.options.parameter] = settings
-    if model.learns:
+    if model.options.learns:
         training = model.training
         average = round(training.average ** (1 / effort), 6)  # it spans the same share of the training
         shorter = {"steps": max(1, round(effort * training.steps)), "average": average}

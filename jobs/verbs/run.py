@@ -57,13 +57,6 @@ class Part(NamedTuple):
         return divisible[self.number - 1 :: self.parts]
 
 
-def _verb(*stages: Stage) -> Callable[..., None]:
-    def verb(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
-        work(recipe, stages, out, on, add)
-
-    return verb
-
-
 def _divisible(stage: Stage) -> Callable[..., None]:
     def verb(recipe: RecipeName, *, part: Share = "", add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
         if part:
@@ -75,8 +68,16 @@ def _divisible(stage: Stage) -> Callable[..., None]:
 
 
 generate, train, bench = map(_divisible, STAGES[:3])
-report = _verb("report")
-run = _verb(*STAGES)
+
+
+def report(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+    """Write the page of a recipe; errors as for `work`."""
+    work(recipe, ["report"], out, on, add)
+
+
+def run(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) -> None:
+    """Do all stages of a recipe; errors as for `work`."""
+    work(recipe, STAGES, out, on, add)
 
 
 def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:

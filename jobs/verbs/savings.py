@@ -143,7 +143,7 @@ def _costs(
     shards = [task for task in tasks if task.stage == "generate"]
     trainings = [task for task in tasks if isinstance(task, Training)]
     cards = [read_card(ledger.out / task.folder) for task in trainings]
-    needed = [task for task in trainings if not model.of_one_material or worn.issuperset(task.fabrics)]
+    needed = [task for task in trainings if not model.options.of_one_material or worn.issuperset(task.fabrics)]
     return {
         ("queries generated", "1"): Value(sum(task.rows for task in shards)),
         ("generation", "s"): Value(sum(ledger.seconds(task) for task in shards)),
@@ -184,7 +184,7 @@ def _difference(scene: str, out: Path, recipes: tuple[Recipe, Recipe], model: Mo
 
     name, setting, ledger = model.options.name, _setting(model), Ledger(out)
     tasks = [task for recipe in recipes for task in plan(recipe) if isinstance(task, SceneShot | OnScene)]
-    tasks = [task for task in tasks if task.scene == scene]
+    tasks = [task for task in tasks if task.scene == scene and not task.larger]
     shots = [task for task in tasks if isinstance(task, SceneShot) and ledger.done(task, verify=True)]
     shown = [task for task in tasks if isinstance(task, OnScene) and task.model.options.name == name]
     shown = [task for task in shown if setting in task.shown and ledger.done(task, verify=True)]
@@ -207,7 +207,7 @@ def _elsewhere(scene: str, out: Path, models: Sequence[tuple[ModelRecipe, Recipe
 
     (same, general), _ = models
     for task in plan(general):
-        if not isinstance(task, SceneShot) or not Ledger(out).done(task, verify=True):
+        if not isinstance(task, SceneShot) or task.larger or not Ledger(out).done(task, verify=True):
             continue
         shot = read_shot(out / task.made.path)
         if shot.name != scene:

@@ -118,15 +118,10 @@ def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
 
 def method_of(fabric: Fabric) -> Fallback:
     """Return the method that answers for a swatch."""
-    from pipeline.models.analytic.point_sampled import PointSampledOptions
-    from pipeline.models.analytic.soft_nodes import SoftNodesOptions
-    from pipeline.models.fallback import Fallback
+    from pipeline.models.named import named_method
 
-    if fabric.weave.different_cells() > TABLE_CELLS:
-        points = PointSampledOptions(counts=[_POINTS])
-        return Fallback(points.methods()[0], points.kinds)
-    nodes = SoftNodesOptions(levels=[2])
-    return Fallback(nodes.methods()[0], nodes.kinds)
+    many = fabric.weave.different_cells() > TABLE_CELLS
+    return named_method(f"point_sampled:{_POINTS}" if many else "soft_nodes:2", "show", "method")
 
 
 def _print_fabric(fabric: Fabric) -> None:

@@ -85,18 +85,18 @@ class OnFabric(_OnHeldOut):
         for fabric, role in subjects.fabrics:
             (frames,), edges = TruthFrames.of(fabric, recipe), TruthEdge.of(fabric, recipe)
             views = {picture.scene: picture.made for picture in TruthPicture.of(fabric, recipe)}
-            for model, trained in subjects.answering([fabric.name]):
+            for model in subjects.answering([fabric.name]):
                 yield cls.of(
                     subjects,
                     fabric,
                     role,
-                    model=trained,
-                    ways=model.ways(bench),
+                    model=model,
+                    ways=model.run_options(bench),
                     frames=frames.made,
                     frame_options=options.select(options.FrameOptions, bench),
                     views=views if model.is_first else {},
                     picture_options=options.select(options.PictureOptions, bench),
-                    shown=trained.shown(bench.picture_counts) if model.is_first else (),
+                    shown=model.shown(bench.picture_counts) if model.is_first else (),
                     edge=edges[0].made if edges else None,
                     edge_options=bench.edge if edges else None,
                 )
@@ -154,10 +154,10 @@ class OnUnseenPopulation(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a seed and model that answers for all of the fabrics: models of one material do not."""
         fabrics, bench = subjects.recipe.unseen_population, subjects.recipe.bench
-        for model, trained in subjects.answering([fabric.name for fabric in fabrics]) if fabrics else ():
+        for model in subjects.answering([fabric.name for fabric in fabrics]) if fabrics else ():
             yield cls(
-                model=trained,
-                ways=model.ways(bench),
+                model=model,
+                ways=model.run_options(bench),
                 fabrics=fabrics,
                 dataset=subjects.held_out(*fabrics),
                 errors=options.select(options.ErrorOptions, bench),
@@ -204,7 +204,7 @@ class ErrorsBySize(Measurement):
         dataset = subjects.held_out(*(fabric for fabric, _ in subjects.fabrics))
         for model in subjects.models:
             if not model.is_first:
-                yield cls(model=model.whole, dataset=dataset, seed=subjects.recipe.bench.seed)
+                yield cls(model=model, dataset=dataset, seed=subjects.recipe.bench.seed)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure all classes of footprints."""
@@ -225,8 +225,8 @@ class OfAddedMetric(_OnHeldOut):
         """Yield one a metric, fabric, model that answers for it, and seed."""
         for metric in subjects.recipe.metrics:
             for fabric, role in subjects.recipe.tested:
-                for _, trained in subjects.answering([fabric.name]):
-                    yield cls.of(subjects, fabric, role, metric=metric, model=trained)
+                for model in subjects.answering([fabric.name]):
+                    yield cls.of(subjects, fabric, role, metric=metric, model=model)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure one method after the other."""
@@ -283,7 +283,7 @@ class Latents(Measurement):
     kind: Literal["latents"] = "latents"
     timed: ClassVar = True
     code: ClassVar = ("truth", "bench")
-    seconds: ClassVar = 10.0
+    cost: ClassVar = 10.0
     model: Trained
     presets: tuple[Uncoloured, ...]  # presets of the pairs
     queries: QueryOptions
@@ -294,10 +294,10 @@ class Latents(Measurement):
         """Yield one a model that blends latents, trained with its first seed."""
         names = sorted({name for first, second, _ in options.LATENT_PAIRS for name in (first, second)})
         dataset = subjects.recipe.dataset
-        for model in subjects.first_models:
-            if subjects.recipe.bench.latents and model.recipe.options.blends:
+        for model in subjects.models if subjects.recipe.bench.latents else ():
+            if model.is_first and model.options.blends:
                 presets = tuple(map(load_fabric, names))
-                yield cls(model=model.whole, presets=presets, queries=dataset.queries, truth=dataset.truth)
+                yield cls(model=model, presets=presets, queries=dataset.queries, truth=dataset.truth)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure edits, then one pair after the other."""

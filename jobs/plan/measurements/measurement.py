@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from jobs.plan.measurements.subjects import Subjects, Trained
-from jobs.plan.task import Made, Progress, Stage, Task, held
+from jobs.plan.task import Made, Progress, Stage, Task
 from pipeline import versions
 from pipeline.models.added.added_code import AddedMethod
 from reports import catalogue
@@ -29,15 +29,10 @@ class Measurement(Task):
     stage: ClassVar[Stage] = "bench"
     code: ClassVar[tuple[str, ...]] = ("bench",)
     """Its code among `pipeline.versions` and ``bench``, beside that of its models and of their ways to run."""
-    seconds: ClassVar[float] = 1.0  # estimated seconds on one core
     endings: ClassVar[tuple[str, ...]] = ()
     """Of the files of a kind that makes files for others, not Records: pictures of the truth, for example."""
 
-    if TYPE_CHECKING:
-
-        @property
-        def kind(self) -> str:
-            """Name of the kind of measurement."""
+    kind: str  # name of the kind of measurement
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
@@ -89,11 +84,6 @@ class Measurement(Task):
         return Made(task=self.id, path=self.products[0])
 
     @property
-    def cost(self) -> float:
-        """Estimated seconds on one core."""
-        return self.seconds
-
-    @property
     def threads(self) -> int:
         """Most threads that a method may use while it is measured."""
         return 1
@@ -104,8 +94,8 @@ class Measurement(Task):
 
     def versions(self) -> dict[str, int]:
         """Return the versions of its code, of its models, and of ways to run them; its inputs have their own."""
-        code, options = {*self.code}, [model.options for model in held(self, Trained)]
-        code |= {"bound"} if any(way.bounds for way in held(self, RunOptions)) else set()
+        code, options = {*self.code}, [model.options for model in self.held(Trained)]
+        code |= {"bound"} if any(way.bounds for way in self.held(RunOptions)) else set()
         code |= {"fallback"} if any(model.model == "selvage" for model in options) else set()
         models = {model.name: model.version for model in options}
         numbers = {**vars(versions), "BENCH": catalogue.BENCH}
@@ -123,8 +113,8 @@ class Measurement(Task):
         A method that fails ends a measurement of it alone. One of several methods starts again without it. MethodFailed
         if the only method fails.
         """
-        models = (model.options for model in held(self, Trained))
-        added = [*held(self, AddedMetric), *(options for options in models if isinstance(options, AddedMethod))]
+        models = (model.options for model in self.held(Trained))
+        added = [*self.held(AddedMetric), *(options for options in models if isinstance(options, AddedMethod))]
         if not added:
             self.write(out, {}, progress)
             return
@@ -151,7 +141,7 @@ class Measurement(Task):
             Record(method=name, scene=getattr(self, "scene", ""), metric="not_run", value=1.0, note=reason)
             for name, reason in left_out.items()
         ]
-        models = [model.options for model in held(self, Trained)]
+        models = [model.options for model in self.held(Trained)]
         origins = {options.name: options.origin for options in models if isinstance(options, AddedMethod)}
         records = [record.made_by(origins[record.method]) if record.method in origins else record for record in records]
         write_records(out / self.records, records, this_machine(self.threads))

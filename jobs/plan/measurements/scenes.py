@@ -35,12 +35,15 @@ class SceneCloth(TaskPart):
     turn: float  # angle from u to the weft, in degrees
 
 
-class _Shot(Measurement):
-    """Frames of a scene: queries with the truth's answers, and pictures. All recipes and models share them."""
+class SceneShot(Measurement):
+    """Frames of a scene, or the first one for the larger pictures of the page: queries with the truth's answers.
 
-    larger: ClassVar = False
+    All recipes and models share them.
+    """
+
     code: ClassVar = ("truth", "fallback", "scenes", "bench", "scene_bench")  # answers of the fallback are stored
     endings: ClassVar = (".npz", ".exr")
+    kind: Literal["scene truth", "scene picture truth"]
     scene: str
     found: Place  # reference to the scene in the recipe: its name, or a path
     files: tuple[str, ...]  # hashes of its files; none for a scene of the package, which has a version
@@ -49,34 +52,51 @@ class _Shot(Measurement):
     options: ShotOptions
 
     @classmethod
-    def of(cls, name: str, options: ShotOptions) -> Self:
-        scene = load_scene(name)
-        cloths = {}
-        for key, fabric in worn(scene).items():
-            cloth = scene.cloths.get(key, Cloth())
-            cloths[key] = SceneCloth(fabric=load_fabric(fabric), yarns=cloth.yarns, turn=cloth.turn)
-        hashes = tuple(map(file_sha256, files(scene)))
-        return cls(scene=scene.name, found=name, files=hashes, cloths=cloths, step=scene.step, options=options)
+    def of(cls, bench: SceneBenchOptions, *, larger: bool = False) -> list[Self]:
+        """Return the shots of a recipe's scenes, in its order; no larger ones if it wants no larger pictures."""
+        if larger and not bench.picture_size:
+            return []
+        options, shots = select(ShotOptions, bench), []
+        if larger:
+            options = options.model_copy(update={"size": bench.picture_size, "frames": 1})
+        for name in bench.names:
+            scene, cloths = load_scene(name), {}
+            for key, fabric in worn(scene).items():
+                cloth = scene.cloths.get(key, Cloth())
+                cloths[key] = SceneCloth(fabric=load_fabric(fabric), yarns=cloth.yarns, turn=cloth.turn)
+            kind = "scene picture truth" if larger else "scene truth"
+            hashes = tuple(map(file_sha256, files(scene)))
+            own = {"scene": scene.name, "found": name, "files": hashes, "cloths": cloths, "step": scene.step}
+            shots.append(cls(kind=kind, options=options, **own))
+        return shots
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        yield from cls.all(subjects.recipe.bench.scenes)
+        """Yield the shots and, after those of each kind, the pictures by all methods."""
+        for larger in (False, True):
+            shots = cls.of(subjects.recipe.bench.scenes, larger=larger)
+            yield from shots
+            for shot in shots:
+                yield from OnScene.of(shot, subjects)
 
-    @classmethod
-    def all(cls, options: SceneBenchOptions) -> list[Self]:
-        """Return the shots of a recipe's scenes, in its order."""
-        raise NotImplementedError
+    @property
+    def larger(self) -> bool:
+        """True if it is for the larger pictures."""
+        return self.kind == "scene picture truth"
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
+        """The first frame by the truth."""
         return (PictureFile("", self.scene, "truth", "", Path(self.products[1]), self.larger),)
 
     @property
     def fabrics(self) -> list[str]:
+        """Names of the fabrics of its cloths."""
         return sorted({cloth.fabric.name for cloth in self.cloths.values()})
 
     @property
     def cost(self) -> float:
+        """Estimated seconds on one core."""
         options = self.options
         fabrics = [cloth.fabric for cloth in self.cloths.values()]
         first, further = ([TruthCost(t, f) for f in fabrics] for t in (options.truth, options.frame_truth))
@@ -85,6 +105,7 @@ class _Shot(Measurement):
         return 5.0 + sum(answer.bounces for answer in first) + answers
 
     def run(self, out: Path, progress: Progress) -> None:
+        """Shoot the frames, and write the first as a picture."""
         from reports.measure.scene import scene_errors, shot
 
         queries, picture = (out / path for path in self.products)
@@ -92,35 +113,14 @@ class _Shot(Measurement):
         scene_errors.write_truth(shot.read_shot(queries), picture)
 
 
-class SceneShot(_Shot):
-    """The frames in which methods are measured."""
+class OnScene(Measurement):
+    """Errors, or a larger picture, of a scene by one setting of a model: a change of it repeats no other measurement.
 
-    kind: Literal["scene truth"] = "scene truth"
+    Of a larger picture there are no Records.
+    """
 
-    @classmethod
-    def all(cls, options: SceneBenchOptions) -> list[Self]:
-        """Return the shots of a recipe's scenes, in its order."""
-        return [cls.of(name, select(ShotOptions, options)) for name in options.names]
-
-
-class LargerShot(_Shot):
-    """The first frame for the larger pictures of the page."""
-
-    kind: Literal["scene picture truth"] = "scene picture truth"
-    larger: ClassVar = True
-
-    @classmethod
-    def all(cls, options: SceneBenchOptions) -> list[Self]:
-        """Return the shots of a recipe's scenes, in its order; none if it wants no larger pictures."""
-        larger = select(ShotOptions, options).model_copy(update={"size": options.picture_size, "frames": 1})
-        return [cls.of(name, larger) for name in options.names] if options.picture_size else []
-
-
-class _OnShot(Measurement):
-    """One setting of a model on one scene: a change of one setting repeats no other measurement."""
-
-    shots: ClassVar[type[_Shot]]
     code: ClassVar = ("fallback", "bench", "scene_bench")
+    kind: Literal["scene errors", "scene picture"]
     scene: str
     shot: Made  # frames of the scene with the truth's answers
     model: Trained
@@ -130,63 +130,57 @@ class _OnShot(Measurement):
     frames: int
 
     @classmethod
-    def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a scene, model that answers for its cloths, seed and setting; pictures are of the first seed."""
+    def of(cls, shot: SceneShot, subjects: Subjects) -> Iterator[Self]:
+        """Yield one a model that answers for the cloths, seed and setting; pictures are of the first seed."""
         bench = subjects.recipe.bench
-        for shot in cls.shots.all(bench.scenes):
-            for model, trained in subjects.answering(shot.fabrics):
-                for options in trained.options.single():
-                    single = trained.model_copy(update={"options": options})
-                    shown = single.shown(bench.picture_counts) if model.is_first else ()
-                    if shown or not shot.larger:
-                        yield cls(
-                            scene=shot.scene,
-                            shot=shot.made,
-                            model=single,
-                            options=select(SceneErrorOptions, bench.scenes),
-                            shown=shown,
-                            extent=shot.options.size,
-                            frames=shot.options.frames,
-                        )
+        for model in subjects.answering(shot.fabrics):
+            for options in model.options.single():
+                single = model.model_copy(update={"options": options})
+                shown = single.shown(bench.picture_counts) if model.is_first else ()
+                if shown or not shot.larger:
+                    yield cls(
+                        kind="scene picture" if shot.larger else "scene errors",
+                        scene=shot.scene,
+                        shot=shot.made,
+                        model=single,
+                        options=select(SceneErrorOptions, bench.scenes),
+                        shown=shown,
+                        extent=shot.options.size,
+                        frames=shot.options.frames,
+                    )
+
+    @property
+    def larger(self) -> bool:
+        """True if it is a larger picture."""
+        return self.kind == "scene picture"
 
     @property
     def subjects(self) -> tuple[str, ...]:
+        """Names of the model, the scene and the setting."""
         return (*super().subjects, *map(self.model.options.setting_of, self.model.options.settings))
 
     @property
     def pictures(self) -> tuple[PictureFile, ...]:
-        subject, larger = ("", self.scene, self.model.options.name), self.shots.larger
-        return tuple(PictureFile(*subject, setting, self.picture(setting), larger) for setting in self.shown)
+        """A picture a setting shown."""
+        subject = ("", self.scene, self.model.options.name)
+        return tuple(PictureFile(*subject, setting, self.picture(setting), self.larger) for setting in self.shown)
 
     @property
     def cost(self) -> float:
+        """Estimated seconds on one core; tables know light from behind and curved cloth."""
         queries = math.prod(self.extent) * _QUERIES_A_PIXEL * self.frames
         unknown = queries if {"behind", "curvature"} - self.model.options.kinds else 0.0
-        # Tables know light from behind and curved cloth.
         return 0.5 + self.model.seconds(queries, fabrics=3.0) + _FALLBACK * unknown
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
+        """Measure the frames, and write the pictures."""
         from reports.measure.scene import scene_errors, shot
 
         methods = self.model.with_fallback(out, self.options.footprint)
         pictures = {setting: out / self.picture(setting) for setting in self.shown}
         frames = shot.read_shot(out / self.shot.path)
         records = scene_errors.measure_scene(methods, frames, self.options, pictures)
-        return [] if self.shots.larger else records  # of a larger picture there are none
-
-
-class OnScene(_OnShot):
-    """Errors of one setting of a model in the frames of a scene."""
-
-    kind: Literal["scene errors"] = "scene errors"
-    shots: ClassVar = SceneShot
-
-
-class LargerPicture(_OnShot):
-    """A larger picture of a scene by one setting of a model."""
-
-    kind: Literal["scene picture"] = "scene picture"
-    shots: ClassVar = LargerShot
+        return [] if self.larger else records
 
 
 class FrameTime(Measurement):
@@ -195,7 +189,7 @@ class FrameTime(Measurement):
     kind: Literal["frame time"] = "frame time"
     timed: ClassVar = True
     code: ClassVar = ("fallback", "bench")
-    seconds: ClassVar = 10.0
+    cost: ClassVar = 10.0
     scene: str
     shot: Made  # frames of the scene with the truth's answers
     models: tuple[Trained, ...]  # the models that answer for its cloths
@@ -207,11 +201,11 @@ class FrameTime(Measurement):
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a scene, of models trained with their first seed: times do not depend on the weights."""
         bench = subjects.recipe.bench
-        for shot in SceneShot.all(bench.scenes):
+        for shot in SceneShot.of(bench.scenes):
             yield cls(
                 scene=shot.scene,
                 shot=shot.made,
-                models=tuple(trained for model, trained in subjects.answering(shot.fabrics) if model.is_first),
+                models=tuple(model for model in subjects.answering(shot.fabrics) if model.is_first),
                 footprint=bench.scenes.footprint,
                 options=select(RepeatOptions, bench),
                 seed=bench.scenes.seed,

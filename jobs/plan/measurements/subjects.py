@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 from jobs.plan.dataset import DataSet
 from jobs.plan.task import PLACE, Made, Place, TaskPart
 from jobs.plan.training import Training
-from jobs.recipe.recipe import ModelRecipe, Recipe
+from jobs.recipe.recipe import Recipe
 from pipeline.models.catalogue import ModelOptions
 from pipeline.models.options import RoundFootprint
-from reports.options import BenchOptions, Role, RunOptions, select
+from reports.options import BenchOptions, Role, RunOptions, RuntimeName, select
 from weaves.fabric import Fabric
 
 if TYPE_CHECKING:
@@ -55,16 +55,33 @@ class HeldOutRows(TaskPart):
 
 
 class Trained(TaskPart):
-    """A model, and the networks that were trained of it."""
+    """A model of the recipe, and the networks that were trained of it with one seed."""
 
     options: ModelOptions
     networks: tuple[Made, ...] = ()  # its trained networks; none where nothing is trained
-    seed: Annotated[int, PLACE] = 0  # seed of their training, which the ids of the networks depend on
+    # What the ids of the networks depend on, and what others make of it, is no part of an identity.
+    fabrics: Annotated[tuple[str, ...], PLACE] = ()  # fabric of each network; a general model has one, called ""
+    seed: Annotated[int, PLACE] = 0  # seed of their training
+    is_first: Annotated[bool, PLACE] = True  # true for the first seed, which pictures are made of and times are of
+    runtimes: Annotated[tuple[RuntimeName, ...], PLACE] = ()  # other ways to run them that are measured
 
     @property
     def title(self) -> str:
         """Name of the model, with the seed of its training where that is not 0."""
         return f"{self.options.name}, seed {self.seed}" if self.seed else self.options.name
+
+    def on(self, fabrics: Sequence[str]) -> Trained | None:
+        """Return the model with the networks that answer for fabrics; None where it was not trained on one of them."""
+        own = dict(zip(self.fabrics, self.networks, strict=True))
+        if not own or "" in own:
+            return self
+        if not own.keys() >= set(fabrics):
+            return None
+        return self.model_copy(update={"networks": tuple(own[name] for name in fabrics), "fabrics": tuple(fabrics)})
+
+    def run_options(self, bench: BenchOptions) -> RunOptions:
+        """Return the ways to use the networks that are measured too."""
+        return select(RunOptions, bench).model_copy(update={"runtimes": self.runtimes})
 
     def shown(self, counts: Sequence[int]) -> tuple[str, ...]:
         """Return the settings that pictures are made of: numbers of points in `counts`, the usual or the only one."""
@@ -106,39 +123,6 @@ class Trained(TaskPart):
 
 
 @dataclass(frozen=True)
-class ModelSubject:
-    """A model of the recipe, trained with one seed."""
-
-    recipe: ModelRecipe  # the model with this training alone
-    trainings: Mapping[str, Training]  # trainings by fabric; a general model has one, with an empty key
-    is_first: bool = True  # true for the first seed, which pictures are made of and times are taken of
-
-    def on(self, fabrics: Sequence[str]) -> Trained | None:
-        """Return the model with the networks that answer for fabrics; None where it was not trained on one of them."""
-        options = self.recipe.options
-        if not self.recipe.learns:
-            return Trained(options=options)
-        if "" in self.trainings:
-            return self._with([""])
-        return self._with(fabrics) if self.trainings.keys() >= set(fabrics) else None
-
-    @property
-    def whole(self) -> Trained:
-        """The model with the networks of all fabrics."""
-        return self._with(list(self.trainings))
-
-    def _with(self, keys: Sequence[str]) -> Trained:
-        networks = tuple(self.trainings[key].made for key in keys)
-        return Trained(options=self.recipe.options, networks=networks, seed=self.recipe.training.seed)
-
-    def ways(self, bench: BenchOptions) -> RunOptions:
-        """Return the ways to use the networks that are measured too; other runtimes only of the first seed."""
-        ways = select(RunOptions, self.recipe.measured(bench))
-        unused = {} if self.is_first else {"runtimes": ()}
-        return ways.model_copy(update=unused)
-
-
-@dataclass(frozen=True)
 class Subjects:
     """Fabrics, models, rows and networks that the measurements of a recipe use."""
 
@@ -153,22 +137,30 @@ class Subjects:
         return list(self.recipe.tested[: len(self.recipe.seen) + len(self.recipe.unseen)])
 
     @cached_property
-    def models(self) -> list[ModelSubject]:
-        """The models in the order of the recipe, once for each seed that they are trained with."""
+    def models(self) -> list[Trained]:
+        """The models in the order of the recipe with all their networks, once for each seed.
+
+        Other runtimes are measured of the first seed alone.
+        """
         models = []
         for model in self.recipe.models:
-            trained = zip(model.single, self.trainings.get(model.options.name, [{}]), strict=True)
-            models += [ModelSubject(single, nets, is_first=not index) for index, (single, nets) in enumerate(trained)]
+            own = model.runtimes if model.runtimes is not None else self.recipe.bench.runtimes
+            for index, trainings in enumerate(self.trainings.get(model.options.name, [{}])):
+                models.append(
+                    Trained(
+                        options=model.options,
+                        networks=tuple(training.made for training in trainings.values()),
+                        fabrics=tuple(trainings),
+                        seed=model.training.seed + index,
+                        is_first=not index,
+                        runtimes=own if model.options.learns and not index else (),
+                    )
+                )
         return models
 
-    @property
-    def first_models(self) -> list[ModelSubject]:
-        """The models, each trained with its first seed."""
-        return [model for model in self.models if model.is_first]
-
-    def answering(self, fabrics: Sequence[str]) -> list[tuple[ModelSubject, Trained]]:
+    def answering(self, fabrics: Sequence[str]) -> list[Trained]:
         """Return the models of all seeds that answer for all of some fabrics, with the networks that do."""
-        return [(model, trained) for model in self.models if (trained := model.on(fabrics))]
+        return [trained for model in self.models if (trained := model.on(fabrics))]
 
     def held_out(self, *fabrics: Fabric) -> HeldOutRows:
         """Return the test rows of fabrics."""
@@ -177,8 +169,8 @@ class Subjects:
 
     @cached_property
     def _test_rows(self) -> Mapping[str, Sequence[str]]:
-        rows: dict[str, list[str]] = {fabric.name: [] for fabric in self.recipe.fabrics}
+        rows: dict[str, list[str]] = {}
         for part in self.dataset.shards:
             if part.shard.split == "test":
-                rows[part.shard.fabric.name].append(part.id)
+                rows.setdefault(part.shard.fabric.name, []).append(part.id)
         return rows

@@ -13,7 +13,6 @@ from pipeline.truth.options import TruthOptions
 from reports.options import RunOptions, TimingOptions, select
 
 if TYPE_CHECKING:
-    from pipeline.models.method import Method
     from reports.record import Record
 
 
@@ -24,17 +23,6 @@ class TimedModel(Trained):
     """A model with all its networks, and the ways to run them that are timed too."""
 
     ways: RunOptions
-
-    def not_run(self, methods: list[Method]) -> list[Record]:
-        """Return a Record for every runtime that this machine lacks."""
-        from pipeline.models.runtimes import not_run
-        from reports.record import Record
-
-        return [
-            Record(method=method.name, setting=name, metric="not_run", value=1.0, note=reason)
-            for method in methods
-            for name, reason in not_run(method, self.ways.runtimes).items()
-        ]
 
 
 class TimeOfMethods(Measurement):
@@ -50,9 +38,9 @@ class TimeOfMethods(Measurement):
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield the one of the recipe, of models trained with their first seed: times do not depend on the weights."""
-        bench = subjects.recipe.bench
+        bench, firsts = subjects.recipe.bench, (model for model in subjects.models if model.is_first)
         yield cls(
-            models=tuple(TimedModel(ways=model.ways(bench), **dict(model.whole)) for model in subjects.first_models),
+            models=tuple(TimedModel(ways=model.run_options(bench), **dict(model)) for model in firsts),
             dataset=subjects.held_out(*(fabric for fabric, _ in subjects.fabrics)),
             options=select(TimingOptions, bench),
         )
@@ -73,8 +61,10 @@ class TimeOfMethods(Measurement):
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Time all queries, then queries by the size of their footprints."""
+        from pipeline.models.runtimes import not_run
         from reports.measure.by_size import measure_by_size
         from reports.measure.held_out import measure_timing
+        from reports.record import Record
 
         truth = TruthOptions.model_validate(self.dataset.manifest(out).about["truth"])
         loaded = [(model, model.methods(out)) for model in self.models]
@@ -82,6 +72,9 @@ class TimeOfMethods(Measurement):
         variants = [run for model, own in loaded for run in model.variants(own, model.ways)]
         rows = list(self.dataset.read(out, rows=self.options.rows))
         records = measure_timing(methods + variants, rows, truth, self.options, lambda share: progress(0.6 * share))
-        records += [record for model, own in loaded for record in model.not_run(own)]
+        for model, own in loaded:
+            for method in own:  # those runtimes that this machine lacks
+                for name, reason in not_run(method, model.ways.runtimes).items():
+                    records.append(Record(method=method.name, setting=name, metric="not_run", value=1.0, note=reason))
         rows = list(self.dataset.read(out))
         return records + measure_by_size(methods, rows, self.options, lambda share: progress(0.6 + 0.4 * share))

@@ -152,15 +152,24 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
 
 
 def citation_file(about: About) -> str:
-    """Return the text of ``CITATION.cff``."""
+    """Return the text of ``CITATION.cff``, in the Citation File Format 1.2."""
+    cited = about.citation
     number = {"type": "other", "value": about.manifest.fingerprint, "description": "Fingerprint of all that shaped it"}
-    return about.citation.cff(
-        abstract=about.summary,
-        version=about.version,
-        license=about.licence,
-        keywords=["woven cloth", "appearance", "BSDF", "rendering", "ground truth"],
-        identifiers=[number],
-    )
+    known = {"date-released": cited.date, "url": cited.url, "doi": cited.doi}
+    content = {
+        "cff-version": "1.2.0",
+        "message": "If you use this data set, please cite it as below.",
+        "type": "dataset",
+        "title": cited.title,
+        "authors": [{"family-names": f, "given-names": g} if g else {"name": f} for f, g in cited.persons],
+        **{name: value for name, value in known.items() if value},
+        "abstract": about.summary,
+        "version": about.version,
+        "license": about.licence,
+        "keywords": ["woven cloth", "appearance", "BSDF", "rendering", "ground truth"],
+        "identifiers": [number],
+    }
+    return str(yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120))
 
 
 def croissant(about: About) -> str:

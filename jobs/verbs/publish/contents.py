@@ -9,9 +9,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from datetime import date
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
-import yaml
 from cyclopts import Parameter
 
 from pipeline.shards.manifest import Manifest, Role, ShardEntry
@@ -44,11 +43,6 @@ class PublishedPart(NamedTuple):
     def rows(self) -> int:
         """Number of rows."""
         return sum(shard.rows for shard in self.shards)
-
-    def entry(self) -> dict[str, Any]:
-        """Return what the manifest says of it: role, split, and the rows of each fabric."""
-        rows = {name: sum(shard.rows for shard in self.shards if shard.fabric == name) for name in self.fabrics}
-        return {"role": self.role, "split": self.split, "rows": rows}
 
 
 def own_shards(manifest: Manifest) -> list[ShardEntry]:
@@ -121,21 +115,6 @@ class Citation:
         fields |= {"year": self.date[:4], "version": version, "doi": self.doi, "url": self.url}
         lines = [f"  {name} = {{{value}}}," for name, value in fields.items() if value]
         return "\n".join([f"@misc{{{key},", *lines, "}"])
-
-    def cff(self, **facts: Any) -> str:
-        """Return the text of ``CITATION.cff``, in the Citation File Format 1.2, with more facts of the data set."""
-        authors = [{"family-names": f, "given-names": g} if g else {"name": f} for f, g in self.persons]
-        known = {"date-released": self.date, "url": self.url, "doi": self.doi}
-        content = {
-            "cff-version": "1.2.0",
-            "message": "If you use this data set, please cite it as below.",
-            "type": "dataset",
-            "title": self.title,
-            "authors": authors,
-            **{name: value for name, value in known.items() if value},
-            **facts,
-        }
-        return str(yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120))
 
 
 def _is_day(text: str) -> bool:

@@ -146,11 +146,13 @@ def _facts(about: About, part: PublishedPart) -> dict[str, Any]:
 
 def _listing(about: About, staging: Path, files: Sequence[str]) -> bytes:
     """Return the manifest: every other file with its size and hash, and what is in the files of rows."""
-    parts = {part.file: part.entry() for part in about.parts}
-    listed = []
+    listed, parts = [], {part.file: part for part in about.parts}
     for file in sorted(files):
-        path, rows = staging / file, parts.get(file, {})
-        listed.append(PublishedFile(file=file, bytes=path.stat().st_size, sha256=file_sha256(path), **rows))
+        path, own = staging / file, {}
+        if part := parts.get(file):
+            rows = {name: sum(shard.rows for shard in part.shards if shard.fabric == name) for name in part.fabrics}
+            own = {"role": part.role, "split": part.split, "rows": rows}
+        listed.append(PublishedFile(file=file, bytes=path.stat().st_size, sha256=file_sha256(path), **own))
     return Published(
         name=about.manifest.name,
         version=about.version,

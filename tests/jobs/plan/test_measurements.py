@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import Field, TypeAdapter
 
-from jobs.plan.measurements.truth import Study
+from jobs.plan.measurements import scenes, truth
 from jobs.plan.plan import KINDS, plan
 from jobs.recipe.entry import Entry, EntryForm
 from jobs.recipe.load import load_recipe
@@ -16,7 +16,7 @@ from reports.record import read_records
 from reports.truth import finding, stability
 from weaves.errors import WorkFailed
 
-ANY = TypeAdapter(Annotated[Union[KINDS], Field(discriminator="kind")])  # noqa: UP007
+ANY = TypeAdapter(Annotated[Union[(*KINDS, scenes.OnScene)], Field(discriminator="kind")])
 
 
 @pytest.fixture(scope="module")
@@ -25,19 +25,19 @@ def tasks():
     recipes = [load_recipe(name) for name in ("smoke", "standard", "curved", "mitsuba")]
     words = {"name": "theirs", "title": "theirs", "definition": "Theirs.", "unit": "1"}
     words |= {"better": "lower", "format": "percent", "stated": "1"}
-    recipes[0] = replace(recipes[0], metrics=(AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words),))
+    metric = AddedMetric(source="/theirs.py:theirs", sha256="0" * 64, **words)
     filled = dict.fromkeys(("name", "authors", "version", "machine", "training"), "theirs") | {"source": ""}
     filled |= {"questions": "0" * 16, "nanoseconds": 1, "threads": 1, "tries": 1, "each_fabric": False}
     entry = Entry(EntryForm(**filled, bytes_stored=0, multiply_adds=0), "0" * 64, "/records/answers.csv")
-    recipes[0] = replace(recipes[0], entries=(entry,))
     first, *others = recipes[0].models
-    recipes[0] = replace(recipes[0], models=(first.model_copy(update={"seeds": 2}), *others))
+    own = {"entries": (entry,), "metrics": (metric,), "models": (first.model_copy(update={"seeds": 2}), *others)}
+    recipes[0] = replace(recipes[0], **own)
     return [task for recipe in recipes for task in plan(recipe) if task.stage == "bench"]
 
 
 def test_every_kind_is_planned_and_read_back_from_its_own_dump(tasks):
     """Its identity has what it needs and no path; so no result outlives what it was made from."""
-    assert {type(task) for task in tasks} == set(KINDS)
+    assert {type(task) for task in tasks} == {*KINDS, scenes.OnScene}
     for task in tasks:
         again = ANY.validate_json(task.model_dump_json())
         assert type(again) is type(task) and again.id == task.id
@@ -60,7 +60,7 @@ def test_a_study_records_what_its_module_yields_and_fails_on_an_unstable_express
     monkeypatch.setattr(stability, "places", list)
     monkeypatch.setattr(stability, "footprints", list)
     (tmp_path / "records").mkdir()
-    study = Study(study="stability")
+    study = truth.Study(study="stability")
     good, bad = (
         finding.judge("x", "corner", "float32", {"x": np.arange(1)}, [value], [1.0], 1e-6) for value in (1.0, 1.1)
     )
