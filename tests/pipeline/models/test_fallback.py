@@ -63,10 +63,7 @@ def test_what_no_form_stands_for_and_a_kind_that_was_not_taught_are_the_fallback
     np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
     found = fallback.predict(fabric, queries)
     assert (found[~strange] == 1.0).all()
-    reference = estimate(fabric, queries.take(strange), fixed(8192), 1).mean
-    # Asked for 10 % of each answer's length, and an absolute error where it is dark.
-    wrong, size = (np.linalg.norm(part, axis=1) for part in (found[strange] - reference, reference))
-    assert np.median(wrong / size) < 0.1 and wrong.sum() < 0.1 * size.sum()
+    np.testing.assert_array_equal(found[strange], fallback_answers(fabric, queries.take(strange), 0))
     # A recipe narrowed to a scene without light from behind teaches none, though the model could learn it.
     fallback = fallback_of(fabric, {}, {"behind", "stretch", "curvature"})
     assert fallback.out_of_domain(fabric, queries)[queries.behind].all()
@@ -169,13 +166,3 @@ def test_beyond_the_ranges_trained_on_the_fallback_answers_and_within_them_the_m
     np.testing.assert_array_equal(found[strange], fallback_answers(fabric, queries.take(strange), 0))
     (asked,) = fallback.method.asked
     assert asked.sigma.max() <= 1.03 and asked.sigma.min() >= 0.29
-
-
-@pytest.mark.parametrize("rows", [0, 7])
-def test_plain_queries_are_the_methods_alone(rows):
-    fabric, sums = load_fabric("denim"), SoftNodes()
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, rows)
-    fallback = Fallback(sums, ())
-    np.testing.assert_array_equal(fallback.predict(fabric, queries), sums.predict(fabric, queries))
-    assert (fallback.name, fallback.setting) == (sums.name, sums.setting)
-    assert fallback.bytes_stored(fabric) == sums.bytes_stored(fabric)

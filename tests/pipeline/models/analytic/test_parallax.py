@@ -73,15 +73,11 @@ def _differ(found, truth):
     ("fabric", "kind", "most"),
     [
         (woven("denim"), "round", 0.035),
-        slow(woven("satin_8"), "round", 0.035),
-        slow(woven("voile"), "round", 0.04),
         (LOPSIDED, "round", 0.05),
-        slow(woven("denim"), "stretch", 0.05),
-        slow(woven("denim"), "behind", 0.07),
+        (woven("denim"), "stretch", 0.05),
         slow(woven("voile"), "behind", 0.08),
         slow(woven("denim"), "curvature", 0.06),
         (woven("denim"), "rising", 0.04),
-        slow(woven("satin_8"), "rising", 0.07),
         (woven("satin_8"), "fixed nodes", 0.05),
     ],
 )
@@ -108,22 +104,10 @@ def test_every_ray_of_an_even_footprint_ends(name):
     assert areas[1].max() < 1.02
 
 
-@pytest.mark.parametrize("name", ["denim", slow("satin_8")])
-def test_rims_are_seen_as_the_truth_sees_them(name):
-    """Steep views meet walls: nodes that leave them out are off by more."""
-    fabric = woven(name)
-    queries = _queries(fabric, 80, 11, sigma=(0.05, 1.0), steepest=85.0)
-    truth = estimate(fabric, queries, RAYS, 1)
-    error = _error(SoftNodes(2), fabric, queries, truth)
-    assert error < 0.04
-    assert _error(SoftNodes(2, walls="left_out"), fabric, queries, truth) > 1.3 * error
-
-
 @pytest.mark.parametrize(
     ("name", "sigma", "most"),
     [
         ("denim", (0.05, 0.3), 0.04),
-        slow("polyester_lining", (0.05, 0.3), 0.06),
         slow("satin_8", (0.05, 0.3), 0.04),
         ("polyester_lining", (1.0, 4.0), 0.016),
         slow("voile", (1.0, 4.0), 0.025),
@@ -174,7 +158,7 @@ def test_light_does_not_depend_on_how_finely_one_looks(name, degrees):
     assert narrow == pytest.approx(wide, rel=0.01)
 
 
-@pytest.mark.parametrize("kind", ["round", "behind"])
+@pytest.mark.parametrize("kind", ["stretch", "behind"])
 def test_points_along_view_rays_converge_to_the_truth(kind):
     """The mean squared error of R2 points falls by more than four times from 16 to 256 of them."""
     fabric = LOPSIDED
@@ -184,6 +168,7 @@ def test_points_along_view_rays_converge_to_the_truth(kind):
     error = _error(many, fabric, queries, truth)
     assert error < 0.05
     assert _error(few, fabric, queries, truth) > 2.0 * error
+    assert not np.array_equal(many.predict(fabric, queries, 1), many.predict(fabric, queries, 2))
 
 
 TABLES = {"prefiltered": PrefilteredOptions, "map_material": partial(MapMaterialOptions, size=128)}
