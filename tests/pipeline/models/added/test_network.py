@@ -7,9 +7,8 @@ import torch
 from pipeline.models.added.guarded import MethodFailed
 from pipeline.models.added.network import build_added, restore_added
 from pipeline.models.network import Batch
-from pipeline.truth.query import Queries
 from tests.pipeline.models.stand_ins import card_of, written
-from tests.pipeline.truth.cloths import woven
+from tests.pipeline.truth.cloths import equal_queries, woven
 from weaves.fabric import load_fabric
 
 CLOTHS = load_fabric("denim"), load_fabric("cotton_twill")
@@ -38,11 +37,6 @@ def batch():
     columns = {name: torch.ones(2, 3) for name in Batch._fields}
     columns |= {"fabric": torch.arange(2), "target": torch.full((2, 3, 4), 0.5)}
     return Batch(**columns | {name: torch.ones(2, 3, 3) for name in ("wi", "wo")})
-
-
-def queries(count):
-    one, up = np.ones(count), np.tile([0, 0, 1], (count, 1))
-    return Queries.round(one, one, one, up, up)
 
 
 def trained(network, cloths, answer):
@@ -130,7 +124,7 @@ def test_weights_are_loaded_and_fabrics_come_back_from_the_card_each_to_its_netw
     network = build_added(options, CLOTHS)
     method = restore_added(options, [trained(network, CLOTHS, 3)])
     assert not method.method.trained.training
-    assert method.predict(CLOTHS[0], queries(2)).tolist() == [[3.0] * 4] * 2
+    assert method.predict(CLOTHS[0], equal_queries([0, 0, 1], [0, 0, 1], rows=2)).tolist() == [[3.0] * 4] * 2
     assert (method.name, method.domain, method.bytes_stored(CLOTHS[0])) == ("theirs", None, 16)
     options = theirs("super().__init__()", "super().__init__(); self.seen = fabrics")
     network = build_added(options, CLOTHS)
@@ -143,5 +137,6 @@ def test_weights_are_loaded_and_fabrics_come_back_from_the_card_each_to_its_netw
     method = restore_added(options, parts)
     for index, cloth in enumerate(CLOTHS):
         for dyed in (cloth, woven(cloth.name, warp={"diffuse": (0.0, 0.0, 0.5)})):
-            assert method.covers(dyed) and method.predict(dyed, queries(1)).tolist() == [[index + 1.0] * 4]
+            assert method.covers(dyed)
+            assert method.predict(dyed, equal_queries([0, 0, 1], [0, 0, 1])).tolist() == [[index + 1.0] * 4]
     assert not method.covers(load_fabric("polyester_lining"))

@@ -8,17 +8,14 @@ from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
 
-def under_an_even_sky(method, cloth, wo):
-    """Return the mean answers for directions in proportion to the cosine, which is inside, from one viewer."""
-    wi = even_sky(4096)
-    none = np.zeros(len(wi))
-    queries = Queries.round(none, none, none + 16.0, wi, np.tile(wo, (len(wi), 1)))
-    return (np.pi * method.predict(cloth, queries) / wi[:, 2:]).mean(axis=0)
-
-
 @pytest.mark.parametrize("name", ["cotton_twill", "gauze"])
 def test_highlights_have_the_energy_of_the_truth(name):
-    """An even sky seen from above: some is lost where the maps' normals turn away from the light."""
+    """An even sky seen from above: some is lost where the maps' normals turn away from the light.
+
+    Directions are drawn in proportion to the cosine, which is inside.
+    """
     cloth, (method,) = load_fabric(name), load_methods(MapMaterialOptions(size=256, sheen=False))
-    highlights = under_an_even_sky(method, cloth, [0.0, 0.0, 1.0])[:2].sum()
+    wi, none = even_sky(4096), np.zeros(4096)
+    queries = Queries.round(none, none, none + 16.0, wi, np.tile([0.0, 0.0, 1.0], (4096, 1)))
+    highlights = np.pi * (method.predict(cloth, queries)[:, :2] / wi[:, 2:]).mean(axis=0).sum()
     assert 0.8 < highlights / reflectance(cloth).specular.sum() < 1.0

@@ -4,22 +4,18 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
-from scipy.special import ndtri
 from scipy.stats import qmc
 
 from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA
+from pipeline.analytic.soft_nodes.shade import AREA
 from pipeline.models.analytic.map_material import MapMaterialOptions
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodes
+from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.truth.geometry.heightfield import height_field
-from pipeline.truth.geometry.pieces import reference_plane
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
-from pipeline.truth.scattering.point import Choices, directions_of, ray_share
 from tests.directions import unit
 from tests.pipeline.truth.cloths import LOPSIDED, equal_queries, woven
 from tests.presets import slow
@@ -29,17 +25,8 @@ PLANE = TruthOptions(estimator="owen", relative_error=0.01, parallax=False)
 
 
 def _queries(fabric, count, seed, sigma=(0.06, 0.3), steepest=78.0):
-    random = np.random.default_rng(seed)
-
-    def directions():
-        z = 1.0 - random.random(count) * (1.0 - np.cos(np.radians(steepest)))
-        turn, sine = random.random(count) * 2.0 * np.pi, np.sqrt(1.0 - z * z)
-        return np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1).astype(np.float32)
-
-    ends, picks = fabric.weave.repeat
-    u, v = (np.float32(random.random(count) * period) for period in (ends, picks))
-    size = np.float32(sigma[0] * (sigma[1] / sigma[0]) ** random.random(count))
-    return Queries.round(u, v, size, directions(), directions())
+    options = QueryOptions(sigma=sigma, directions="hemisphere", max_angle=steepest)
+    return draw_queries(options, fabric.weave.repeat, seed, 0, count)
 
 
 def _kind(queries, kind):
@@ -118,27 +105,6 @@ def test_rims_where_floats_end_hide_light_from_behind(name, sigma, most):
     fabric = woven(name)
     queries = _kind(_queries(fabric, 60, 11, sigma=sigma, steepest=75.0), "behind")
     assert _error(SoftNodes(4), fabric, queries, estimate(fabric, queries, RAYS, 1)) < most
-
-
-@pytest.mark.parametrize("degrees", [0.0, 35.0, 60.0])
-def test_the_area_of_a_footprint_is_that_of_its_rays(degrees):
-    """Lines that miss a part, or see one twice, have another area than rays, which is wo_z.
-
-    Footprints end at 2.6 deviations: up to 2 % of one lie beyond, and Gauss's rule is up to 3 % off where it is cut.
-    Up to .3 of the rays of these meet walls.
-    """
-    fabric = woven("polyester_lining")
-    front, back, table = height_field(fabric), height_field(fabric.back()), tabulate(fabric)
-    plane, choices = reference_plane(front), Choices(macro=False, shadows=True, rims=True)
-    for x in (0.0, 0.5, 1.1, 1.7):
-        look = equal_queries(unit(20.0, 10.0), unit(degrees, 25.0), sigma=0.2, centre=(x, 0.7))
-        sums, gaps = query_sums(table, look)
-        towards = directions_of(*look.wi[0].astype(float), *look.wo[0].astype(float), 0.0)
-        points = [x, 0.7] + 0.2 * ndtri(qmc.Sobol(2, rng=1).random(1024))
-        rays = np.mean([ray_share(front, back, plane, *point, towards, choices)[1] for point in points])
-        area = sums[0, :, AREA].sum() + gaps[0]
-        assert abs(area - rays) < 0.055 * look.wo[0, 2]
-        np.testing.assert_allclose(sums[0, :, AREA], sums[0, :, BARE_AREA], rtol=1e-6)  # nothing hidden is placed
 
 
 @pytest.mark.parametrize("name", ["denim", *(slow(name) for name in ("satin_8", "silk_shantung", "voile", "crepe"))])
