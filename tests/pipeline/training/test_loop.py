@@ -28,8 +28,8 @@ WOVEN = WovenOptions(map_texels=16, encoder_channels=4, hidden=32, log_k=10, dif
 NEUMIP = NeumipOptions(texels_per_yarn=4, log_k=10, diffuse_weight=10)
 SHORT = TrainingOptions(steps=30, batch=256, fabrics=2, checkpoint_every=8, curve_points=5, device="cpu")
 BOTH = ["polyester_lining", "cotton_twill"]
-FABRICS = {"woven": BOTH, "neumip": ["cotton_twill"], "theirs": BOTH}
-OPTIONS = {"woven": WOVEN, "neumip": NEUMIP}
+FABRICS = {"woven": BOTH, "in shards": BOTH, "neumip": ["cotton_twill"], "theirs": BOTH}
+OPTIONS = {"woven": WOVEN, "in shards": WOVEN, "neumip": NEUMIP}
 
 NETWORK = """
 class Network(nn.Module):
@@ -53,7 +53,6 @@ def theirs(tmp_path):
 
 
 def kill_at(share, *arguments):
-
     def progress(fraction):
         if fraction >= share:
             raise KeyboardInterrupt
@@ -83,40 +82,28 @@ def whole(folder, tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize("model", ["woven", "theirs"])
-def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, whole, theirs):
-    """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike. The network
-    from outside reads the random numbers of torch, and its code may lie elsewhere when it goes on."""
-    whole, resumed = whole(model), tmp_path / "resumed"
+@pytest.mark.parametrize("model", ["woven", "in shards", "theirs"])
+def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, whole, theirs, monkeypatch):
+    """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike, whatever the
+    number of threads is. Rows may stay in their shards. The network from outside reads the random numbers of torch, and
+    its code may lie elsewhere when it goes on."""
+    if model == "in shards":
+        monkeypatch.setattr(dataset, "MOST_IN_TABLE", 1000)
+    whole, resumed, threads = whole(model), tmp_path / "resumed", torch.get_num_threads()
     kill_at(20 / 30, OPTIONS.get(model) or theirs(), SHORT, folder, FABRICS[model], resumed)
     assert read_checkpoint(resumed / CHECKPOINT)[0]["step"] == 16
+    assert bool(list(resumed.glob("*.npy"))) == (model != "in shards")
     shares = []
     (tmp_path / "elsewhere").mkdir()
     moved = written(tmp_path / "elsewhere", NETWORK)(limit=50.0)
-    train(OPTIONS.get(model, moved), SHORT, folder, FABRICS[model], resumed, shares.append)
+    torch.set_num_threads(threads + 3)
+    try:
+        train(OPTIONS.get(model, moved), SHORT, folder, FABRICS[model], resumed, shares.append)
+    finally:
+        torch.set_num_threads(threads)
     assert shares[0] == pytest.approx(17 / 30)
     assert contents(resumed) == contents(whole)
     assert set(contents(whole)) == {"model.safetensors", "card.json"}
-
-
-def test_a_killed_training_on_rows_that_stay_in_their_shards_goes_on_to_the_same_bytes(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(dataset, "MOST_IN_TABLE", 1000)
-    arguments = OPTIONS["woven"], SHORT, folder, FABRICS["woven"]
-    train(*arguments, tmp_path / "whole")
-    kill_at(20 / 30, *arguments, tmp_path / "resumed")
-    assert not list((tmp_path / "resumed").glob("*.npy"))
-    train(*arguments, tmp_path / "resumed")
-    assert contents(tmp_path / "resumed") == contents(tmp_path / "whole")
-
-
-def test_no_bit_depends_on_the_threads_of_the_process(folder, tmp_path, whole):
-    before = torch.get_num_threads()
-    torch.set_num_threads(before + 3)
-    try:
-        train(WOVEN, SHORT, folder, FABRICS["woven"], tmp_path)
-    finally:
-        torch.set_num_threads(before)
-    assert contents(tmp_path) == contents(whole("woven"))
 
 
 def test_a_network_from_outside_learns_and_answers(folder, theirs, whole):
