@@ -8,7 +8,6 @@ from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.directions import unit
-from tests.pipeline.truth.cloths import woven
 from tests.refusals import refusal
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -56,8 +55,6 @@ def test_what_was_not_taught_is_refused_by_name(options, message):
     behind = asked()
     behind.wo[3] *= np.float32(-1)
     assert "1 rows; first row 3: wo" in refusal(PLAIN.refuse, behind, "m")
-    with pytest.raises(BadInput, match=r"denim: roughness = 0.9.*0.16 to 0.55"):
-        PLAIN.refuse_fabric(woven("denim", warp={"roughness": 0.9}), "m")
     with pytest.raises(BadInput, match=r"truth: frame = 'macro'.*frame = 'ply'"):
         of_plane = Domain.of({"truth": {"parallax": False}}, FABRICS)
         of_plane.refuse_truth(TruthOptions(frame="macro", parallax=False), "m")

@@ -43,10 +43,8 @@ def test_every_method_answers_any_query_and_knows_what_the_fallback_lets_through
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("selvege", "did you mean 'selvage'"),
         ("selvage:2", "above 0 and below 1"),
         ("selvage:two", "above 0 and below 1"),
-        ("woven", "must be trained first"),
         ("soft_nodes:3", "1, 2, 4 or 8"),
         ("prefiltered:4", "prefiltered has no settings"),
         ("point_sampled:x", "a number k after the colon"),
