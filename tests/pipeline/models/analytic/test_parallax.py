@@ -13,9 +13,9 @@ from pipeline.models.analytic.map_material import MapMaterialOptions
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
+from pipeline.truth.query import Queries
 from tests.directions import unit
 from tests.pipeline.truth.cloths import LOPSIDED, equal_queries, woven
 from tests.presets import slow
@@ -25,8 +25,17 @@ PLANE = TruthOptions(estimator="owen", relative_error=0.01, parallax=False)
 
 
 def _queries(fabric, count, seed, sigma=(0.06, 0.3), steepest=78.0):
-    options = QueryOptions(sigma=sigma, directions="hemisphere", max_angle=steepest)
-    return draw_queries(options, fabric.weave.repeat, seed, 0, count)
+    random = np.random.default_rng(seed)
+
+    def directions():
+        z = 1.0 - random.random(count) * (1.0 - np.cos(np.radians(steepest)))
+        turn, sine = random.random(count) * 2.0 * np.pi, np.sqrt(1.0 - z * z)
+        return np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1).astype(np.float32)
+
+    ends, picks = fabric.weave.repeat
+    u, v = (np.float32(random.random(count) * period) for period in (ends, picks))
+    size = np.float32(sigma[0] * (sigma[1] / sigma[0]) ** random.random(count))
+    return Queries.round(u, v, size, directions(), directions())
 
 
 def _kind(queries, kind):
