@@ -28,7 +28,7 @@ def lambertian(reflectance=0.6):
     return Scattering(KLEMS_FULL, {"visible": np.broadcast_to(shares / np.pi, (2, 2, 145, 145)).copy()})
 
 
-@pytest.mark.parametrize(("basis", "patches"), zip(BASES.values(), (145, 73, 41), strict=True))
+@pytest.mark.parametrize(("basis", "patches"), [*zip(BASES.values(), (145, 73, 41), strict=True)])
 def test_patches_fill_the_hemisphere_and_turn_with_their_labels(basis, patches):
     random = np.random.default_rng(1)
     assert basis.patches == patches and basis.projected_solid_angle.sum() == pytest.approx(np.pi, abs=1e-12)

@@ -10,10 +10,14 @@ from weaves.fabric import load_fabric
 LIGHTS = np.array([[0.6, 0.0, 0.8], [0.6, 0.0, -0.8]])
 
 
-SETTINGS = {"": "error 2 %", ":.05": "error 5 %"}, {"": "k = 8", ":1": "k = 1"}, {"": "k = 64", ":3": "k = 3"}
-
-
-@pytest.mark.parametrize(("name", "settings"), zip(("selvage", "soft_nodes", "point_sampled"), SETTINGS, strict=True))
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("selvage", {"": "error 2 %", ":.05": "error 5 %"}),
+        ("soft_nodes", {"": "k = 8", ":1": "k = 1"}),
+        ("point_sampled", {"": "k = 64", ":3": "k = 3"}),
+    ],
+)
 def test_a_name_and_a_setting_load_a_method(name, settings):
     for text, setting in settings.items():
         method = named_method(name + text, "render", "--method")
