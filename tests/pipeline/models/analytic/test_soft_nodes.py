@@ -17,7 +17,7 @@ def test_each_level_is_its_sums_in_chunks_and_rows_lit_on_both_sides_are_answere
     asked = draw_queries(QueryOptions(), fabric.weave.repeat, 2, 0, 5000)
     methods = load_methods(SoftNodesOptions())
     assert [method.setting for method in methods] == [f"k = {level}" for level in DETAILS]
-    table = tabulate(fabric, level=DETAILS[1])
+    table = tabulate(fabric, level=2)
     np.testing.assert_array_equal(methods[1].predict(fabric, asked), read_queries(table, asked).components)
     assert methods[1].bytes_stored(fabric) == nbytes(table)
     fabric, method = load_fabric("voile"), SoftNodes()
