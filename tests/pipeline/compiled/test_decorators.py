@@ -1,11 +1,10 @@
 """What a kernel computes does not depend on who compiled it, when, or what was compiled before.
 
-Kernels of a small copy, and the real ones in a slow test, in fresh processes: the first of them compile, the others
-read the cache, and every process uses the kernels in an order of its own.
+Kernels of a small copy in fresh processes: the first of them compile, the others read the cache, and every process uses
+the kernels in an order of its own.
 """
 
 import ast
-import itertools
 import os
 import shutil
 import subprocess
@@ -67,7 +66,10 @@ def twice(x):
     return first + out.sum()
 """
 
-SMALL = """
+ANSWERS = """
+import hashlib
+import sys
+import numpy as np
 from pipeline.truth import small
 
 x = (np.random.default_rng(5).random(61) - 0.3).astype(np.float32)
@@ -77,24 +79,6 @@ def smooth():
     return out
 asked = {name: (lambda name=name: getattr(small, name)(x)) for name in ("fast", "plain", "twice", "shared")}
 asked["smooth"] = smooth
-"""
-
-REAL = """
-from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.estimator import estimate
-from pipeline.truth.options import TruthOptions
-from weaves.fabric import load_fabric
-
-fabric = load_fabric("denim")
-queries = draw_queries(QueryOptions(), fabric.weave.repeat, 7, 0, 300)
-asked = {
-    "auto": lambda: np.hstack(estimate(fabric, queries, TruthOptions(), 1)[:2]),
-    "soft_nodes": lambda: SoftNodes().predict(fabric, queries),
-}
-"""
-
-ANSWERS = """
 answers = {name: asked[name]() for name in sys.argv[1:]}
 for name in sorted(answers):
     print(name, hashlib.sha256(np.ascontiguousarray(answers[name]).tobytes()).hexdigest())
@@ -271,20 +255,11 @@ def test_kernels_that_borrow_arrays_call_none_that_returns_them():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("asked", "order"),
-    [(SMALL, ("fast", "plain", "twice", "smooth", "shared")), (REAL, ("auto", "soft_nodes"))],
-    ids=["small", "real"],
-)
-def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies, asked, order):
-    if asked is REAL:
-        for copy, package in itertools.product(copies, ("weaves", "pipeline")):
-            shutil.copytree(ROOT / package, copy / package, ignore=IGNORED, dirs_exist_ok=True)
-    script = f"import hashlib, sys\nimport numpy as np\n{asked}{ANSWERS}"
-    cold = answers(start(copies[0], script, *order))
+def test_kernels_answer_the_same_cold_and_warm_in_any_order(copies):
+    order = ("fast", "plain", "twice", "smooth", "shared")
+    cold = answers(start(copies[0], ANSWERS, *order))
     assert len(cold.split()) == 2 * len(order)
-    assert answers(start(copies[0], script, *order[::-1])) == cold
-    assert answers(start(copies[1], script, *order[::-1])) == cold
-    if asked is SMALL:
-        together = [start(copies[2], script, *order), start(copies[2], script, *order[::-1])]
-        assert [answers(process) for process in together] == [cold, cold]
+    assert answers(start(copies[0], ANSWERS, *order[::-1])) == cold
+    assert answers(start(copies[1], ANSWERS, *order[::-1])) == cold
+    together = [start(copies[2], ANSWERS, *order), start(copies[2], ANSWERS, *order[::-1])]
+    assert [answers(process) for process in together] == [cold, cold]

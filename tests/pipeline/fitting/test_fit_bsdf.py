@@ -7,7 +7,7 @@ from pipeline.bsdf.klems import BASES, Scattering
 from pipeline.bsdf.of_fabric import fabric_bsdf
 from pipeline.fitting.fit_bsdf import fit_bsdf
 from pipeline.fitting.fitted import cloth
-from pipeline.fitting.scattered import Pairs, Scatterer, YarnOptics, fit_optics, optics_numbers, solve, with_colours
+from pipeline.fitting.scattered import Pairs, Scatterer, YarnOptics, fit_optics, optics_numbers, with_colours
 from tests.refusals import refusal
 
 QUARTER = BASES["LBNL/Klems Quarter"]
@@ -19,13 +19,6 @@ EVERYTHING = np.ones(QUARTER.patches, bool)
 @pytest.fixture(scope="module")
 def geometry():
     return cloth("twill 3/1", (0.8, 0.9), (25.0, 20.0), (0.6, 0.5))
-
-
-@pytest.mark.slow
-def test_colours_are_linear_without_bounces(geometry):
-    pairs = Pairs(*(index.ravel()[::7] for index in np.indices((2, 2, QUARTER.patches, QUARTER.patches))))
-    components = Scatterer(geometry, QUARTER, pairs).components(OPTICS)
-    assert solve(components, components @ COLOURS, np.ones(len(components))) == pytest.approx(COLOURS, abs=1e-3)
 
 
 @pytest.mark.slow

@@ -1,9 +1,10 @@
-"""Formulas at their limits, and against the errors that pipeline/fitting/measured states of the shipped shade."""
+"""The shipped shade has the numbers that its laboratory states, and formulas have the errors stated of it."""
 
 import numpy as np
 import pytest
 
 from pipeline.bsdf.files import read_bsdf
+from pipeline.bsdf.klems import KLEMS_FULL
 from pipeline.fitting.held_out import RIVALS, rivals, roller_blind, woven_shade
 from pipeline.fitting.measured import SHADE
 
@@ -25,3 +26,19 @@ def test_cut_off_angles_and_errors_on_the_measured_shade():
     stated = dict(zip([*RIVALS, "means over azimuths, of these very data"], (0.54, 0.36, 0.98, 0.247), strict=True))
     for name, error in stated.items():
         assert errors[name].straight == pytest.approx(error, rel=0.1)
+
+
+def test_the_measured_shade_has_the_laboratory_s_numbers():
+    """Numbers of pipeline/fitting/measured/README.md: reflectances, light straight through, rings that are known."""
+    shade = read_bsdf(SHADE)
+    assert shade.basis == KLEMS_FULL
+    known = np.isfinite(shade.hemispherical("visible")[1, 0])
+    assert np.unique(shade.basis.ring[known]).tolist() == [0, 1, 3, 5, 7]
+    reflectance, direct = shade.hemispherical("visible")[0], shade.direct("visible")
+    ring = shade.basis.ring == 3
+    assert reflectance[:, ring].mean(axis=1) == pytest.approx([0.401, 0.2226], abs=1e-3)
+    rings = [direct[0, shade.basis.ring == k].mean() for k in (1, 3, 5, 7)]
+    assert rings == pytest.approx([0.0125, 0.0115, 0.0041, 0.0007], abs=1e-4)
+    # Along one axis nothing is left at 70 degrees, along the other almost half.
+    along, across = (direct[0, np.flatnonzero(shade.basis.ring == 7)[k]] for k in (4, 0))
+    assert along / direct[0, ring].max() > 0.35 and across < 1e-4

@@ -1,13 +1,9 @@
-import math
-
 import numpy as np
 import pytest
 
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.bounded import Bounded, limited
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.query import Queries
-from tests.directions import sphere, unit
 from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -40,22 +36,6 @@ def test_what_is_below_the_bound_stays_as_it_is(name, behind):
 def test_an_excess_goes_to_the_other_yarn_up_to_its_bound(components, bounds, expected):
     found = limited(np.array([components], np.float32), np.array([bounds], np.float32))
     np.testing.assert_allclose(found, [expected], rtol=1e-6)
-
-
-@pytest.mark.parametrize("sigma", [0.1, 2.0])
-def test_all_four_sums_of_the_brightest_method_stay_within_those_of_the_point_model(sigma):
-    """Integrals over the sphere by 4096 directions even in solid angle, as far as a narrow lobe allows."""
-    fabric, wi = load_fabric("gauze"), sphere(64, 64).astype(np.float32)
-    bright = FakeMethod(lambda queries: np.full((len(queries.u), 4), 1e3, np.float32))
-    for wo in (unit(5.0, 30.0), unit(60.0, 100.0), unit(80.0, 220.0)):
-        columns = (np.full(len(wi), value, np.float32) for value in (0.3, 0.8, sigma))
-        queries = Queries.round(*columns, wi, np.tile(np.float32(wo), (len(wi), 1)))
-        found = Bounded(bright).predict(fabric, queries).astype(float)
-        specular, diffuse = found[:, :2].sum(axis=1), found[:, 2:].sum(axis=1)
-        for side in (wi[:, 2] > 0, wi[:, 2] < 0):
-            assert 0.3 < 4.0 * math.pi * (diffuse * side).mean() <= 1.005
-            assert 0.01 < 4.0 * math.pi * (specular * side).mean() <= 0.5
-        assert 4.0 * math.pi * specular.mean() < 1.0 - math.exp(-fabric.optical_thickness)
 
 
 def test_it_is_named_apart_and_refuses_curved_cloth():

@@ -4,12 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.models.domain import Domain
-from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.directions import unit
-from tests.pipeline.truth.cloths import woven
 from tests.refusals import refusal
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -57,8 +55,6 @@ def test_what_was_not_taught_is_refused_by_name(options, message):
     behind = asked()
     behind.wo[3] *= np.float32(-1)
     assert "1 rows; first row 3: wo" in refusal(PLAIN.refuse, behind, "m")
-    with pytest.raises(BadInput, match=r"denim: roughness = 0.9.*0.16 to 0.55"):
-        PLAIN.refuse_fabric(woven("denim", warp={"roughness": 0.9}), "m")
     with pytest.raises(BadInput, match=r"truth: frame = 'macro'.*frame = 'ply'"):
         of_plane = Domain.of({"truth": {"parallax": False}}, FABRICS)
         of_plane.refuse_truth(TruthOptions(frame="macro", parallax=False), "m")
@@ -76,13 +72,10 @@ def one(sigma=1.0, minor=None, light=10.0, viewer=10.0, curvature=0.0):
     ("asked", "strange"),
     [
         ({}, False),
-        ({"sigma": 0.2}, False),
         ({"sigma": 0.19}, False),  # 2 % of the logarithm of 15, a factor of 1.056
         ({"sigma": 0.18}, True),
-        ({"sigma": 0.01}, True),
         ({"light": 60.9}, False),
         ({"light": 61.2}, True),
-        ({"viewer": 75.0}, True),
         ({"viewer": 61.2, "light": -20.0}, True),
     ],
 )
@@ -121,24 +114,3 @@ def test_what_is_asked_lies_within_what_was_taught(sigma, high):
         assert 0.1 / slack <= asked.sigma.item() <= high * slack
     if sigma < 0.999 * high or high < 0.499 * 4:  # single precision
         assert asked is queries
-
-
-@settings(max_examples=20)
-@given(
-    low=st.floats(0.05, 1.0),
-    factor=st.floats(1.0, 20.0),
-    angle=st.floats(20.0, 89.0),
-    stretch=st.sampled_from([1.0, 6.0]),
-    curvature=st.sampled_from([(0.0, 0.0), (0.01, 0.1)]),
-    margin=st.sampled_from([1.0, 1.25, 2.0]),
-)
-def test_a_model_taught_what_a_scene_requires_answers_for_it(low, factor, angle, stretch, curvature, margin):
-    """But for the rarest: 5e-4 at either end of the sizes, and of the largest ratio, curvature and angles."""
-    options = QueryOptions(sigma=(low, low * factor), max_angle=angle, stretch=stretch, curvature=curvature)
-    asked = draw_queries(options, (4, 4), 2, 0, 4000)
-    names = ("small", "middle", "large")
-    taught = Requirement.of("made up", 1, {"denim": asked}, (0.0, 0.3, 1.0), names, margin).queries()
-    domain = Domain.of({"queries": taught.model_dump()}, [DENIM])
-    assert not domain.faults(asked, "m")
-    # Two ends and four quantities, of 4,000 queries: two each, and one more for the quantile between two of them.
-    assert domain.out_of_domain(DENIM, asked).sum() <= 6 * 3

@@ -149,7 +149,7 @@ def of_turn(index):
     return tuple(name for name in METHODS if name not in TABLES or name == turn)
 
 
-@pytest.mark.parametrize("indices", [range(4), *(slow(range(k, k + 100)) for k in range(0, 1000, 100))], ids=str)
+@pytest.mark.parametrize("indices", [range(1, 3), *(slow(range(k, k + 100)) for k in range(0, 1000, 100))], ids=str)
 def test_no_legal_cloth_makes_light(indices):
     results = {(i, name): both for i in indices for name, both in scores(i, legal_cloth(i), of_turn(i)).items()}
     limit = stats.norm.isf(LEVEL / (3 * len(METHODS) * 1000))

@@ -2,16 +2,14 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.coverage import quick_coverage
-from pipeline.fingerprint import fingerprint
 from pipeline.models.analytic.soft_nodes import SoftNodes
-from pipeline.models.curved.model import Curved, CurvedNetwork
 from pipeline.models.domain import Domain
 from pipeline.models.fallback import FLAT_TURN, Fallback, fallback_answers
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.models.against_truth import colour_error
-from tests.pipeline.models.stand_ins import SMALL, FakeMethod
+from tests.pipeline.models.stand_ins import FakeMethod
 from tests.pipeline.truth.cloths import fixed, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
@@ -63,10 +61,7 @@ def test_what_no_form_stands_for_and_a_kind_that_was_not_taught_are_the_fallback
     np.testing.assert_array_equal(strange, (queries.wi[:, 2] < 0) | (queries.wo[:, 2] < 0))
     found = fallback.predict(fabric, queries)
     assert (found[~strange] == 1.0).all()
-    reference = estimate(fabric, queries.take(strange), fixed(8192), 1).mean
-    # Asked for 10 % of each answer's length, and an absolute error where it is dark.
-    wrong, size = (np.linalg.norm(part, axis=1) for part in (found[strange] - reference, reference))
-    assert np.median(wrong / size) < 0.1 and wrong.sum() < 0.1 * size.sum()
+    np.testing.assert_array_equal(found[strange], fallback_answers(fabric, queries.take(strange), 0))
     # A recipe narrowed to a scene without light from behind teaches none, though the model could learn it.
     fallback = fallback_of(fabric, {}, {"behind", "stretch", "curvature"})
     assert fallback.out_of_domain(fabric, queries)[queries.behind].all()
@@ -124,21 +119,10 @@ def test_a_viewer_behind_the_cloth_is_in_front_of_its_back(name):
     assert np.sqrt(np.mean((clear - truth.transparency) ** 2)) < 0.01
 
 
-def test_yarns_and_steep_cloth_unlike_those_trained_on_are_left_to_the_fallback():
+def test_yarns_unlike_those_trained_on_are_left_to_the_fallback():
     fallback, queries = fallback_of(DENIM, {}), draw_queries(QueryOptions(sigma=(0.5, 1.0)), (4, 4), 3, 0, 20)
     assert not fallback.out_of_domain(DENIM, queries).any() and fallback.out_of_domain(ROUGH, queries).all()
     np.testing.assert_array_equal(fallback.predict(ROUGH, queries), fallback_answers(ROUGH, queries, 0))
-    # The scenes' drape bends up to 1 a yarn; `curved` knows up to .5, and refuses beyond.
-    about, options = {"queries": {"curvature": [0.01, 0.2], "behind": 0.5}}, SMALL["curved"]
-    network = CurvedNetwork(options, DENIM.weave.repeat)
-    method = Curved({fingerprint(DENIM.optics()): network}, Domain.of(about, [DENIM]))
-    queries = draw_queries(QueryOptions(curvature=(0.1, 1.0)), DENIM.weave.repeat, 3, 0, 40)
-    fallback, steep = Fallback(method, options.kinds), queries.curvature > 0.2
-    assert steep.any() and not steep.all()
-    np.testing.assert_array_equal(fallback.out_of_domain(DENIM, queries), steep)
-    answers = fallback.predict(DENIM, queries)
-    np.testing.assert_array_equal(answers[~steep], method.predict(DENIM, queries.take(~steep)))
-    np.testing.assert_array_equal(answers[steep], fallback_answers(DENIM, queries.take(steep), 0))
 
 
 @pytest.mark.parametrize(("turned", "bound"), [(0.5 * FLAT_TURN, 0.03), (3.0 * FLAT_TURN, 0.1)])
@@ -169,13 +153,3 @@ def test_beyond_the_ranges_trained_on_the_fallback_answers_and_within_them_the_m
     np.testing.assert_array_equal(found[strange], fallback_answers(fabric, queries.take(strange), 0))
     (asked,) = fallback.method.asked
     assert asked.sigma.max() <= 1.03 and asked.sigma.min() >= 0.29
-
-
-@pytest.mark.parametrize("rows", [0, 7])
-def test_plain_queries_are_the_methods_alone(rows):
-    fabric, sums = load_fabric("denim"), SoftNodes()
-    queries = draw_queries(QueryOptions(), fabric.weave.repeat, 3, 0, rows)
-    fallback = Fallback(sums, ())
-    np.testing.assert_array_equal(fallback.predict(fabric, queries), sums.predict(fabric, queries))
-    assert (fallback.name, fallback.setting) == (sums.name, sums.setting)
-    assert fallback.bytes_stored(fabric) == sums.bytes_stored(fabric)

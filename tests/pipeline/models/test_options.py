@@ -1,8 +1,11 @@
 import pytest
+import torch
 from pydantic import TypeAdapter, ValidationError
 
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.catalogue import CLASSES, ModelOptions
+from pipeline.models.networks.layers import component_error
+from pipeline.models.options import ComponentLossOptions
 
 MODEL = TypeAdapter(ModelOptions)
 
@@ -35,3 +38,9 @@ def test_identities_state_all_choices_of_the_design(model):
 def test_bad_model_options_are_refused(table):
     with pytest.raises(ValidationError):
         MODEL.validate_python(table)
+
+
+def test_errors_are_weighed_by_kind_of_component():
+    options = ComponentLossOptions(specular_weight=3.0, diffuse_weight=5.0)
+    output, target = torch.tensor([[1.0, 0.0, 2.0, 0.0]]), torch.zeros(1, 4)
+    assert component_error(output, target, options).item() == pytest.approx(3 * 1 / 2 + 5 * 4 / 2)

@@ -8,7 +8,6 @@ from scipy import stats
 from pipeline.analytic.importance.lobes import Lobes
 from pipeline.models.named import named_method
 from pipeline.models.patch_bsdf import PatchBSDF
-from pipeline.scenes.shade import shade
 from pipeline.truth.query import Queries
 from tests.directions import sphere, unit
 from tests.presets import slow
@@ -85,33 +84,10 @@ def test_samples_follow_their_density(names):
     assert min(values.values()) > 1 - (1 - LEVEL) ** (1 / len(values)), values
 
 
-@pytest.mark.slow
-def test_weights_have_the_integral_of_eval_as_their_mean():
-    """A z-test of scattered light and of light straight through, against even directions; Sidak at LEVEL."""
-    scores, count = {}, 40_000
-    for number, name in enumerate(CONFIGURATIONS):
-        bsdf = bsdf_of(name)
-        wi = sphere(160, 320)
-        even = bsdf.eval(looks_of(name, len(wi), wi)) @ LUMINANCE
-        scattered = even.mean() * 4.0 * math.pi
-        looks = looks_of(name, count)
-        through = float(bsdf.method.transparency(bsdf.fabric, looks.take(slice(1)))[0])
-        random = np.random.default_rng(100 + number).random((count, 3))
-        sample = bsdf.sample(looks, random, lobes_of(bsdf, name, count))
-        weight = sample.weight @ LUMINANCE
-        assert np.isfinite(weight).all() and (weight >= 0).all()
-        for kind, own, wanted in (("", ~sample.straight, scattered), (" straight", sample.straight, through)):
-            values = np.where(own, weight, 0.0)
-            error = values.std() / math.sqrt(count)
-            scores[name + kind] = abs(values.mean() - wanted) / error if error > 0 else 0.0
-        assert scattered + through <= 1.0, name
-    limit = stats.norm.isf(0.5 * (1 - (1 - LEVEL) ** (1 / len(scores))))
-    assert max(scores.values()) < limit, (limit, scores)
-
-
-@pytest.mark.parametrize("name", ["front", slow("voile"), slow("grazing"), slow("behind")])
-def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name):
-    """A z-test at LEVEL of light that is no longer in the lobes' shares, against even directions."""
+@pytest.mark.parametrize("name", ["front", slow("voile"), slow("grazing"), slow("ellipse"), slow("behind a gauze")])
+def test_weights_have_the_integral_of_eval_as_their_mean(name):
+    """A z-test at LEVEL of light that is no longer in the lobes' shares, against even directions, and of light straight
+    through."""
     count, wi = 20_000, sphere(80, 160)
     one, every = (PatchBSDF(load_fabric(CONFIGURATIONS[name][0]), bounces=number) for number in (1, "all"))
     queries, looks = looks_of(name, len(wi), wi), looks_of(name, count)
@@ -119,11 +95,14 @@ def test_weights_with_all_bounces_have_the_integral_of_eval_as_their_mean(name):
     scattered = even.mean() * 4.0 * math.pi
     assert scattered > 1.005 * first.mean() * 4.0 * math.pi
     sample = every.sample(looks, np.random.default_rng(11).random((count, 3)), lobes_of(every, name, count))
-    values = np.where(sample.straight, 0.0, sample.weight @ LUMINANCE)
-    assert abs(values.mean() - scattered) < stats.norm.isf(0.5 * LEVEL) * values.std() / math.sqrt(count)
+    through = float(every.method.transparency(every.fabric, looks.take(slice(1)))[0])
+    assert scattered + through <= 1.0
+    for own, wanted in ((~sample.straight, scattered), (sample.straight, through)):
+        values = np.where(own, sample.weight @ LUMINANCE, 0.0)
+        assert abs(values.mean() - wanted) <= stats.norm.isf(0.5 * LEVEL) * values.std() / math.sqrt(count)
 
 
-@pytest.mark.parametrize("name", ["ellipse", "voile", "behind"])
+@pytest.mark.parametrize("name", ["ellipse", "voile"])
 def test_a_sample_is_what_asking_for_it_gives(name):
     bsdf, looks, random = bsdf_of(name), looks_of(name, 500), np.random.default_rng(1).random((500, 3))
     sample = bsdf.sample(looks, random)
@@ -160,15 +139,6 @@ def test_viewers_on_both_sides_are_answered_together_by_any_method():
     bsdf = PatchBSDF(other.fabric, method)
     np.testing.assert_array_equal(bsdf.pdf(queries), other.pdf(queries))
     assert not np.array_equal(bsdf.eval(queries), other.eval(queries))
-    # What a method answers changes nothing of them; another number of bounces is refused.
-    denim, up = load_fabric("denim"), np.float32([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
-    queries = Queries.round(np.array([0.3, 0.7]), np.array([0.2, 0.9]), np.array([0.1, 3.0]), up[::-1], up)
-    one, every = (PatchBSDF(denim, "prefiltered", bounces=number) for number in (1, "all"))
-    added = every.eval(queries) - one.eval(queries)
-    assert added == pytest.approx(shade(denim, np.zeros((2, 4)), queries, "all"), rel=1e-4)
-    assert added.min() > 0.0
-    with pytest.raises(BadInput, match=r'bounces.*must be 1 or "all"'):
-        PatchBSDF(denim, bounces=2)
 
 
 @pytest.mark.slow
@@ -184,11 +154,9 @@ def test_patches_that_nobody_sees_still_have_samples():
     ("random", "message"),
     [
         (np.zeros((3, 3)), "shape of random"),
-        (np.zeros(6), "shape of random"),
         ([[0.1, 0.2, 1.0], [0.1, 0.2, 0.3]], r"random\[0, 2\]"),
         ([[0.1, 0.2, 0.3], [-0.1, 0.2, 0.3]], r"random\[1, 0\]"),
         ([[0.1, math.nan, 0.3], [0.1, 0.2, 0.3]], r"random\[0, 1\]"),
-        ([["a", "b", "c"]], "random"),
         ([[0.1, 0.2, 0.3], [0.1]], "random"),
     ],
 )
@@ -199,7 +167,7 @@ def test_numbers_that_are_not_in_the_unit_interval_are_refused(random, message):
 
 def test_bad_settings_are_refused():
     bsdf = bsdf_of("front")
-    for settings in ({"points": 0}, {"widening": math.nan}, {"method": "no_such_method"}):
+    for settings in ({"points": 0}, {"widening": math.nan}, {"method": "no_such_method"}, {"bounces": 2}):
         with pytest.raises(BadInput, match=f"PatchBSDF: {next(iter(settings))}"):
             PatchBSDF(bsdf.fabric, **settings)
     assert "lobes" in refusal(bsdf.pdf, looks_of("front", 3), bsdf.lobes(looks_of("front", 2)))

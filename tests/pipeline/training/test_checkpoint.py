@@ -27,8 +27,11 @@ def saved(tmp_path_factory):
     return path
 
 
-def test_a_checkpoint_gives_all_state_back(saved):
+def test_a_checkpoint_gives_all_state_back_and_one_of_another_training_none(saved):
     other = state(saved, seed=1)
+    other.identity = "another"
+    assert other.restore(torch.device("cpu")) == 0
+    other.identity = "identity"
     assert other.restore(torch.device("cpu")) == 3
     expected = state(saved)
     assert other.curve == expected.curve

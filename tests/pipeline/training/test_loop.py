@@ -28,8 +28,8 @@ WOVEN = WovenOptions(map_texels=16, encoder_channels=4, hidden=32, log_k=10, dif
 NEUMIP = NeumipOptions(texels_per_yarn=4, log_k=10, diffuse_weight=10)
 SHORT = TrainingOptions(steps=30, batch=256, fabrics=2, checkpoint_every=8, curve_points=5, device="cpu")
 BOTH = ["polyester_lining", "cotton_twill"]
-FABRICS = {"woven": BOTH, "neumip": ["cotton_twill"], "theirs": BOTH}
-OPTIONS = {"woven": WOVEN, "neumip": NEUMIP}
+FABRICS = {"woven": BOTH, "in shards": BOTH, "neumip": ["cotton_twill"], "theirs": BOTH}
+OPTIONS = {"woven": WOVEN, "in shards": WOVEN, "neumip": NEUMIP}
 
 NETWORK = """
 class Network(nn.Module):
@@ -53,7 +53,6 @@ def theirs(tmp_path):
 
 
 def kill_at(share, *arguments):
-
     def progress(fraction):
         if fraction >= share:
             raise KeyboardInterrupt
@@ -83,40 +82,28 @@ def whole(folder, tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize("model", ["woven", slow("neumip"), "theirs"])
-def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, whole, theirs):
-    """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike. The network
-    from outside reads the random numbers of torch, and its code may lie elsewhere when it goes on."""
-    whole, resumed = whole(model), tmp_path / "resumed"
+@pytest.mark.parametrize("model", ["woven", "in shards", "theirs"])
+def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, whole, theirs, monkeypatch):
+    """Killed after step 20 of 30, with a checkpoint at 16; the second run repeats 17 to 20 and ends alike, whatever the
+    number of threads is. Rows may stay in their shards. The network from outside reads the random numbers of torch, and
+    its code may lie elsewhere when it goes on."""
+    if model == "in shards":
+        monkeypatch.setattr(dataset, "MOST_IN_TABLE", 1000)
+    whole, resumed, threads = whole(model), tmp_path / "resumed", torch.get_num_threads()
     kill_at(20 / 30, OPTIONS.get(model) or theirs(), SHORT, folder, FABRICS[model], resumed)
     assert read_checkpoint(resumed / CHECKPOINT)[0]["step"] == 16
+    assert bool(list(resumed.glob("*.npy"))) == (model != "in shards")
     shares = []
     (tmp_path / "elsewhere").mkdir()
     moved = written(tmp_path / "elsewhere", NETWORK)(limit=50.0)
-    train(OPTIONS.get(model, moved), SHORT, folder, FABRICS[model], resumed, shares.append)
+    torch.set_num_threads(threads + 3)
+    try:
+        train(OPTIONS.get(model, moved), SHORT, folder, FABRICS[model], resumed, shares.append)
+    finally:
+        torch.set_num_threads(threads)
     assert shares[0] == pytest.approx(17 / 30)
     assert contents(resumed) == contents(whole)
     assert set(contents(whole)) == {"model.safetensors", "card.json"}
-
-
-def test_a_killed_training_on_rows_that_stay_in_their_shards_goes_on_to_the_same_bytes(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(dataset, "MOST_IN_TABLE", 1000)
-    arguments = OPTIONS["woven"], SHORT, folder, FABRICS["woven"]
-    train(*arguments, tmp_path / "whole")
-    kill_at(20 / 30, *arguments, tmp_path / "resumed")
-    assert not list((tmp_path / "resumed").glob("*.npy"))
-    train(*arguments, tmp_path / "resumed")
-    assert contents(tmp_path / "resumed") == contents(tmp_path / "whole")
-
-
-def test_no_bit_depends_on_the_threads_of_the_process(folder, tmp_path, whole):
-    before = torch.get_num_threads()
-    torch.set_num_threads(before + 3)
-    try:
-        train(WOVEN, SHORT, folder, FABRICS["woven"], tmp_path)
-    finally:
-        torch.set_num_threads(before)
-    assert contents(tmp_path) == contents(whole("woven"))
 
 
 def test_a_network_from_outside_learns_and_answers(folder, theirs, whole):
@@ -135,27 +122,11 @@ def test_a_network_from_outside_learns_and_answers(folder, theirs, whole):
     assert "trained with other options; train it again" in refusal(load_methods, theirs("width=16", "width=17"), [out])
 
 
-@pytest.mark.parametrize(
-    ("loss", "error", "sentence"),
-    [
-        ("1 / 0", MethodFailed, r"^theirs: loss: ZeroDivisionError: division by zero \(theirs.py, line 13\)$"),
-        ("self(batch)", MethodFailed, r"^theirs: loss returned a tensor float32 \(2, 128, 4\); one number"),
-        ("self(batch).sum() * torch.nan", WorkFailed, "the training loss diverged by step 6: try a lower"),
-        ("self(batch).exp().mul_(2).exp_().sum()", MethodFailed, "^theirs: loss: RuntimeError: one of the variables"),
-    ],
-)
-def test_a_fault_of_a_loss_from_outside_is_a_sentence(folder, tmp_path, theirs, loss, error, sentence):
-    options = theirs("(self(batch) - batch.target).square().mean()", loss)
-    with pytest.raises(error, match=sentence):
+def test_a_loss_from_outside_without_a_gradient_is_a_sentence(folder, tmp_path, theirs):
+    options = theirs("(self(batch) - batch.target).square().mean()", "self(batch).exp().mul_(2).exp_().sum()")
+    with pytest.raises(MethodFailed, match="theirs: loss: RuntimeError: one of the variables"):
         train(options, SHORT, folder, FABRICS["woven"], tmp_path / "out")
     assert not (tmp_path / "out" / "card.json").exists()
-
-
-def test_a_foreign_checkpoint_is_not_gone_on_from(folder, tmp_path, whole):
-    whole, other = whole("neumip"), tmp_path / "other"
-    kill_at(0.9, NEUMIP, SHORT.model_copy(update={"seed": 1}), folder, FABRICS["neumip"], other)
-    train(NEUMIP, SHORT, folder, FABRICS["neumip"], other)
-    assert contents(other)["model.safetensors"] == contents(whole)["model.safetensors"]
 
 
 def test_flipped_bytes_of_a_checkpoint_or_of_cached_rows_are_not_used(folder, tmp_path, whole):
@@ -190,11 +161,8 @@ def test_a_smooth_problem_is_learnt(model, folder, tmp_path):
 def test_the_card_tells_what_was_trained_and_how_well(whole):
     folder = whole("woven")
     card = card_in(folder)
-    assert card["model"] == "woven"
     assert card["last_bits"].keys() == {"torch", "processor", "device"}
-    assert WovenOptions.model_validate(card["options"]) == WOVEN
     assert card["dataset"] == {"name": "tiny", "fingerprint": "0"}
-    assert [fabric["name"] for fabric in card["fabrics"]] == FABRICS["woven"]
     weights = safetensors.torch.load_file(folder / "model.safetensors")
     assert card["architecture"]["parameters"]["total"] == sum(tensor.numel() for tensor in weights.values())
     assert card["architecture"]["layers"] == {name: list(tensor.shape) for name, tensor in weights.items()}
@@ -203,7 +171,6 @@ def test_the_card_tells_what_was_trained_and_how_well(whole):
         figures = card["validation"][name]["diffuse_warp"]
         assert figures["noise"] == pytest.approx(1e-6, rel=1e-3)  # the tiny data set's standard error is 1e-3
         assert figures["relative_rmse"] == pytest.approx(math.sqrt(figures["mse"]) / figures["mean"], rel=1e-4)
-    assert card["steps_taken"] == 30
     assert all(0 < point["held_out_noise"] < point["held_out_mse"] for point in card["curve"])
     assert set(card["validation"]["cotton_twill"]["footprints"]) <= set(footprint_labels())
 
@@ -234,8 +201,8 @@ def test_the_state_of_the_lowest_held_out_loss_is_shipped(folder, tmp_path, monk
 def test_a_training_stops_where_the_truth_is_all_noise_and_leaves_torch_as_it_was(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(HeldOut, "error_and_noise", lambda self, weights: (1.9e-6, 1e-6))
     threads = torch.get_num_threads()
-    for changes, steps in (({"threads": threads + 1}, 6), ({"stop_at_noise": False}, 30)):
-        train(NEUMIP, SHORT.model_copy(update=changes), folder, FABRICS["neumip"], tmp_path)
+    for changes, steps in (({"threads": threads + 1}, 2), ({"stop_at_noise": False}, 10)):
+        train(NEUMIP, SHORT.model_copy(update={"steps": 10} | changes), folder, FABRICS["neumip"], tmp_path)
         assert card_in(tmp_path)["steps_taken"] == steps
     assert torch.get_num_threads() == threads
     assert not torch.are_deterministic_algorithms_enabled()

@@ -25,6 +25,8 @@ def test_a_file_says_what_it_holds_and_a_class_with_a_network_is_trained(path, m
     assert (found.name, found.stated, found.setting, found.kinds) == ("theirs", "2.1", "", {"stretch"})
     assert (found.own, found.limit, found.source) == ({"rows": 9}, 5.0, f"{path}:Theirs")
     assert found.origin == f"theirs.py, version 2.1, SHA-256 {found.sha256}"
+    sentence = "__init__: AssertionError: too many rows (theirs.py, line 6)"
+    assert sentence in refusal(describe, f"{path}:Theirs", {"rows": 500}, {})
     assert not list(path.parent.glob("__pycache__"))
     monkeypatch.chdir(path.parent)
     assert describe("theirs:Theirs", {"rows": 9}, {"limit": 5.0}) == found
@@ -62,14 +64,12 @@ def test_every_file_of_a_package_counts(tmp_path, monkeypatch):
         ('"2.1", ""', '2.1, ""', "version = 2.1 must be an integer or a short text"),
         ('version, setting, kinds = "theirs", "2.1"', 'setting, kinds = "theirs"', "lacks the attribute 'version'"),
         ('"theirs", "2.1"', '"../theirs", "2.1"', "name = '../theirs' must be letters"),
-        ('"2.1", ""', '"2.1", "../a"', "setting = '../a' must be at most 40 letters, digits, spaces"),
         ('"2.1", ""', '"2.1", "a | `b`"', "setting = 'a | `b`' must be at most 40 letters, digits, spaces"),
         ('{"stretch"}', '{"sideways"}', "kinds = ['sideways'] must be some of behind, stretch, curvature"),
         ("    def covers", "    network = print\n\n    def covers", "has a function 'network' and lacks 'load'"),
         ("    def covers", "    of_one_material = True\n\n    def covers", "and lacks a function 'network'"),
         ("    def covers", "    of_one_material = 1\n\n    def covers", "of_one_material = 1 must be True or False"),
         ("rows=8", "rows", "its option 'rows' has no default; every option needs one"),
-        ("rows=8", "rows=800", "__init__: AssertionError: too many rows (theirs.py, line 6)"),
     ],
 )
 def test_code_that_is_no_method_gets_a_sentence(path, old, new, sentence):
@@ -79,27 +79,14 @@ def test_code_that_is_no_method_gets_a_sentence(path, old, new, sentence):
         describe(f"{path}:Theirs", {}, {})
 
 
-def test_options_that_it_does_not_have_and_code_that_ends_its_process_get_a_sentence(path, monkeypatch):
-    for options, sentence in (
-        ({"row": 5}, "has no option 'row'; did you mean 'rows'"),
-        ({"rows": 500}, "too many rows"),
-    ):
-        with pytest.raises(BadInput, match=sentence):
-            describe(f"{path}:Theirs", options, {})
+def test_code_that_ends_its_process_or_needs_more_memory_than_its_limit_gets_a_sentence(path, monkeypatch):
     monkeypatch.setattr(describe_module, "run_apart", run_apart)
     path.write_text("import os; os._exit(0)" + METHOD)
     assert "import ended its process (exit code 0)" in refusal(describe, f"{path}:Theirs", {}, {})
-
-
-@pytest.mark.parametrize("code", ["bytearray(2**30)", "__import__('numpy').zeros(2**27)"])
-def test_a_method_that_needs_more_memory_than_its_limit_is_told(path, monkeypatch, code):
-    monkeypatch.setattr(describe_module, "run_apart", run_apart)
-    path.write_text(f"x = {code}\n" + METHOD)
+    path.write_text("x = __import__('numpy').zeros(2**27)\n" + METHOD)
     assert describe(f"{path}:Theirs", {}, {"memory": 2.0}).memory == 2.0
-    with pytest.raises(
-        BadInput, match=r"import: it needs more than 0.5 GiB of memory, its limit \(theirs.py, line 1\)"
-    ):
-        describe(f"{path}:Theirs", {}, {"memory": 0.5})
+    sentence = "import: it needs more than 0.5 GiB of memory, its limit (theirs.py, line 1)"
+    assert sentence in refusal(describe, f"{path}:Theirs", {}, {"memory": 0.5})
 
 
 @pytest.mark.parametrize(

@@ -4,22 +4,18 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
-from scipy.special import ndtri
 from scipy.stats import qmc
 
 from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA
+from pipeline.analytic.soft_nodes.shade import AREA
 from pipeline.models.analytic.map_material import MapMaterialOptions
 from pipeline.models.analytic.point_sampled import PointSampledOptions
 from pipeline.models.analytic.prefiltered import PrefilteredOptions
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.truth.estimator import estimate
-from pipeline.truth.geometry.heightfield import height_field
-from pipeline.truth.geometry.pieces import reference_plane
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from pipeline.truth.scattering.point import Choices, directions_of, ray_share
 from tests.directions import unit
 from tests.pipeline.truth.cloths import LOPSIDED, equal_queries, woven
 from tests.presets import slow
@@ -73,15 +69,11 @@ def _differ(found, truth):
     ("fabric", "kind", "most"),
     [
         (woven("denim"), "round", 0.035),
-        slow(woven("satin_8"), "round", 0.035),
-        slow(woven("voile"), "round", 0.04),
         (LOPSIDED, "round", 0.05),
-        slow(woven("denim"), "stretch", 0.05),
-        slow(woven("denim"), "behind", 0.07),
+        (woven("denim"), "stretch", 0.05),
         slow(woven("voile"), "behind", 0.08),
         slow(woven("denim"), "curvature", 0.06),
         (woven("denim"), "rising", 0.04),
-        slow(woven("satin_8"), "rising", 0.07),
         (woven("satin_8"), "fixed nodes", 0.05),
     ],
 )
@@ -108,22 +100,10 @@ def test_every_ray_of_an_even_footprint_ends(name):
     assert areas[1].max() < 1.02
 
 
-@pytest.mark.parametrize("name", ["denim", slow("satin_8")])
-def test_rims_are_seen_as_the_truth_sees_them(name):
-    """Steep views meet walls: nodes that leave them out are off by more."""
-    fabric = woven(name)
-    queries = _queries(fabric, 80, 11, sigma=(0.05, 1.0), steepest=85.0)
-    truth = estimate(fabric, queries, RAYS, 1)
-    error = _error(SoftNodes(2), fabric, queries, truth)
-    assert error < 0.04
-    assert _error(SoftNodes(2, walls="left_out"), fabric, queries, truth) > 1.3 * error
-
-
 @pytest.mark.parametrize(
     ("name", "sigma", "most"),
     [
         ("denim", (0.05, 0.3), 0.04),
-        slow("polyester_lining", (0.05, 0.3), 0.06),
         slow("satin_8", (0.05, 0.3), 0.04),
         ("polyester_lining", (1.0, 4.0), 0.016),
         slow("voile", (1.0, 4.0), 0.025),
@@ -134,27 +114,6 @@ def test_rims_where_floats_end_hide_light_from_behind(name, sigma, most):
     fabric = woven(name)
     queries = _kind(_queries(fabric, 60, 11, sigma=sigma, steepest=75.0), "behind")
     assert _error(SoftNodes(4), fabric, queries, estimate(fabric, queries, RAYS, 1)) < most
-
-
-@pytest.mark.parametrize("degrees", [0.0, 35.0, 60.0])
-def test_the_area_of_a_footprint_is_that_of_its_rays(degrees):
-    """Lines that miss a part, or see one twice, have another area than rays, which is wo_z.
-
-    Footprints end at 2.6 deviations: up to 2 % of one lie beyond, and Gauss's rule is up to 3 % off where it is cut.
-    Up to .3 of the rays of these meet walls.
-    """
-    fabric = woven("polyester_lining")
-    front, back, table = height_field(fabric), height_field(fabric.back()), tabulate(fabric)
-    plane, choices = reference_plane(front), Choices(macro=False, shadows=True, rims=True)
-    for x in (0.0, 0.5, 1.1, 1.7):
-        look = equal_queries(unit(20.0, 10.0), unit(degrees, 25.0), sigma=0.2, centre=(x, 0.7))
-        sums, gaps = query_sums(table, look)
-        towards = directions_of(*look.wi[0].astype(float), *look.wo[0].astype(float), 0.0)
-        points = [x, 0.7] + 0.2 * ndtri(qmc.Sobol(2, rng=1).random(1024))
-        rays = np.mean([ray_share(front, back, plane, *point, towards, choices)[1] for point in points])
-        area = sums[0, :, AREA].sum() + gaps[0]
-        assert abs(area - rays) < 0.055 * look.wo[0, 2]
-        np.testing.assert_allclose(sums[0, :, AREA], sums[0, :, BARE_AREA], rtol=1e-6)  # nothing hidden is placed
 
 
 @pytest.mark.parametrize("name", ["denim", *(slow(name) for name in ("satin_8", "silk_shantung", "voile", "crepe"))])
@@ -174,7 +133,7 @@ def test_light_does_not_depend_on_how_finely_one_looks(name, degrees):
     assert narrow == pytest.approx(wide, rel=0.01)
 
 
-@pytest.mark.parametrize("kind", ["round", "behind"])
+@pytest.mark.parametrize("kind", ["stretch", "behind"])
 def test_points_along_view_rays_converge_to_the_truth(kind):
     """The mean squared error of R2 points falls by more than four times from 16 to 256 of them."""
     fabric = LOPSIDED
@@ -184,6 +143,7 @@ def test_points_along_view_rays_converge_to_the_truth(kind):
     error = _error(many, fabric, queries, truth)
     assert error < 0.05
     assert _error(few, fabric, queries, truth) > 2.0 * error
+    assert not np.array_equal(many.predict(fabric, queries, 1), many.predict(fabric, queries, 2))
 
 
 TABLES = {"prefiltered": PrefilteredOptions, "map_material": partial(MapMaterialOptions, size=128)}

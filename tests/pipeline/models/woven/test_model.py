@@ -22,9 +22,6 @@ TWILL = load_fabric("cotton_twill")
 @pytest.mark.parametrize(
     ("changes", "more", "picture"),
     [
-        ({"one_blob": "plain"}, 0, 0),
-        ({"one_blob": "plain", "extra_layer": "encoder"}, -128 * 129, 0),
-        ({"one_blob": "periodic"}, 0, 0),
         ({"one_blob": "local"}, 64 * 128, 64),
         # The first layer alone changes: 3 numbers enter it in place of 24.
         ({"one_blob": "none"}, -21 * 128, 0),
