@@ -90,8 +90,9 @@ def evaluate(
             summary = evaluate_file(
                 cloth, queries, out, answerer, skip_bad, threads=workers or cores(), progress=advance
             )
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(f"stopped; {out} was not written") from None
+        except KeyboardInterrupt as stop:
+            stop.args = (f"stopped; {out} was not written",)
+            raise
     answered, error = summary.rows - summary.bad, summary.median_relative_error
     row = (
         f"{summary.rows:,}",

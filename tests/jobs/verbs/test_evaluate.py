@@ -13,6 +13,7 @@ import safetensors.torch
 import torch
 
 import pipeline.shards.evaluate
+from jobs import exits
 from pipeline.fingerprint import IDENTITY
 from pipeline.models.card import write_model
 from pipeline.models.domain import Domain
@@ -65,9 +66,10 @@ def test_a_summary_tells_what_was_done(evaluate, tmp_path):
         assert (path.read_bytes() == first) == (not choice or choice[0] == "--workers"), choice
 
 
-def test_ctrl_c_says_that_nothing_was_written(evaluate, tmp_path, monkeypatch):
-    monkeypatch.setattr(pipeline.shards.evaluate, "estimate", Mock(side_effect=KeyboardInterrupt))
-    assert evaluate() == (130, "", "stopped; result.parquet was not written", None)
+@pytest.mark.parametrize(("stop", "code"), [(KeyboardInterrupt(), 130), (exits._Stopped(signal.SIGTERM), 143)])
+def test_a_stop_says_that_nothing_was_written(evaluate, tmp_path, monkeypatch, stop, code):
+    monkeypatch.setattr(pipeline.shards.evaluate, "estimate", Mock(side_effect=stop))
+    assert evaluate() == (code, "", "stopped; result.parquet was not written", None)
     assert [path.name for path in tmp_path.iterdir()] == ["queries.parquet"]
 
 
