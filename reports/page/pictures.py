@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,8 @@ from weaves.colour import LUMINANCE
 FRAME_GAP: Final = 2  # clear pixels between frames
 SHOWN: Final = 6  # frames of a strip, if there are as many
 MOST_FILMS: Final = 12  # rows of a strip of frames
+
+Crop = tuple[slice, slice]  # rows and columns of a rectangle of pixels
 
 
 @dataclass(frozen=True)
@@ -100,15 +102,6 @@ def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
     return result
 
 
-class Crop(NamedTuple):
-    """A rectangle of pixels, the first row on top."""
-
-    top: int
-    left: int
-    height: int
-    width: int
-
-
 def filmstrip(films: Mapping[str, npt.NDArray[np.floating]]) -> bytes:
     """Return frames side by side as PNG bytes, without words.
 
@@ -136,13 +129,13 @@ def liveliest(films: Mapping[str, npt.NDArray[np.floating]], largest: tuple[int,
     )
     sums = {(top, left): change[top : top + height, left : left + width].sum() for top in tops for left in lefts}
     top, left = max(sums, key=lambda place: sums[place])
-    return Crop(top, left, height, width)
+    return slice(top, top + height), slice(left, left + width)
 
 
 def _strip(frames: npt.NDArray[np.floating], crop: Crop) -> Bytes8:
     """Return the crops of frames side by side and the slice over time, RGBA."""
-    top, left, height, width = crop
-    codes = encoded(EXPOSURE * frames[:, top : top + height, left : left + width])
+    codes = encoded(EXPOSURE * frames[:, *crop])
+    height = codes.shape[1]
     opaque = np.pad(codes, ((0, 0), (0, 0), (0, 0), (0, 1)), constant_values=255)
     over_time = opaque[np.arange(height) * len(opaque) // height, height // 2]
     clear = np.zeros((height, FRAME_GAP, 4), np.uint8)
