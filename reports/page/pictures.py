@@ -67,23 +67,13 @@ def strips(
         cell = {"stem": file.stem, "method": file.method, "label": display(file.method, file.setting)}
         strip.cells.append(cell | {"mse": beyond_noise(value, scientific)})
     for strip in views.values():
-        strip.cells[:] = _first_of_each_kind(strip.cells, kinds)
+        of_cells = [kinds.get(cell["method"], cell["method"]) for cell in strip.cells]
+        again = [kind in of_cells[:i] and kind != ADDED_MODEL for i, kind in enumerate(of_cells)]
+        strip.cells[:] = [strip.cells[i] for i in np.argsort(again, kind="stable").tolist()]
     fabrics, places = (
         {name: index for index, name in enumerate(names)} for names in (order, list(dict.fromkeys(scenes)))
     )
     return sorted(views.values(), key=lambda s: (fabrics.get(s.fabric, len(fabrics)), places.get(s.scene, len(places))))
-
-
-def _first_of_each_kind(cells: Sequence[dict[str, str]], kinds: Mapping[str, str]) -> list[dict[str, str]]:
-    """Return cells with the first one of each kind in front; methods from outside are kinds of their own."""
-    first: list[dict[str, str]] = []
-    others: list[dict[str, str]] = []
-    met = set[str]()
-    for cell in cells:
-        kind = kinds.get(cell["method"], cell["method"])
-        (others if kind in met - {ADDED_MODEL} else first).append(cell)
-        met.add(kind)
-    return first + others
 
 
 def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
