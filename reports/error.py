@@ -134,7 +134,7 @@ def _interval(rows: Float64, value: float, spread: float, resamples: int) -> tup
     return float(ends.low), float(ends.high)
 
 
-def bootstrap(columns: tuple[Float64, ...], statistic: Callable[..., Any], resamples: int, seed: int) -> Any:
+def bootstrap(columns: tuple[npt.NDArray[Any], ...], statistic: Callable[..., Any], resamples: int, seed: int) -> Any:
     """Return scipy's percentile bootstrap of a statistic of columns, whose rows are drawn together."""
     return stats.bootstrap(
         columns, statistic, paired=True, vectorized=True, n_resamples=resamples, method="percentile",

@@ -17,17 +17,13 @@ def many_queries(rows):
     return [(None, Queries.round(scalars, scalars, scalars + 1, vectors, vectors))]
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    clock = Clock()
-    monkeypatch.setattr(timing.time, "perf_counter_ns", clock)
-    return clock
-
-
 class Clock:
     """A clock that only the methods move."""
 
     now = 0
+
+    def __init__(self, monkeypatch):
+        monkeypatch.setattr(timing.time, "perf_counter_ns", self)
 
     def __call__(self):
         return self.now
@@ -42,8 +38,8 @@ class Clock:
         return predict
 
 
-def test_methods_take_turns_after_the_warm_up(clock):
-    calls = []
+def test_methods_take_turns_after_the_warm_up(monkeypatch):
+    clock, calls = Clock(monkeypatch), []
     contenders = [
         Contender(clock.method(calls, "a", [10**9] * 2 + list(range(1000, 2100, 100))), many_queries(10)),
         Contender(clock.method(calls, "b", [10**9] * 4 + [500] * 22), many_queries(100) + many_queries(150)),
@@ -69,8 +65,9 @@ def test_on_several_threads_each_makes_the_call_at_the_same_time():
 
 
 @pytest.mark.parametrize(("cost", "rows"), [(1, 1000), (10_000, 1000), (40_000, 512), (300_000, 64), (10**9, 16)])
-def test_slow_methods_answer_fewer_queries(cost, rows, clock):
+def test_slow_methods_answer_fewer_queries(cost, rows, monkeypatch):
     """Of each of two fabrics .05 s allow 2500, 625, 83 and no queries at 10, 40, 300 µs and 1 s a query."""
+    clock = Clock(monkeypatch)
 
     def predict(fabric, queries):
         clock.now += cost * len(queries.u)

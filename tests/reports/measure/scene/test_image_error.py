@@ -23,7 +23,6 @@ def flat(*rgb):
 
 
 def measured(*arguments, **options):
-    """Return the Records of a picture's errors by their metrics, and the maps."""
     subject = Record(method="woven", fabric="denim", scene="sphere")
     records, maps = image_errors(subject, *arguments, **options)
     return {record.metric: record for record in records}, maps
@@ -31,7 +30,6 @@ def measured(*arguments, **options):
 
 def values(picture, truth=CLOTH):
     records, _ = measured(picture, truth, EXACT, ALL)
-    # What is infinite has no Record.
     return {name: records[name].value if name in records else math.inf for name in ("mse", "mse_relative", *PERCEIVED)}
 
 
