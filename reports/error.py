@@ -22,8 +22,9 @@ Intervals are 95 % percentile bootstraps over queries [Efron1993Bootstrap] by sc
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -129,12 +130,13 @@ def ratio(numerator: tuple[float, float], denominator: tuple[float, float]) -> t
 def _interval(rows: Float64, value: float, spread: float, resamples: int) -> tuple[float, float]:
     if resamples < 2 or len(rows) < 2 or spread == 0.0:
         return value - 1.96 * spread, value + 1.96 * spread
-    result = stats.bootstrap(
-        (rows,),
-        np.mean,
-        n_resamples=resamples,
-        batch=max(1, 2_000_000 // len(rows)),
-        method="percentile",
-        rng=np.random.default_rng(0),
-    )
-    return float(result.confidence_interval.low), float(result.confidence_interval.high)
+    ends = bootstrap((rows,), np.mean, resamples, 0).confidence_interval
+    return float(ends.low), float(ends.high)
+
+
+def bootstrap(columns: tuple[npt.NDArray[Any], ...], statistic: Callable[..., Any], resamples: int, seed: int) -> Any:
+    """Return scipy's percentile bootstrap of a statistic of columns, whose rows are drawn together."""
+    return stats.bootstrap(
+        columns, statistic, paired=True, vectorized=True, n_resamples=resamples, method="percentile",
+        batch=max(1, 2_000_000 // len(columns[0])), rng=np.random.default_rng(seed),
+    )  # fmt: skip

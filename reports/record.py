@@ -16,7 +16,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import pandas as pd
 from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationError
@@ -100,22 +100,14 @@ class Record(Frozen):
     """Further information on `value`, such as the input that gave it."""
     provenance: Provenance = Provenance()
 
-    def of(
-        self,
-        metric: Metric,
-        value: float,
-        count: int,
-        *,
-        standard_error: float | None = None,
-        low: float | None = None,
-        high: float | None = None,
-        curve: tuple[tuple[float, float], ...] = (),
-        samples: tuple[float, ...] = (),
-    ) -> Record:
-        """Return another number measured on the same subject, in the unit of its metric."""
+    def of(self, metric: Metric, value: float, count: int, **bounds: Any) -> Record:
+        """Return another number measured on the same subject, in the unit of its metric.
+
+        Its `bounds` are `standard_error`, `low`, `high`, `curve` and `samples`; those of this Record do not count.
+        """
+        subject = self.model_dump(exclude={"standard_error", "low", "high", "curve", "samples"})
         number = {"metric": metric, "value": value, "count": count, "unit": metric_row(metric).unit}
-        bounds = {"standard_error": standard_error, "low": low, "high": high, "curve": curve, "samples": samples}
-        return Record.model_validate(self.model_dump() | number | bounds)
+        return Record.model_validate(subject | number | bounds)
 
     def subject(self, *provenance: str) -> tuple[object, ...]:
         """Return what the number is of, with these fields of its provenance."""

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from pipeline.compiled.arrays import Float64, Mask
+from reports.error import bootstrap
 from reports.options import ImageOptions
 
 
@@ -28,18 +28,12 @@ def block_interval(rows: Float64, mask: Mask, options: ImageOptions) -> tuple[fl
     """
     block = blocks(mask, options.block)
     sums, counts = np.bincount(block, rows), np.bincount(block).astype(np.float64)
-    bootstrap = stats.bootstrap(
-        (sums, counts),
-        lambda a, b, axis: a.sum(axis=axis) / b.sum(axis=axis),
-        paired=True,
-        vectorized=True,
-        n_resamples=options.resamples,
-        batch=max(1, 2_000_000 // len(sums)),
-        method="percentile",
-        rng=np.random.default_rng(options.seed),
-    )
-    ends = bootstrap.confidence_interval
-    return float(bootstrap.standard_error), float(ends.low), float(ends.high)
+
+    def mean(a: Float64, b: Float64, axis: int) -> Float64:
+        return np.asarray(a.sum(axis=axis) / b.sum(axis=axis))
+
+    drawn = bootstrap((sums, counts), mean, options.resamples, options.seed)
+    return float(drawn.standard_error), float(drawn.confidence_interval.low), float(drawn.confidence_interval.high)
 
 
 def blocks(mask: Mask, side: int) -> npt.NDArray[np.intp]:

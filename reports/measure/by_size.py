@@ -22,7 +22,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.models.method import Method
 from reports.error import COLOUR_WEIGHTS, colour_error
 from reports.measure.held_out import HeldOutFabric
-from reports.measure.timing import Contender, affordable, time_side_by_side
+from reports.measure.timing import Contender, affordable, quartiles, time_side_by_side
 from reports.options import TimingOptions
 from reports.record import Metric, Record
 
@@ -75,7 +75,7 @@ def measure_by_size(
             progress=lambda share, done=done: progress((done + share) / len(classes)),  # type: ignore[misc]
         )
         for index, timing in enumerate(timings):
-            times[index].append((low, timing.quartiles[1]))
+            times[index].append((low, quartiles(timing.samples)[1]))
     records = []
     for index, method in enumerate(methods):
         errors = _errors(method, classes, shares, options.seed)

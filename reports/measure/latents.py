@@ -12,9 +12,8 @@ is the delay until the next answer: the fabric's maps are made and encoded again
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
-from typing import Final, Literal, Protocol, runtime_checkable
+from typing import Final, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -37,8 +36,7 @@ _SEED = 31
 _BLENDED = ("width", "bend", "twist", "roughness", "relief", "blend")
 
 
-@dataclass(frozen=True)
-class Pair:
+class Pair(NamedTuple):
     """Two fabrics that differ in one thing."""
 
     first: Fabric

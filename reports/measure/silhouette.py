@@ -67,13 +67,6 @@ def edge_queries(options: EdgeOptions, repeat: tuple[int, int]) -> Queries:
     return result._replace(curvature=np.full(len(v), 1.0 / radius, np.float32))
 
 
-def true_edge(fabric: Fabric, options: EdgeOptions) -> Edge:
-    """Return the truth's pictures."""
-    queries = edge_queries(options, fabric.weave.repeat)
-    covered, _ = coverage(fabric, queries, options.truth, options.seed)
-    return _edge(fabric, queries, covered, estimate(fabric, queries, options.truth, options.seed).mean, options)
-
-
 def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
     """Return a method's pictures."""
     queries = edge_queries(options, fabric.weave.repeat)
@@ -90,7 +83,9 @@ def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
 
 def render_edge(fabric: Fabric, options: EdgeOptions, path: Path) -> None:
     """Write the truth's pictures to `path`: R, G, B the light, A the coverage."""
-    edge = true_edge(fabric, options)
+    queries = edge_queries(options, fabric.weave.repeat)
+    covered, _ = coverage(fabric, queries, options.truth, options.seed)
+    edge = _edge(fabric, queries, covered, estimate(fabric, queries, options.truth, options.seed).mean, options)
     planes = {name: edge.light[..., index] for index, name in enumerate("RGB")} | {"A": edge.coverage}
     write_exr(path, planes, {"fabric": fabric.name, "scene": "edge", "method": TRUTH})
 

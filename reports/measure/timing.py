@@ -67,22 +67,16 @@ class CallTiming(NamedTuple):
         """Share of the time on one thread in which the process did not run, because others did."""
         return max(0.0, 1.0 - self.processor * len(self.samples) / sum(self.samples))
 
-    @property
-    def quartiles(self) -> tuple[float, float, float]:
-        """First quartile, median and third quartile."""
-        return quartiles(self.samples)
-
 
 def time_side_by_side(
     contenders: Sequence[Contender],
     repeats: int,
     warm_up: int,
-    clock: Callable[[], int] = time.perf_counter_ns,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[CallTiming]:
     """Time methods in turns: so many timed calls of each, after others to warm up.
 
-    `clock` returns nanoseconds; `progress` receives the finished share between two rounds.
+    `progress` receives the finished share between two rounds.
     """
     set_threads(1)
     elapsed: list[list[int]] = [[] for _ in contenders]
@@ -95,10 +89,10 @@ def time_side_by_side(
         for turn in range(repeats):
             for index, contender in enumerate(contenders):
                 _synchronise()
-                counters, start, ran_before = _counters(), clock(), time.process_time_ns()
+                counters, start, ran_before = _counters(), time.perf_counter_ns(), time.process_time_ns()
                 _call(contender, pool)
                 _synchronise()
-                elapsed[index].append(clock() - start)
+                elapsed[index].append(time.perf_counter_ns() - start)
                 ran[index] += time.process_time_ns() - ran_before
                 used[index] += _joules(counters)
             progress((warm_up + turn + 1) / (warm_up + repeats))
@@ -108,12 +102,7 @@ def time_side_by_side(
     ]
 
 
-def affordable(
-    contender: Contender,
-    longest: float = LONGEST,
-    fewest: int = FEWEST,
-    clock: Callable[[], int] = time.perf_counter_ns,
-) -> Contender:
+def affordable(contender: Contender, longest: float = LONGEST, fewest: int = FEWEST) -> Contender:
     """Return the contender with as many of its queries as one call answers in `longest` seconds, on one thread.
 
     Queries a fabric are doubled from `fewest` on while a call with twice as many is made in time: their number is a
@@ -127,7 +116,7 @@ def affordable(
     while rows < most:
         more = contender.first(2 * rows)
         # The fastest of three: the first call of a size takes new memory, and another program may interrupt one.
-        if 1e-3 * min(milliseconds(partial(_answer, more), clock) for _ in range(3)) > longest:
+        if 1e-3 * min(milliseconds(partial(_answer, more)) for _ in range(3)) > longest:
             break
         rows *= 2
     return contender.first(rows)
@@ -150,13 +139,13 @@ def timed(subject: Record, metric: Metric, samples: Sequence[float]) -> Record:
     return subject.of(metric, median, len(samples), low=low, high=high, samples=tuple(samples))
 
 
-def milliseconds(action: Callable[[], object], clock: Callable[[], int] = time.perf_counter_ns) -> float:
+def milliseconds(action: Callable[[], object]) -> float:
     """Return how long a single action takes, in milliseconds."""
     _synchronise()
-    start = clock()
+    start = time.perf_counter_ns()
     action()
     _synchronise()
-    return 1e-6 * (clock() - start)
+    return 1e-6 * (time.perf_counter_ns() - start)
 
 
 def set_threads(threads: int) -> None:

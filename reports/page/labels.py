@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -31,8 +30,7 @@ _DIRECTIONS: Final = 48
 _FIRST: Final = 225.0  # direction of the first place, in degrees: below, on the left
 
 
-@dataclass(frozen=True)
-class Label:
+class Label(NamedTuple):
     """A text that belongs to a mark."""
 
     axes: Axes

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,8 @@ from weaves.colour import LUMINANCE
 FRAME_GAP: Final = 2  # clear pixels between frames
 SHOWN: Final = 6  # frames of a strip, if there are as many
 MOST_FILMS: Final = 12  # rows of a strip of frames
+
+Crop = tuple[slice, slice]  # rows and columns of a rectangle of pixels
 
 
 @dataclass(frozen=True)
@@ -65,23 +67,13 @@ def strips(
         cell = {"stem": file.stem, "method": file.method, "label": display(file.method, file.setting)}
         strip.cells.append(cell | {"mse": beyond_noise(value, scientific)})
     for strip in views.values():
-        strip.cells[:] = _first_of_each_kind(strip.cells, kinds)
+        of_cells = [kinds.get(cell["method"], cell["method"]) for cell in strip.cells]
+        again = [kind in of_cells[:i] and kind != ADDED_MODEL for i, kind in enumerate(of_cells)]
+        strip.cells[:] = [strip.cells[i] for i in np.argsort(again, kind="stable").tolist()]
     fabrics, places = (
         {name: index for index, name in enumerate(names)} for names in (order, list(dict.fromkeys(scenes)))
     )
     return sorted(views.values(), key=lambda s: (fabrics.get(s.fabric, len(fabrics)), places.get(s.scene, len(places))))
-
-
-def _first_of_each_kind(cells: Sequence[dict[str, str]], kinds: Mapping[str, str]) -> list[dict[str, str]]:
-    """Return cells with the first one of each kind in front; methods from outside are kinds of their own."""
-    first: list[dict[str, str]] = []
-    others: list[dict[str, str]] = []
-    met = set[str]()
-    for cell in cells:
-        kind = kinds.get(cell["method"], cell["method"])
-        (others if kind in met - {ADDED_MODEL} else first).append(cell)
-        met.add(kind)
-    return first + others
 
 
 def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
@@ -98,15 +90,6 @@ def films(pictures: Sequence[PictureFile]) -> dict[str, list[PictureFile]]:
         wanted = sorted(once, key=lambda file: file.method != TRUTH and (file.method, file.setting) != BASELINE)
         result[scene] = [file for file in once if file in wanted[:MOST_FILMS]]
     return result
-
-
-class Crop(NamedTuple):
-    """A rectangle of pixels, the first row on top."""
-
-    top: int
-    left: int
-    height: int
-    width: int
 
 
 def filmstrip(films: Mapping[str, npt.NDArray[np.floating]]) -> bytes:
@@ -136,13 +119,13 @@ def liveliest(films: Mapping[str, npt.NDArray[np.floating]], largest: tuple[int,
     )
     sums = {(top, left): change[top : top + height, left : left + width].sum() for top in tops for left in lefts}
     top, left = max(sums, key=lambda place: sums[place])
-    return Crop(top, left, height, width)
+    return slice(top, top + height), slice(left, left + width)
 
 
 def _strip(frames: npt.NDArray[np.floating], crop: Crop) -> Bytes8:
     """Return the crops of frames side by side and the slice over time, RGBA."""
-    top, left, height, width = crop
-    codes = encoded(EXPOSURE * frames[:, top : top + height, left : left + width])
+    codes = encoded(EXPOSURE * frames[:, *crop])
+    height = codes.shape[1]
     opaque = np.pad(codes, ((0, 0), (0, 0), (0, 0), (0, 1)), constant_values=255)
     over_time = opaque[np.arange(height) * len(opaque) // height, height // 2]
     clear = np.zeros((height, FRAME_GAP, 4), np.uint8)

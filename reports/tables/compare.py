@@ -20,8 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 from scipy import stats
 
@@ -42,8 +41,7 @@ NO_DIFFERENCE: Final[tuple[Outcome, ...]] = ("no difference shown", "within trai
 _Key = tuple[Metric, str, str, str, int, str]
 
 
-@dataclass(frozen=True)
-class Difference:
+class Difference(NamedTuple):
     """One measurement in both benchmarks."""
 
     a: Record
@@ -71,8 +69,7 @@ class Difference:
         return words[self.sign > 0]
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(NamedTuple):
     """All that two benchmarks share, and what they do not."""
 
     times: list[Difference]

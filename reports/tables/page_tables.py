@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Final
+from dataclasses import asdict, fields
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -74,8 +74,7 @@ _NOTES: Final = {"machine": "stated_time", "trained on": "stated_bytes", "code":
 _WHERE_MEASURED: Final = {"between": summary.path_table, OTHER: summary.other_table, "extremes": summary.extremes_table}
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """A section of a page."""
 
     id: str
@@ -169,7 +168,7 @@ def _without_repeats(tables: Iterable[ResultTable]) -> list[ResultTable]:
         before = full[index - 1].intro if index else ()
         after = full[index + 1].note if index + 1 < len(full) else ()
         intro = tuple(text for text in part.intro if text not in before)
-        kept.append(replace(part, intro=intro, note=tuple(text for text in part.note if text not in after)))
+        kept.append(part._replace(intro=intro, note=tuple(text for text in part.note if text not in after)))
     return kept
 
 
@@ -202,8 +201,8 @@ def _errors(
         stars = [name for name in per_material if role == "unseen" and name in set(part["method"])]
         known |= {"queries": queries} | ({"starred": listed(list(map(display, stars)))} if stars else {})
         made = of_methods("errors", part, known, columns, role)
-        lines = tuple(replace(line, label=line.label + " *" * (line.method in stars)) for line in made.rows)
-        tables.append(replace(made, rows=lines))
+        lines = tuple(line._replace(label=line.label + " *" * (line.method in stars)) for line in made.rows)
+        tables.append(made._replace(rows=lines))
     over = errors[[over_unseen(row) for row in rows(errors)]] if len(errors) else errors
     columns = {"ratio": _ratio(number("ratio_fabrics", "× lower", "times"))}
     columns |= {name: number(f"{name}_fabrics", metric=name) for name in ERRORS}
@@ -261,7 +260,7 @@ def _scenes(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
     for scene, part in parts_of(frame, "scene"):
         noise = [TableCell(shown(name, part[floors[name]].mean()) if name in floors else NONE) for name in columns]
         made = of_methods("scenes", part, {**values, "scene": plain(scene)}, columns, scene)
-        tables.append(replace(made, rows=(*made.rows, TableRow("noise of the truth", tuple(noise), kind="noise"))))
+        tables.append(made._replace(rows=(*made.rows, TableRow("noise of the truth", tuple(noise), kind="noise"))))
     return tables
 
 
@@ -272,7 +271,7 @@ def _energy(frames: Frames, values: Values) -> list[ResultTable]:
         def cell(row: Any) -> TableCell:
             made = column.cell(row)
             largest = max(getattr(row, name), np.nan_to_num(getattr(row, name + MOST)))
-            return replace(made, text=made.text + (" ✗" if largest > 1.0 else ""))
+            return made._replace(text=made.text + (" ✗" if largest > 1.0 else ""))
 
         return Column(column.title, cell)
 
@@ -402,17 +401,10 @@ def _truth_facts(records: Sequence[Record]) -> dict[str, object]:
     return values
 
 
-_KEPT: Final[Mapping[str, RowRecords[Any]]] = {
-    "stability": finding.RECORDS,
-    "truth_accuracy": accuracy.RECORDS,
-    "truth_calibration": calibration.RECORDS,
-    "truth_bias": bias.RECORDS,
-    "truth_effort": effort.RECORDS,
-    "truth_colours": footprint_colours.RECORDS,
-    "sampler": sampling.RECORDS,
-    "traced": path_traced.RECORDS,
-    "measured": measured_cloth.RECORDS,
-}
+_STUDIES: Final = (
+    finding, accuracy, calibration, bias, effort, footprint_colours, sampling, path_traced, measured_cloth,
+)  # fmt: skip
+_KEPT: Final[dict[str, RowRecords[Any]]] = {study.RECORDS.table: study.RECORDS for study in _STUDIES}
 """Measurements of the truth itself, of its sampler, of path tracing and of fits, by the names of their tables."""
 
 _RATES: Final = (

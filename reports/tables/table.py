@@ -10,7 +10,6 @@ import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -28,8 +27,7 @@ WORDS: Final = tomllib.loads(Path(__file__).with_name("tables.toml").read_text(e
 Values = Mapping[str, object]  # of words
 
 
-@dataclass(frozen=True)
-class TableCell:
+class TableCell(NamedTuple):
     """One number in words."""
 
     text: str
@@ -48,8 +46,7 @@ class Column(NamedTuple):
     cell: Callable[[Any], TableCell]
 
 
-@dataclass(frozen=True)
-class TableRow:
+class TableRow(NamedTuple):
     """One row; a row of a method knows it."""
 
     label: str
@@ -59,8 +56,7 @@ class TableRow:
     kind: str = ""  # ``baseline``, ``noise`` or ``marked`` where a row is shown apart
 
 
-@dataclass(frozen=True)
-class ResultTable:
+class ResultTable(NamedTuple):
     """A table of results."""
 
     title: str

@@ -29,6 +29,7 @@ from pipeline.truth.cloth import Raw, cloth_side, columns_of
 from pipeline.truth.estimator import ESTIMATORS, uncalibrated
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import EstimatorName, TruthOptions
+from reports.error import bootstrap
 from reports.truth.row_records import RowRecords
 from weaves.population import Population, Ranges, population_fabrics
 
@@ -166,12 +167,9 @@ def interval(wrong: Float64, error: Float64, doubt: Float64) -> tuple[float, flo
         # The reference's own variance may exceed errors that are far smaller than stated.
         return np.asarray(np.log(np.maximum(true.mean(axis=axis), _LEAST * whole) / whole))
 
-    bootstrap = stats.bootstrap(
-        squares, logarithm, paired=True, vectorized=True, n_resamples=999, batch=99, method="percentile",
-        rng=np.random.default_rng(0),
-    )  # fmt: skip
     middle = float(logarithm(*squares, axis=0))
-    reach = float(stats.norm.ppf(0.5 + 0.5 * _LEVEL)) * float(bootstrap.standard_error)
+    spread = float(bootstrap(squares, logarithm, 999, 0).standard_error)
+    reach = float(stats.norm.ppf(0.5 + 0.5 * _LEVEL)) * spread
     return math.exp(0.5 * (middle - reach)), math.exp(0.5 * (middle + reach))
 
 

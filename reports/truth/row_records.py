@@ -38,9 +38,24 @@ class RowRecords(Generic[Row]):
         fields_of = {kind.__metadata__[0]: name for name, kind in types.items() if hasattr(kind, "__metadata__")}
         return {fields_of[metric]: metric for metric in METRICS if metric in fields_of}
 
+    @property
+    def table(self) -> str:
+        """Name of the table that shows the rows: that of their metrics."""
+        return METRICS[next(iter(self.metrics.values()))].table
+
     def to_records(self, found: Iterable[Row]) -> list[Record]:
         """Return one Record for each number."""
-        return [record for row in found for record in self._of(vars(row))]
+        records = []
+        for row in map(vars, found):
+            method = row[self.method_field] if self.method_field else self.method
+            setting = self.joint.join(row[name] for name in self.setting)
+            subject = Record(method=method, setting=setting, fabric=row.get("fabric", ""))
+            once = {attribute: row[name] for attribute, name in self.once.items()}
+            for index, (name, metric) in enumerate(self.metrics.items()):
+                if not math.isnan(value := float(row[name])):
+                    record = subject.of(metric, value, row["count"])
+                    records.append(record if index else record.model_copy(update=once))
+        return records
 
     def from_records(self, records: Iterable[Record]) -> list[Row]:
         """Return the rows that Records hold, in their order; other metrics and rows that lack a field are left out."""
@@ -60,19 +75,6 @@ class RowRecords(Generic[Row]):
             for row in rows.values()
             if needed <= row.keys()
         ]
-
-    def _of(self, row: Mapping[str, Any]) -> Iterable[Record]:
-        subject = Record(
-            method=row[self.method_field] if self.method_field else self.method,
-            setting=self.joint.join(row[name] for name in self.setting),
-            fabric=row.get("fabric", ""),
-        )
-        once = {attribute: row[name] for attribute, name in self.once.items()}
-        for index, (name, metric) in enumerate(self.metrics.items()):
-            value = float(row[name])
-            if not math.isnan(value):
-                record = subject.of(metric, value, row["count"])
-                yield record if index else record.model_copy(update=once)
 
     def _named(self, record: Record) -> dict[str, Any]:
         """Return the fields that name a Record's row."""

@@ -30,8 +30,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Final, NamedTuple
+from dataclasses import replace
+from typing import Any, Final
 
 import flip_evaluator
 import numpy as np
@@ -56,64 +56,52 @@ DISPLAY_EXPOSURE: Final = 1.6  # factor on linear values before they are shown, 
 _DEFAULTS: Final = ImageOptions()
 
 
-class Measure(NamedTuple):
-    """A mean over pixels, its 95 % interval and the truth's noise floor."""
-
-    value: float
-    low: float
-    high: float
-    floor: float
-    pixels: int  # in the mean
-
-
-@dataclass(frozen=True)
-class ImageErrors:
-    """All measures of one picture, and maps of the perceived errors."""
-
-    mse: Error
-    mse_relative: Error
-    perceived: dict[Metric, Measure]  # by the keys of `PERCEIVED`
-    maps: dict[str, Float64]  # (H, W) by name: `ssim`, `flip_ldr`, `flip_hdr`, `delta_e`, and `square`, that of PSNR
-    mask: Mask  # pixels that count, (H, W)
-
-    def records(self, subject: Record) -> list[Record]:
-        """Return every number as a Record of `subject`; numbers that are infinite (equal pictures) are left out."""
-        r = self.mse_relative
-        records = subject.of_error(self.mse)
-        records.append(
-            subject.of("mse_relative", r.value, r.count, standard_error=r.standard_error, low=r.low, high=r.high)
-        )
-        records.append(subject.of("mse_relative_floor", r.noise, r.count))
-        for metric in PERCEIVED:
-            m = self.perceived[metric]
-            low, high = (bound if math.isfinite(bound) else None for bound in (m.low, m.high))
-            if math.isfinite(m.value):
-                records.append(subject.of(metric, m.value, m.pixels, low=low, high=high))
-            if math.isfinite(m.floor):
-                records.append(subject.of(f"{metric}_floor", m.floor, m.pixels))
-        return records
-
-
 def image_errors(
+    subject: Record,
     picture: npt.ArrayLike,
     truth: npt.ArrayLike,
     standard_error: npt.ArrayLike,
     mask: npt.ArrayLike,
     options: ImageOptions = _DEFAULTS,
     floor: Mapping[Metric, float] | None = None,
-) -> ImageErrors:
+) -> tuple[list[Record], dict[str, npt.NDArray[Any]]]:
     """Measure a picture against the truth's, linear RGB (H, W, 3), with the latter's standard error.
+
+    Return every number as a Record of the `subject`, but those that are infinite (equal pictures); and maps of the
+    errors by name, (H, W): `lit`, `relative.R` and so on, `square`, `ssim`, `flip_ldr`, `flip_hdr` and `delta_e`.
 
     The mask (H, W) is True where there is lit cloth; what other pixels hold does not matter. `floor` is the result of
     `noise_floor` for this truth; it takes half of the time if it is not given. BadInput if a value that counts is not
     finite, the truth is dark, or fewer than two blocks of pixels count.
     """
     m, t, s, lit = _checked(picture, truth, standard_error, mask, options)
-    mse, relative = _light_errors(m[lit], t[lit], s[lit], lit, options)
-    maps = _perceived_maps(m, t, lit)
-    floors = floor or noise_floor(t, s, lit, options)
-    perceived = {metric: _measure(metric, maps, floors[metric], lit, options) for metric in PERCEIVED}
-    return ImageErrors(mse, relative, perceived, maps, lit)
+    mse, r = _light_errors(m[lit], t[lit], s[lit], lit, options)
+    relative = subject.of("mse_relative", r.value, r.count, standard_error=r.standard_error, low=r.low, high=r.high)
+    records = [*subject.of_error(mse), relative, subject.of("mse_relative_floor", r.noise, r.count)]
+    maps, floors = _perceived_maps(m, t, lit), floor or noise_floor(t, s, lit, options)
+    for metric in PERCEIVED:
+        rows = _rows(metric, maps, lit)
+        _, *means = block_interval(rows, lit, options)
+        low, high = (end if math.isfinite(end) else None for end in sorted(_unit(metric, mean) for mean in means))
+        value, pixels = _unit(metric, float(rows.mean())), len(rows)
+        records += [subject.of(metric, value, pixels, low=low, high=high)] if math.isfinite(value) else []
+        if math.isfinite(floors[metric]):
+            records.append(subject.of(f"{metric}_floor", floors[metric], pixels))
+    return records, {"lit": lit, **relative_differences(m, t, lit), **maps}
+
+
+def relative_differences(m: Float64, t: Float64, lit: Mask, epsilon: float = RELATIVE_EPSILON) -> dict[str, Float64]:
+    """Return (m - t) / sqrt(t^2 + epsilon <t>^2), (H, W), of each channel and of luminance; 0 where nothing counts.
+
+    The mean of the channels' squares is the relative MSE as measured (`reports.error`).
+    """
+    m, t = m[lit], t[lit]
+    light, reference = m @ LUMINANCE, t @ LUMINANCE
+    shares = [*((m - t) * relative_weight(t, epsilon)).T, (light - reference) * relative_weight(reference, epsilon)]
+    maps = {f"relative.{name}": np.zeros(lit.shape) for name in "RGBY"}
+    for plane, share in zip(maps.values(), shares, strict=True):
+        plane[lit] = share
+    return maps
 
 
 def noise_floor(
@@ -135,13 +123,6 @@ def _light_errors(m: Float64, t: Float64, s: Float64, lit: Mask, options: ImageO
         spread, low, high = block_interval(rows, lit, options)
         errors.append(replace(error, standard_error=spread, low=low, high=high))
     return errors[0], errors[1]
-
-
-def _measure(metric: Metric, maps: dict[str, Float64], floor: float, lit: Mask, options: ImageOptions) -> Measure:
-    rows = _rows(metric, maps, lit)
-    _, *ends = block_interval(rows, lit, options)
-    low, high = sorted(_unit(metric, end) for end in ends)
-    return Measure(_unit(metric, float(rows.mean())), low, high, floor, len(rows))
 
 
 def _rows(metric: Metric, maps: dict[str, Float64], lit: Mask) -> Float64:

@@ -23,17 +23,16 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
 from pipeline.models.method import Method
-from reports.error import COLOUR_WEIGHTS, relative_weight, squared_error
+from reports.error import COLOUR_WEIGHTS, squared_error
 from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
-from reports.measure.scene.image_error import DISPLAY_EXPOSURE, RELATIVE_EPSILON, ImageErrors, image_errors, noise_floor
+from reports.measure.scene.image_error import DISPLAY_EXPOSURE, image_errors, noise_floor
 from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, time_side_by_side, timed
 from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
@@ -66,14 +65,13 @@ def measure_scene(
     for method in filter(shot.covered_by, methods):
         answers = shot.answers(method, options.seed)
         shown = shot.pictures(answers)
-        errors = image_errors(shown[0], truths[0], noises[0], lit[0], image, floor)
+        subject = _subject(method, shot)
+        measured, maps = image_errors(subject, shown[0], truths[0], noises[0], lit[0], image, floor)
         if method.setting in pictures:
             about = {"scene": shot.name, "method": method.name, "setting": method.setting}
-            layers = frame_layers(shown) | difference_maps(shown[0], truths[0], errors)
+            layers = frame_layers(shown) | maps
             write_picture(pictures[method.setting], shown[0], np.ones_like(lit[0]), about, layers=layers)
-        subject = _subject(method, shot)
-        records += errors.records(subject)
-        records.append(_colour(subject, shot, answers, image))
+        records += [*measured, _colour(subject, shot, answers, image)]
         own, truth, noise = (values @ np.array(LUMINANCE) for values in (shown, truths, noises))
         records += _over_time(subject, own, truth, noise, np.asarray(lit.all(axis=0)), image)
         if (rims := shot.rim_errors(method, options.seed)).size:
@@ -147,27 +145,6 @@ def _colour(subject: Record, shot: Shot, answers: Sequence[Float32], image: Imag
 
 def _subject(method: Method, shot: Shot) -> Record:
     return Record(method=method.name, setting=method.setting, scene=shot.name, threads=1)
-
-
-def difference_maps(picture: npt.ArrayLike, truth: npt.ArrayLike, errors: ImageErrors) -> dict[str, npt.NDArray[Any]]:
-    """Return the layers of a picture's errors, (H, W) by channel: `lit` (1 where a pixel counts), and all maps."""
-    return {"lit": errors.mask, **relative_differences(picture, truth, errors.mask), **errors.maps}
-
-
-def relative_differences(
-    picture: npt.ArrayLike, truth: npt.ArrayLike, mask: Mask, epsilon: float = RELATIVE_EPSILON
-) -> dict[str, Float64]:
-    """Return (m - t) / sqrt(t^2 + epsilon <t>^2), (H, W), of each channel and of luminance; 0 where nothing counts.
-
-    The mean of the channels' squares is the relative MSE as measured (`reports.error`).
-    """
-    m, t = (np.asarray(values, np.float64)[mask] for values in (picture, truth))
-    light, reference = m @ LUMINANCE, t @ LUMINANCE
-    shares = [*((m - t) * relative_weight(t, epsilon)).T, (light - reference) * relative_weight(reference, epsilon)]
-    maps = {f"relative.{name}": np.zeros(mask.shape) for name in "RGBY"}
-    for plane, share in zip(maps.values(), shares, strict=True):
-        plane[mask] = share
-    return maps
 
 
 def fovvideovdp(subject: Record, film: Float64, truth: Float64) -> list[Record]:

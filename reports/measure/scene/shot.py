@@ -12,9 +12,8 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -41,8 +40,7 @@ _RIM = "rim."
 _COLUMNS = ("frame", "pixel", "weight", "mean", "standard_error", "fallback_values")
 
 
-@dataclass(frozen=True)
-class ClothQueries:
+class ClothQueries(NamedTuple):
     """M queries on one cloth over all F frames."""
 
     fabric: Fabric
@@ -78,8 +76,7 @@ class ClothQueries:
         return np.asarray(self.weight * np.sqrt(coloured(squared, np.square(self.colours))))
 
 
-@dataclass(frozen=True)
-class Shot:
+class Shot(NamedTuple):
     """A scene's frames."""
 
     name: str

@@ -13,7 +13,6 @@ from reports.measure.by_size import EDGES
 from reports.measure.latents import SHARES
 from reports.measure.pictures import write_picture
 from reports.measure.scene.image_error import image_errors
-from reports.measure.scene.scene_errors import difference_maps
 from reports.options import BenchOptions, SceneBenchOptions
 from reports.page.content import ModelNote, PageInput, PictureFile
 from reports.page.page import write_page
@@ -122,10 +121,10 @@ def scene(folder):
     for method, setting, factor in (("truth", "", 1.0), ("woven", "", 1.08), ("point_sampled", "k = 2", 0.6)):
         path, layers = folder / f"{method}.exr", frame_layers(factor * truth)
         if method != "truth":
-            error = image_errors(factor * truth[0], truth[0], 0.01 * truth[0], lit)
-            layers |= difference_maps(factor * truth[0], truth[0], error)
             subject = Record(method=method, setting=setting, scene="attic")
-            records += [*error.records(subject), subject.of("frame_time", 20.0 * factor, 25)]
+            errors, maps = image_errors(subject, factor * truth[0], truth[0], 0.01 * truth[0], lit)
+            layers |= maps
+            records += [*errors, subject.of("frame_time", 20.0 * factor, 25)]
             records += [subject.of("colour_rrmse", abs(factor - 1), 900), subject.of("flicker", factor - 1, 3)]
         write_picture(path, factor * truth[0], np.ones_like(lit), {}, layers=layers)
         pictures.append(PictureFile("", "attic", method, setting, path))

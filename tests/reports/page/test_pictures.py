@@ -8,7 +8,7 @@ import pandas as pd
 from pipeline.models.added.added_code import ADDED_MODEL
 from reports.images import tiles
 from reports.page.content import ModelNote, PictureFile
-from reports.page.pictures import FRAME_GAP, MOST_FILMS, SHOWN, Crop, films, filmstrip, liveliest, strips
+from reports.page.pictures import FRAME_GAP, MOST_FILMS, SHOWN, films, filmstrip, liveliest, strips
 
 
 def file(method, setting="", scene="attic", fabric=""):
@@ -67,8 +67,8 @@ def test_the_liveliest_crop_holds_what_moves():
     still = np.zeros((3, 64, 120, 3))
     moving = still.copy()
     moving[1, 40:52, 70:90] = 0.5
-    crop = liveliest({"truth": still, "points": moving}, (16, 32))
-    assert crop.height == 16 and crop.width == 32
-    assert crop.top <= 40 and crop.top + 16 >= 52 and crop.left <= 70 and crop.left + 32 >= 90
-    assert liveliest({"truth": still}, (16, 32)) == Crop(0, 0, 16, 32)
-    assert liveliest({"truth": moving}, (100, 200)) == Crop(0, 0, 64, 120)
+    rows, columns = liveliest({"truth": still, "points": moving}, (16, 32))
+    assert rows.stop - rows.start == 16 and columns.stop - columns.start == 32
+    assert rows.start <= 40 and rows.stop >= 52 and columns.start <= 70 and columns.stop >= 90
+    assert liveliest({"truth": still}, (16, 32)) == (slice(0, 16), slice(0, 32))
+    assert liveliest({"truth": moving}, (100, 200)) == (slice(0, 64), slice(0, 120))
