@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.truth.geometry.heightfield import TOP, UNDER, height_field, surface_at
+from pipeline.truth.geometry.heightfield import UNDER, height_field, surface_at
 from pipeline.truth.geometry.march import Cell, height_along, level_ray
 from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
@@ -47,11 +47,3 @@ def test_surface_matches_the_oracle_and_slopes_are_those_of_the_height(name):
             height_along(field, side, x, y, towards, distance, cell) for distance in (0.0, step, -step)
         )
         assert slope == pytest.approx((ahead - behind) / (2 * step), abs=2e-4)
-
-
-def test_the_place_in_the_endless_fabric_does_not_matter():
-    field = height_field(FABRICS["denim"])
-    towards = level_ray(0.6, 0.8, 0.0)
-    near = height_along(field, TOP, 1.3, 2.6, towards, 0.0, Cell(1, 2, 1, 2, 0.0, 0.0))
-    far = height_along(field, TOP, 1.3 - 8, 2.6 + 12, towards, 0.0, Cell(1, 2, 1 - 8, 2 + 12, 0.0, 0.0))
-    np.testing.assert_allclose(near, far, atol=1e-12)

@@ -40,12 +40,3 @@ def test_rays_that_leave_a_gap_find_the_yarn_beneath(degrees):
     sees = [visible(field, a, b, 0.0, UNDER, ray(*w, 0.0)) for a, b in zip(x, y, strict=True)]
     free = leaves(fabric, x, y, np.zeros(len(x)), w)
     assert 0.05 < free.mean() < 0.95 and not (np.array(sees) & ~free).any()
-
-
-def test_the_normal_is_always_visible_and_a_crest_sees_the_horizon():
-    field = height_field(load_fabric("polyester_lining"))
-    point = surface_at(field, 0.3, 0.4, 0, 0)
-    assert visible(field, 0.3, 0.4, point[2], point[1], ray(0.0, 0.0, 1.0, 0.0))
-    crest = max(((x + 0.5), (y + 0.5)) for x in range(2) for y in range(2) if field.crown[y, x] == field.highest)
-    height = surface_at(field, *crest, int(crest[0]), int(crest[1]))[2]
-    assert visible(field, *crest, height, 0, ray(math.cos(0.3), math.sin(0.3), 1e-6, 0.0))
