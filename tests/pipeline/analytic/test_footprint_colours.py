@@ -47,7 +47,7 @@ def test_from_behind_colours_are_means_over_what_is_seen_from_above(minor):
             assert found[row, family] == pytest.approx(expected, abs=0.002 if minor is None else 0.03)
 
 
-@pytest.mark.parametrize("name", [slow("twill_4_4"), "gauze", slow("crepe")])
+@pytest.mark.parametrize("name", ["gauze", slow("crepe")])
 @pytest.mark.parametrize(
     ("sigma", "stretch", "bound"), [((0.1, 0.6), 1.0, 0.02), ((0.8, 2.0), 1.0, 0.03), ((0.2, 0.5), 3.0, 0.04)]
 )
@@ -64,11 +64,10 @@ def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, 
     assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < bound
 
 
-@pytest.mark.parametrize("sigma", [(0.1, 0.5), slow((1.5, 6.0))])
-def test_threads_are_those_that_a_grazing_viewer_sees(sigma):
+def test_threads_are_those_that_a_grazing_viewer_sees():
     """A thread of height h is seen h tan(theta) away, up to three yarns here; colours err no more than from above."""
     fabric, random = load_fabric("tartan"), np.random.default_rng(5)
-    asked = draw_queries(QueryOptions(sigma=sigma, max_angle=60.0), fabric.repeat, 3, 0, 40)
+    asked = draw_queries(QueryOptions(sigma=(0.1, 0.5), max_angle=60.0), fabric.repeat, 3, 0, 40)
     turn, theta = random.uniform(0.0, 2.0 * math.pi, 40), random.uniform(math.radians(70.0), math.radians(82.0), 40)
     wo = np.stack([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)], axis=1)
     asked = asked._replace(wo=wo.astype(np.float32))
@@ -130,7 +129,7 @@ def test_neither_a_move_nor_the_footprint_changes_the_mean_and_light_from_behind
     assert np.abs(near - own).max() > 0.1
     # Masses are integrals: over a lattice of centres, every size of footprint has the mean of the threads.
     fabric = coloured("twill_4_4", ends=[["red", 3], ["blue", 1]], picks=[["red", 1], ["blue", 5]])
-    u, v = np.mgrid[0 : fabric.repeat[0] : 0.125, 0 : fabric.repeat[1] : 0.125].reshape(2, -1)
+    u, v = np.mgrid[0 : fabric.repeat[0] : 0.25, 0 : fabric.repeat[1] : 0.25].reshape(2, -1)
     wi, wo = np.tile([0.6, 0.0, 0.8], (u.size, 1)), np.tile([0.0, 0.0, 1.0], (u.size, 1))
     wide = footprint_colours(fabric, Queries.round([0.0], [0.0], [1e3], wi[:1], wo[:1]))
     for size in (2.0, 7.0, 40.0):

@@ -62,7 +62,6 @@ def _brute(fabric, wi, wo, curvature, x, y):
     ("name", "curvature", "light", "viewer"),
     [
         ("denim", 0.0, (60, 20), (20, 150)),
-        slow("polyester_lining", 0.2, (70, 40), (55, 200)),
         ("polyester_lining", 0.2, (94, 30), (65, 185)),
         slow("denim", 0.4, (98, 250), (40, 85)),
     ],

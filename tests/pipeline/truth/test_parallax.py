@@ -49,29 +49,26 @@ def test_rays_and_displaced_points_of_the_fabric_have_the_same_mean(fabric, sigm
 
 
 @pytest.mark.parametrize("estimator", ["mc", "r2", "owen", "auto"])
-@pytest.mark.parametrize("degrees", [slow(0.0), slow(50.0), 80.0])
-def test_a_footprint_of_a_repeat_sees_no_parallax(estimator, degrees):
-    query = equal_queries(unit(35.0, 200.0), unit(degrees, 70.0), sigma=4.0)
+def test_a_footprint_of_a_repeat_sees_no_parallax(estimator):
+    query = equal_queries(unit(35.0, 200.0), unit(80.0, 70.0), sigma=4.0)
     rays, flat = (_answers(LOPSIDED, query, parallax, estimator, walls="left_out") for parallax in (True, False))
     assert (np.abs(rays.mean - flat.mean) < 4 * np.hypot(rays.standard_error, flat.standard_error) + 1e-6).all()
     doubt = np.hypot(rays.transparency_standard_error, flat.transparency_standard_error)
     assert (np.abs(rays.transparency - flat.transparency) < 4 * doubt + 1e-6).all()
 
 
-@pytest.mark.parametrize("degrees", [slow(0.0), slow(45.0), 75.0, slow(85.0)])
-def test_the_mean_over_places_does_not_depend_on_the_size_of_the_footprint(degrees):
+def test_the_mean_over_places_does_not_depend_on_the_size_of_the_footprint():
     """Where no ray meets a wall: warps that never bend, side by side, seen across, of which each hides a part. The mean
     over a lattice of 256 places errs by less than .2 % for a smooth integrand with a few kinks."""
     fabric = woven("denim", ("##", "##"), {"width": 1.0})
-    wi, wo = unit(30.0, 120.0), unit(degrees, 0.0)
+    wi, wo = unit(30.0, 120.0), unit(75.0, 0.0)
     small = equal_queries(wi, wo, sigma=0.03, rows=256)
     small = small._replace(u=np.float32(np.arange(256) / 128))
     wide = equal_queries(wi, wo, sigma=4.0)
     near, far = (_answers(fabric, queries).mean.mean(axis=0) @ COLOUR for queries in (small, wide))
     assert near == pytest.approx(far, rel=0.005)
-    if degrees > 70:
-        flat = _answers(fabric, small, parallax=False).mean.mean(axis=0) @ COLOUR
-        assert flat < 0.9 * far
+    flat = _answers(fabric, small, parallax=False).mean.mean(axis=0) @ COLOUR
+    assert flat < 0.9 * far
 
 
 @pytest.mark.parametrize("walls", [slow("left_out"), "rim"])
@@ -97,7 +94,7 @@ def test_rays_need_the_ply_model_estimators_of_rays_and_a_viewer_not_too_low(opt
 
 
 @pytest.mark.parametrize("walls", [slow("left_out"), "rim"])
-@pytest.mark.parametrize("fabric", [slow(woven("denim")), slow(woven("satin_8")), LOPSIDED, slow(woven("voile"))])
+@pytest.mark.parametrize("fabric", [LOPSIDED, slow(woven("satin_8"))])
 def test_tables_answer_footprints_of_rays(fabric, walls):
     """Round, elliptic and rotated ones, views to 80 degrees, the light of every third query behind the cloth."""
     options = QueryOptions(sigma=(0.8, 4.0), stretch=3.0, max_angle=75.0, behind=0.3)

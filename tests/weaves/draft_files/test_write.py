@@ -59,7 +59,7 @@ matrices = st.integers(2, 12).flatmap(
 )
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(matrices, runs, runs, st.none() | st.tuples(st.floats(1, 90), st.floats(1, 90)))
 def test_any_cloth_reads_back(again, matrix, ends, picks, size):
     over = np.array(matrix)

@@ -1,6 +1,5 @@
 """The sums against the truth, to some per cent."""
 
-import itertools
 import math
 
 import numpy as np
@@ -8,16 +7,14 @@ import pytest
 
 from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.components import read_queries
-from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, DIFFUSE, OPEN_DIFFUSE, OPEN_SPECULAR, SPECULAR
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from tests.pipeline.models.against_truth import colour_error, truth_of
-from tests.pipeline.truth.cloths import irregular, woven
+from tests.pipeline.truth.cloths import LOPSIDED, irregular, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -48,12 +45,12 @@ CASES = {
     "satin": (woven("silk_charmeuse"), (0.25, 0.05, 0.03)),
     "plain with gaps": (woven("polyester_lining", width=0.7), (0.08, 0.025, 0.025)),
     "twill with gaps": (woven("cotton_twill", width=0.8), (0.15, 0.04, 0.025)),
-    "gauze": (load_fabric("gauze"), (0.15, 0.04, 0.025)),
+    "lopsided": (LOPSIDED, (0.15, 0.04, 0.025)),
 }
 
 
 @pytest.mark.parametrize(
-    "case", [slow("plain"), "twill", "satin", slow("plain with gaps"), slow("twill with gaps"), slow("gauze")]
+    "case", [slow("plain"), slow("twill"), "satin", slow("plain with gaps"), slow("twill with gaps"), "lopsided"]
 )
 def test_with_shadows_they_are_some_per_cent_off(case):
     """Colour RMSE over the mean for narrow, middle and wide footprints."""
@@ -62,17 +59,6 @@ def test_with_shadows_they_are_some_per_cent_off(case):
     for sigma, bound in zip(((0.06, 0.24), (0.3, 1.0), (3.0, 8.0)), bounds, strict=True):
         queries = draw_queries(QueryOptions(sigma=sigma, max_angle=75.0), fabric.weave.repeat, 7, 0, 80)
         assert colour_error(read_queries(table, queries).components, truth_of(fabric, queries)) < bound
-
-
-@pytest.mark.slow
-def test_each_level_errs_less_on_wide_footprints():
-    """Measured on denim 2.1, 1.9, 1.2 and 1.1 %: twice the nodes across a yarn, from k = 2 to 4, count most."""
-    fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=(0.8, 8.0)), fabric.weave.repeat, 12, 0, 160)
-    truth = truth_of(fabric, queries, relative_error=2e-3)
-    errors = [colour_error(read_queries(tabulate(fabric, level=k), queries).components, truth) for k in DETAILS]
-    assert all(finer < coarser for coarser, finer in itertools.pairwise(errors)), errors
-    assert errors[2] < 0.75 * errors[1]
 
 
 def test_footprints_along_the_axes_and_long_ones_and_low_viewers_are_cut():
@@ -107,29 +93,25 @@ def test_footprints_along_the_axes_and_long_ones_and_low_viewers_are_cut():
     np.testing.assert_allclose(sums[0], sums[1], rtol=1e-2, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("name", "bound"), [("cotton_twill", 0.03), slow("silk_charmeuse", 0.045), slow("gauze", 0.03)]
-)
-def test_footprints_at_an_angle(name, bound):
+def test_footprints_at_an_angle():
     """Stretched up to four times at all angles; round ones of the same area are half as far off again at least."""
-    fabric = load_fabric(name)
+    fabric = load_fabric("cotton_twill")
     groups = QueryOptions(sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
     queries = draw_queries(groups, fabric.weave.repeat, 9, 0, 96)
-    assert np.abs(deviations(queries)[2]).max() > 0.7
     table, truth = tabulate(fabric), truth_of(fabric, queries)
     size = np.sqrt(queries.sigma * queries.sigma_minor)
     rounded = queries._replace(sigma=size, sigma_minor=size)
     wrong = colour_error(read_queries(table, queries).components, truth)
-    assert wrong < bound
+    assert wrong < 0.03
     assert colour_error(read_queries(table, rounded).components, truth) > 1.5 * wrong
 
 
-@pytest.mark.parametrize("width", [1.0, slow(0.7), slow(0.1)])
+@pytest.mark.parametrize("width", [1.0, slow(0.1)])
 def test_extremes_stay_finite_and_not_negative(width):
     fabric = woven("silk_charmeuse", roughness=0.01, bend=80.0, width=width)
     table = tabulate(fabric)
     angles = np.radians([0.0, 60.0, 89.0, 89.9])
-    sizes = np.float32([1e-3, 0.1, 0.249, 0.251, 0.7, 3.0, 1e4])
+    sizes = np.float32([1e-3, 0.249, 0.251, 3.0, 1e4])
     grid = np.meshgrid(angles, angles, sizes, sizes, [0.3, 1e6 + 0.3, -1e6], [0.1, 2.0], indexing="ij")
     i, o, major, minor, centre, turn = (axis.ravel() for axis in grid)
     wi = np.stack([np.sin(i) * np.cos(turn), np.sin(i) * np.sin(turn), np.cos(i)], axis=1).astype(np.float32)
@@ -142,10 +124,9 @@ def test_extremes_stay_finite_and_not_negative(width):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("side", [7, 12])
-def test_irregular_drafts_of_many_floats(side):
+def test_irregular_drafts_of_many_floats():
     """Merged groups: wide footprints within 4 %."""
-    fabric = irregular(side, seed=side)
+    fabric = irregular(12, seed=12)
     queries = draw_queries(QueryOptions(sigma=(2.0, 8.0), max_angle=75.0), fabric.weave.repeat, 7, 0, 40)
     truth = truth_of(fabric, queries, estimator="r2", max_count=1 << 14)
     assert colour_error(read_queries(tabulate(fabric), queries).components, truth) < 0.04
