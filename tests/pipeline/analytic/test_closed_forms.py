@@ -8,12 +8,11 @@ from pipeline.analytic.exact_points import sample_transparency
 from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, OPEN_DIFFUSE, OPEN_SPECULAR
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from tests.pipeline.analytic import methods
-from tests.pipeline.truth.cloths import along_cylinders, cylinder_answers, cylinders, woven
+from tests.pipeline.truth.cloths import along_cylinders, cylinder_answers, cylinders, drawn, woven
 
 
 @pytest.mark.parametrize("method", methods.ALL)
@@ -23,9 +22,7 @@ def test_a_lamp_at_the_eye_lights_all_that_is_seen(method):
     Soft nodes see by rays and areas what they light by soft horizons: up to 2.6 % are in soft shadows there.
     """
     fabric = woven("cotton_twill", blend=0.0)
-    queries = draw_queries(
-        QueryOptions(sigma=(0.3, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 60
-    )  # fmt: skip
+    queries = drawn(fabric, 3, 60, sigma=(0.3, 4.0), max_angle=70.0, stretch=3.0)  # fmt: skip
     found = method(fabric, queries._replace(wi=queries.wo))[:, 2:].sum(axis=1)
     np.testing.assert_allclose(found * math.pi, queries.wo[:, 2], rtol=0.03 if method is methods.soft_nodes else 2e-3)
 
@@ -68,7 +65,7 @@ def test_soft_shadows_converge_with_the_nodes_across_and_the_seen_area_is_the_pr
     # Straight yarns side by side hide one another, but no light passes: the area seen is cos, at any angle.  Its
     # table is linear between angles and azimuths; no wall is there to be left out.
     fabric = cloth()
-    queries = draw_queries(QueryOptions(sigma=(6.0, 8.0), max_angle=80.0), fabric.weave.repeat, 3, 0, 60)
+    queries = drawn(fabric, 3, 60, sigma=(6.0, 8.0), max_angle=80.0)
     sums, gaps = query_sums(tabulate(fabric, rims=False), queries)
     assert not gaps.any()
     assert np.abs(sums[:, :, AREA].sum(axis=1) / queries.wo[:, 2] - 1.0).mean() < 0.01

@@ -5,12 +5,11 @@ import pytest
 from scipy.stats import norm
 
 from pipeline.analytic.footprint_colours import footprint_colours
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
-from tests.pipeline.truth.cloths import LOPSIDED, OVER, coloured, exchanged_axes, redrawn
+from tests.pipeline.truth.cloths import LOPSIDED, OVER, coloured, drawn, exchanged_axes, redrawn
 from tests.presets import slow
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
@@ -55,7 +54,7 @@ def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, 
     """RMSE of the colour over its mean square, against the exact shares, which err by less than a quarter of the bound.
     Components are those of the truth in both."""
     fabric = coloured(name, **STRIPES)
-    asked = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=75.0), fabric.repeat, 3, 0, 24)
+    asked = drawn(fabric, 3, 24, sigma=sigma, stretch=stretch, max_angle=75.0)
     components = estimate(fabric, asked, TruthOptions(estimator="owen", max_count=1024), 1).mean
     exact = component_colours(fabric, asked, TruthOptions(relative_error=0.006, max_count=1 << 13), 2)
     colours = exact.mean, footprint_colours(fabric, asked)
@@ -67,7 +66,7 @@ def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, 
 def test_threads_are_those_that_a_grazing_viewer_sees():
     """A thread of height h is seen h tan(theta) away, up to three yarns here; colours err no more than from above."""
     fabric, random = load_fabric("tartan"), np.random.default_rng(5)
-    asked = draw_queries(QueryOptions(sigma=(0.1, 0.5), max_angle=60.0), fabric.repeat, 3, 0, 40)
+    asked = drawn(fabric, 3, 40, sigma=(0.1, 0.5), max_angle=60.0)
     turn, theta = random.uniform(0.0, 2.0 * math.pi, 40), random.uniform(math.radians(70.0), math.radians(82.0), 40)
     wo = np.stack([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)], axis=1)
     asked = asked._replace(wo=wo.astype(np.float32))

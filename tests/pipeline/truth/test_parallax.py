@@ -7,7 +7,6 @@ area of A(p, wo) dp / wo_z. Points of the fabric with that place in the footprin
 import numpy as np
 import pytest
 
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import height_field, surface_at
@@ -16,7 +15,7 @@ from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.scattering.thread_colours import component_colours
 from tests.directions import unit
-from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, equal_queries, woven
+from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, drawn, equal_queries, woven
 from tests.presets import slow
 from tests.refusals import refusal
 from weaves.validation import validated
@@ -34,8 +33,7 @@ def _answers(fabric, queries, parallax=True, estimator="owen", **options):
 def test_rays_and_displaced_points_of_the_fabric_have_the_same_mean(fabric, sigma):
     """Rays are sampled; quadrature integrates over the fabric, cut where light or view is lost. A third of the lights
     are behind the cloth. The bounds hold for 99.7 % of answers."""
-    options = QueryOptions(sigma=(sigma, 2 * sigma), max_angle=75.0, behind=0.3)
-    queries = draw_queries(options, fabric.weave.repeat, 5, 0, 60)
+    queries = drawn(fabric, 5, 60, sigma=(sigma, 2 * sigma), max_angle=75.0, behind=0.3)
     options = {"walls": "left_out", "max_count": 1 << 16}
     rays, points = (_answers(fabric, queries, estimator=name, **options) for name in ("owen", "quadrature"))
     difference = rays.mean - points.mean
@@ -97,8 +95,7 @@ def test_rays_need_the_ply_model_estimators_of_rays_and_a_viewer_not_too_low(opt
 @pytest.mark.parametrize("fabric", [LOPSIDED, slow(woven("satin_8"))])
 def test_tables_answer_footprints_of_rays(fabric, walls):
     """Round, elliptic and rotated ones, views to 80 degrees, the light of every third query behind the cloth."""
-    options = QueryOptions(sigma=(0.8, 4.0), stretch=3.0, max_angle=75.0, behind=0.3)
-    queries = draw_queries(options, fabric.weave.repeat, 6, 0, 120)
+    queries = drawn(fabric, 6, 120, sigma=(0.8, 4.0), stretch=3.0, max_angle=75.0, behind=0.3)
     physics = TruthOptions(walls=walls)
     queries = queries.take(FINE.knows(cloth_side(fabric, physics), columns_of(queries)))
     assert len(queries.u) > 60

@@ -7,19 +7,18 @@ import pytest
 
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from tests.pipeline.analytic.methods import soft_table
 from tests.pipeline.models.against_truth import colour_error
-from tests.pipeline.truth.cloths import LOPSIDED, woven
+from tests.pipeline.truth.cloths import LOPSIDED, drawn, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
 def test_rows_do_not_depend_on_each_other_nor_the_front_on_the_back():
     table = soft_table(LOPSIDED)
-    asked = draw_queries(QueryOptions(), LOPSIDED.weave.repeat, 3, 0, 60)
+    asked = drawn(LOPSIDED, 3, 60)
     whole, part = read_queries(table, asked), read_queries(table, asked.take(slice(20, 40)))
     for all_rows, some in zip(whole, part, strict=True):
         np.testing.assert_array_equal(some, all_rows[20:40])
@@ -34,13 +33,13 @@ def test_yarns_that_never_change_side():
     """A float without end is straight: numbers stay finite, beneath and on top, with and without room around."""
     for width in (0.7, 1.0):
         fabric = woven("denim", ("##", "##"), width=width)
-        asked = draw_queries(QueryOptions(), fabric.weave.repeat, 4, 0, 200)
+        asked = drawn(fabric, 4, 200)
         for found in read_queries(tabulate(fabric), asked):
             assert np.isfinite(found).all()
 
 
 def asked(fabric, count=100, **options):
-    queries = draw_queries(QueryOptions(behind=1.0, max_angle=75.0, **options), fabric.weave.repeat, 3, 0, count)
+    queries = drawn(fabric, 3, count, behind=1.0, max_angle=75.0, **options)
     assert (queries.wi[:, 2] < 0).all()
     return queries
 

@@ -6,10 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.truth.cloths import fixed, woven
+from tests.pipeline.truth.cloths import drawn, fixed, woven
 from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -17,7 +16,7 @@ from weaves.fabric import load_fabric
 
 def test_curved_cloth_is_refused_and_left_to_other_estimators():
     fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=(1.0, 8.0), max_angle=60.0), fabric.weave.repeat, 3, 0, 4)
+    queries = drawn(fabric, 3, 4, sigma=(1.0, 8.0), max_angle=60.0)
     curved = queries._replace(curvature=np.float32([0, 0, 0.1, 0]))
     with pytest.raises(BadInput, match=r"node_table \(row 2\).*take auto"):
         estimate(fabric, curved, TruthOptions(estimator="node_table"), 0)
@@ -40,7 +39,7 @@ def test_answers_match_converged_ones(fabric, behind, choices):
     typical query is within .6 %; transparency likewise. Footprints of the fabric plane are narrower."""
     for options in choices:
         least = 0.4 if options else 1.5
-        queries = draw_queries(QueryOptions(sigma=(least, 8.0), max_angle=80.0), fabric.weave.repeat, 21, 0, 80)
+        queries = drawn(fabric, 21, 80, sigma=(least, 8.0), max_angle=80.0)
         if behind:
             queries = queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
         exact = estimate(fabric, queries, fixed(1 << 15, **options), 4)
