@@ -47,16 +47,6 @@ def test_shadows_of_cylinders_on_each_other(method, bound):
         assert (shadow_errors(method, blend, viewer) < bound).all()
 
 
-@pytest.mark.parametrize("blend", [0.0, 1.0])
-def test_shadows_converge_with_points(blend):
-    """A line across the yarns is cut at a few places: R2 points err by 1 / n."""
-    counts = [64, 256, 1024, 4096]
-    by_points = np.array([shadow_errors(methods.points, blend, count=n) for n in counts])
-    for component in range(2):
-        slope = np.polyfit(np.log(counts), np.log(by_points[:, component]), 1)[0]
-        assert 0.8 < -slope < 1.7, by_points
-
-
 def test_soft_shadows_converge_with_the_nodes_across_and_the_seen_area_is_the_projected_one():
     """From k = 2 to 4 a yarn has twice as many, and narrower ramps: order 1/2 at least. Others change nothing."""
     errors = np.array([shadow_errors(methods.soft_nodes, 0.5, 1.2, level=level) for level in (1, 2, 4, 8)])

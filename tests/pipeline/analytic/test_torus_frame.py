@@ -3,9 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.torus_frame import Angles, Fibre, bend, normal, sigma, spread, tangent, turning
+from pipeline.analytic.torus_frame import Angles, Fibre, bend, normal, tangent, turning
 from pipeline.truth.geometry import heightfield as heights
-from pipeline.truth.scattering import slab
 from tests.pipeline.truth.cloths import woven
 
 STEP = 1e-5  # of central differences
@@ -56,15 +55,3 @@ def test_turning_is_the_derivative_of_the_tangent(seed):
 def test_a_float_ends_at_its_steepest_place(sine, expected):
     angles, _ = bend(0.0, 1.0, 0.4, sine * 2.5, 1.0 / 2.1, 0.999)
     assert angles.sin_u == pytest.approx(expected) and math.hypot(angles.sin_u, angles.cos_u) == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("alpha", [0.05, 0.3, 1.0])
-def test_flakes_by_cosines_are_those_by_cross_products(alpha):
-    """Away from the fibre's axis, to the digits that a difference from 1 leaves."""
-    random = np.random.default_rng(4)
-    for _ in range(20):
-        i, o, t = (w / np.linalg.norm(w) for w in random.normal(size=(3, 3)))
-        square, size = alpha**2, 1.0 / float((i + o) @ (i + o))
-        assert sigma(float(i @ t), square) == pytest.approx(slab.sigma(*i, *t, alpha), rel=1e-6)
-        q = spread(float((i + o) @ t), size, square)
-        assert alpha**3 / (math.pi * q) == pytest.approx(slab.density(*(i + o), *t, alpha), rel=1e-5)

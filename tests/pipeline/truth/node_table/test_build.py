@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.truth.cloths import drawn, fixed, woven
+from tests.pipeline.truth.cloths import LOPSIDED, drawn, fixed
 from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -26,9 +26,9 @@ def test_curved_cloth_is_refused_and_left_to_other_estimators():
 @pytest.mark.parametrize(
     ("fabric", "behind"),
     [
-        pytest.param(load_fabric("polyester_lining"), False, id="plain"),
+        pytest.param(LOPSIDED, False, id="narrow"),
         pytest.param(load_fabric("denim"), True, id="twill_behind"),
-        pytest.param(woven("cotton_twill", width=0.8), False, id="narrow_twill", marks=pytest.mark.slow),
+        pytest.param(load_fabric("satin_8"), False, id="satin", marks=pytest.mark.slow),
     ],
 )
 @pytest.mark.parametrize(
