@@ -82,15 +82,3 @@ def test_white_cloth_that_lets_light_through_makes_none(name, blend):
             once = np.where(around[:, 2:] > 0.0, share, 1.0 - share) * first
             gap = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width)
             assert 0.3 < (once.sum() + later) * 4.0 * math.pi / len(around) < 1.01 - 0.5 * gap * viewer[2]
-
-
-@pytest.mark.slow
-def test_yarns_that_transmit_nothing_look_as_in_the_table_of_reflections():
-    """Closed cloth, k_dt = 0: walks are the same up to the third yarn, then fewer; no light comes from behind."""
-    table, own = bounce_table(CLOSED, 1 << 14, through=True), bounce_table(CLOSED, 1 << 14)
-    colours = np.array([[1e-6, 0.9], [1e-6, 0.9], [0.0, 0.0], [0.0, 0.0]])
-    both, one = bounced(table, LIGHTS, VIEWERS, colours)[:, :2], bounced(own, LIGHTS, VIEWERS, colours[:2])
-    assert both[..., 0] == pytest.approx(one[..., 0], rel=1e-5, abs=1e-6 * one[..., 0].max())
-    assert np.sqrt(np.mean((both - one)[..., 1] ** 2)) < 0.05 * one[..., 1].mean()
-    behind = bounced(table, LIGHTS * np.float32([1.0, 1.0, -1.0]), VIEWERS, colours)
-    assert np.abs(behind[:, :2]).max() < 1e-6 and behind[:, 2:].max() > 1e-3

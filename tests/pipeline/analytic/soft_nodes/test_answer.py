@@ -12,6 +12,7 @@ from pipeline.analytic.soft_nodes.shade import AREA, DIFFUSE, OPEN_DIFFUSE, OPEN
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.pipeline.analytic.methods import soft_table
 from tests.pipeline.models.against_truth import colour_error, truth_of
 from tests.pipeline.truth.cloths import LOPSIDED, drawn, irregular, woven
 from tests.presets import slow
@@ -67,11 +68,11 @@ def test_footprints_along_the_axes_and_long_ones_and_low_viewers_are_cut():
     stretch = np.geomspace(1.0, 6.0, 60).astype(np.float32)
     queries = queries._replace(sigma=queries.sigma * stretch, sigma_minor=queries.sigma / np.sqrt(stretch))
     turned = queries._replace(angle=np.full(60, math.pi / 2, np.float32))
-    table = tabulate(fabric)
+    table = soft_table(fabric)
     for asked in (queries, turned):
         assert colour_error(read_queries(table, asked).components, truth_of(fabric, asked)) < 0.04
     # A footprint longer than LONGEST and narrow across, or a viewer in the plane, answers as the nearest known one.
-    table, up = tabulate(load_fabric("denim")), [0.0, 0.0, 1.0]
+    table, up = soft_table(load_fabric("denim")), [0.0, 0.0, 1.0]
     for angle in (0.0, 0.3, math.pi / 2):
         long = Queries.round([0.3] * 2, [0.4] * 2, [1e4, 48.0], [up] * 2, [[0.6, 0.0, 0.8]] * 2)
         sums, _ = query_sums(table, long._replace(sigma_minor=np.float32([0.1, 0.1]), angle=np.float32([angle] * 2)))
@@ -87,7 +88,7 @@ def test_footprints_at_an_angle():
     """Stretched up to four times at all angles; round ones of the same area are half as far off again at least."""
     fabric = load_fabric("cotton_twill")
     queries = drawn(fabric, 9, 96, sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
-    table, truth = tabulate(fabric), truth_of(fabric, queries)
+    table, truth = soft_table(fabric), truth_of(fabric, queries)
     size = np.sqrt(queries.sigma * queries.sigma_minor)
     rounded = queries._replace(sigma=size, sigma_minor=size)
     wrong = colour_error(read_queries(table, queries).components, truth)
@@ -144,6 +145,6 @@ def test_shadows_take_light_away(sigma):
     """No sum exceeds that of what is seen without shadows."""
     fabric = load_fabric("denim")
     queries = drawn(fabric, 6, 100, sigma=sigma, max_angle=85.0)
-    sums, _ = query_sums(tabulate(fabric), queries)
+    sums, _ = query_sums(soft_table(fabric), queries)
     for lit, whole in ((DIFFUSE, OPEN_DIFFUSE), (SPECULAR, OPEN_SPECULAR)):
         assert (sums[:, :, lit] >= 0.0).all() and (sums[:, :, lit] <= 1.001 * sums[:, :, whole] + 1e-7).all()

@@ -31,7 +31,7 @@ def layer(field, family):
 @pytest.fixture(scope="module")
 def cloth():
     field = height_field(woven("denim", relief=1.2, twist=30.0).model_copy(update={"optical_thickness": 0.4}))
-    return field, tabulate(field, field, True, 32, 128)
+    return field, tabulate(field, field, True, 16, 8)
 
 
 def pieces(table):
