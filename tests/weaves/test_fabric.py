@@ -43,7 +43,7 @@ tables = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(tables.map(Fabric.model_validate))
 def test_a_fabric_reads_back_from_its_own_file(tmp_path_factory, fabric):
     path = tmp_path_factory.mktemp("fabric") / "cloth.toml"

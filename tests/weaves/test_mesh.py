@@ -10,7 +10,7 @@ from weaves.fabric import load_fabric
 from weaves.mesh import repeat_mesh
 from weaves.surface import GAP, surface_at
 
-WIDTHS = [(1.0, 1.0), (0.7, 0.7), (1.0, 0.4), (0.55, 0.9)]
+WIDTHS = [(1.0, 1.0), (1.0, 0.4), (0.55, 0.9)]
 
 
 def _cloth(cloth, widths=(1.0, 1.0), warp=None, weft=None):
@@ -120,8 +120,7 @@ def test_walls_fill_what_lies_between_both_sides_and_no_more(name):
     assert crossings
 
 
-@pytest.mark.parametrize("steps", [2, 3, 16, 64])
-@pytest.mark.parametrize("width", [1.0, 0.6])
+@pytest.mark.parametrize(("steps", "width"), [(2, 0.6), (3, 1.0), (16, 0.6)])
 def test_volume_of_straight_yarns_is_that_of_inscribed_prisms(steps, width):
     flat = {"bend": 0.0, "relief": 1.0}
     fabric = _cloth("denim", (width, width), flat, flat)
@@ -173,7 +172,7 @@ def test_copies_are_the_repeat_moved_whose_mean_height_converges_to_the_surface(
     assert finest == pytest.approx(expected, rel=2e-3)
 
 
-@pytest.mark.parametrize("steps", [2, 7, 64])
+@pytest.mark.parametrize("steps", [2, 7])
 def test_triangles_are_never_degenerate(steps):
     for widths in WIDTHS:
         for part in repeat_mesh(_cloth("silk_shantung", widths), steps):

@@ -86,12 +86,6 @@ def test_other_models_complain_in_the_same_words():
 
 
 @settings(max_examples=300)
-@given(st.dictionaries(words, trees, max_size=5))
-def test_any_table_is_a_fabric_or_one_sentence(tree):
-    accepted(validated, Fabric, tree, "cloth.toml")
-
-
-@settings(max_examples=300)
 @given(st.sampled_from([None, "warp", "draft", "weft"]), words, trees)
 def test_any_single_change_of_a_good_fabric_is_a_fabric_or_one_sentence(table, key, tree):
     changed = {**GOOD, key: tree} if table is None else {**GOOD, table: {**GOOD[table], key: tree}}

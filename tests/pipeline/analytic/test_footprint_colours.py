@@ -5,12 +5,11 @@ import pytest
 from scipy.stats import norm
 
 from pipeline.analytic.footprint_colours import footprint_colours
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.thread_colours import component_colours
-from tests.pipeline.truth.cloths import LOPSIDED, OVER, coloured, exchanged_axes, redrawn
+from tests.pipeline.truth.cloths import LOPSIDED, OVER, coloured, drawn, exchanged_axes, redrawn
 from tests.presets import slow
 from weaves.fabric import load_fabric
 from weaves.surface import surface_at
@@ -47,7 +46,7 @@ def test_from_behind_colours_are_means_over_what_is_seen_from_above(minor):
             assert found[row, family] == pytest.approx(expected, abs=0.002 if minor is None else 0.03)
 
 
-@pytest.mark.parametrize("name", [slow("twill_4_4"), "gauze", slow("crepe")])
+@pytest.mark.parametrize("name", ["gauze", slow("crepe")])
 @pytest.mark.parametrize(
     ("sigma", "stretch", "bound"), [((0.1, 0.6), 1.0, 0.02), ((0.8, 2.0), 1.0, 0.03), ((0.2, 0.5), 3.0, 0.04)]
 )
@@ -55,7 +54,7 @@ def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, 
     """RMSE of the colour over its mean square, against the exact shares, which err by less than a quarter of the bound.
     Components are those of the truth in both."""
     fabric = coloured(name, **STRIPES)
-    asked = draw_queries(QueryOptions(sigma=sigma, stretch=stretch, max_angle=75.0), fabric.repeat, 3, 0, 24)
+    asked = drawn(fabric, 3, 24, sigma=sigma, stretch=stretch, max_angle=75.0)
     components = estimate(fabric, asked, TruthOptions(estimator="owen", max_count=1024), 1).mean
     exact = component_colours(fabric, asked, TruthOptions(relative_error=0.006, max_count=1 << 13), 2)
     colours = exact.mean, footprint_colours(fabric, asked)
@@ -64,11 +63,10 @@ def test_each_component_has_its_own_shares_of_the_threads(name, sigma, stretch, 
     assert math.sqrt(np.mean((found - truth) ** 2) / np.mean(truth**2)) < bound
 
 
-@pytest.mark.parametrize("sigma", [(0.1, 0.5), slow((1.5, 6.0))])
-def test_threads_are_those_that_a_grazing_viewer_sees(sigma):
+def test_threads_are_those_that_a_grazing_viewer_sees():
     """A thread of height h is seen h tan(theta) away, up to three yarns here; colours err no more than from above."""
     fabric, random = load_fabric("tartan"), np.random.default_rng(5)
-    asked = draw_queries(QueryOptions(sigma=sigma, max_angle=60.0), fabric.repeat, 3, 0, 40)
+    asked = drawn(fabric, 3, 40, sigma=(0.1, 0.5), max_angle=60.0)
     turn, theta = random.uniform(0.0, 2.0 * math.pi, 40), random.uniform(math.radians(70.0), math.radians(82.0), 40)
     wo = np.stack([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)], axis=1)
     asked = asked._replace(wo=wo.astype(np.float32))
@@ -130,7 +128,7 @@ def test_neither_a_move_nor_the_footprint_changes_the_mean_and_light_from_behind
     assert np.abs(near - own).max() > 0.1
     # Masses are integrals: over a lattice of centres, every size of footprint has the mean of the threads.
     fabric = coloured("twill_4_4", ends=[["red", 3], ["blue", 1]], picks=[["red", 1], ["blue", 5]])
-    u, v = np.mgrid[0 : fabric.repeat[0] : 0.125, 0 : fabric.repeat[1] : 0.125].reshape(2, -1)
+    u, v = np.mgrid[0 : fabric.repeat[0] : 0.25, 0 : fabric.repeat[1] : 0.25].reshape(2, -1)
     wi, wo = np.tile([0.6, 0.0, 0.8], (u.size, 1)), np.tile([0.0, 0.0, 1.0], (u.size, 1))
     wide = footprint_colours(fabric, Queries.round([0.0], [0.0], [1e3], wi[:1], wo[:1]))
     for size in (2.0, 7.0, 40.0):

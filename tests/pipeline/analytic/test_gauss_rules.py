@@ -63,11 +63,3 @@ def test_rules_converge_faster_than_any_power(radius):
     by_node = np.polyfit(counts, np.log(errors), 1)[0]
     by_order = np.polyfit(np.log(counts), np.log(errors), 1)[0]
     assert by_node < -math.log(2.0) and by_order < -4.0, errors
-
-
-@pytest.mark.parametrize("radius", [0.0, 0.5])
-def test_a_mirrored_extent_has_the_mirrored_rule(radius):
-    own, other = gauss_rule(0.1, 0.7, 5, radius), gauss_rule(0.3, 0.9, 5, radius)
-    for values, mirrored in ((own.places, other.places), (own.borders, other.borders)):
-        np.testing.assert_allclose(1.0 - values[::-1], mirrored, atol=1e-14)
-    np.testing.assert_allclose(own.weights[::-1], other.weights, atol=1e-14)

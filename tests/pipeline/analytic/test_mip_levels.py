@@ -72,16 +72,3 @@ def test_a_moved_map_is_read_at_the_moved_place_and_a_mirrored_one_at_its_mirror
         np.testing.assert_allclose(read(moved, u - 2.0, v + 1.0, sigma), own, rtol=1e-4)
         np.testing.assert_allclose(read(mirrored, 8.0 - u, v, sigma), own, rtol=1e-4)
         np.testing.assert_allclose(read(maps, u + 800.0, v - 1600.0, sigma), own, rtol=1e-4)
-
-
-@pytest.mark.parametrize("periods", [1, 2, 4])
-def test_waves_are_damped_as_by_the_gaussian(periods):
-    """Within 5 % of the wave from half a texel to where a third of it is left; without filter it would be all."""
-    phase = 2.0 * math.pi * periods * (np.arange(TEXELS) + 0.5) / TEXELS
-    maps = levels_of(np.broadcast_to(np.cos(phase), (TEXELS, TEXELS))[..., None])
-    number = 2.0 * math.pi * periods / 8.0
-    for sigma in (0.0625, 0.125, 0.25, 0.5):
-        exact = math.exp(-0.5 * (number * sigma) ** 2)
-        if exact > 1.0 / 3.0:
-            peak = np.mean([read(maps, u, 1.0, sigma)[0] * math.cos(number * u) for u in np.arange(0.0, 8.0, 1 / 32)])
-            assert 2.0 * peak == pytest.approx(exact, abs=0.05)

@@ -20,7 +20,7 @@ def test_a_texel_is_a_point(point_shares, wi, wo):
     ends, picks = fabric.weave.repeat
     columns, rows = (1 << int(np.ceil(np.log2(extent * PER_YARN))) for extent in (ends, picks))
     x, y = np.meshgrid((np.arange(columns) + 0.5) * ends / columns, (np.arange(rows) + 0.5) * picks / rows)
-    x, y = (axis.ravel()[::7].astype(np.float32) for axis in (x, y))
+    x, y = (axis.ravel()[::29].astype(np.float32) for axis in (x, y))
     wi, wo = (np.tile(np.float32(above(*w)), (len(x), 1)) for w in (wi, wo))
     queries = Queries.round(x, y, np.full(len(x), 1e-4, np.float32), wi, wo)
     tables = tabulate(fabric, PER_YARN, parallax=False)

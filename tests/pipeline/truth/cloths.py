@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.draft import Draft, Matrix
@@ -40,6 +41,11 @@ def equal_queries(wi, wo, sigma=2.0, rows=1, centre=(0.3, 0.7)):
     ones = np.ones(rows, np.float32)
     directions = (np.tile(np.asarray(w, np.float32), (rows, 1)) for w in (wi, wo))
     return Queries.round(ones * centre[0], ones * centre[1], (ones * sigma).astype(np.float32), *directions)
+
+
+def drawn(fabric, seed, rows, **options):
+    """Return random queries about a fabric."""
+    return draw_queries(QueryOptions(**options), fabric.repeat, seed, 0, rows)
 
 
 def answering(estimator, **options):
@@ -99,6 +105,27 @@ ONE = np.float32(1)
 def on_lattice(queries):
     """Return queries whose centres lie on a lattice of 1/64, so that single precision moves them exactly."""
     return queries._replace(u=np.round(queries.u * 64) / 64, v=np.round(queries.v * 64) / 64)
+
+
+def agree(one, other, worst, mean):
+    """Compare answers (N, K): no difference, over the largest one of its column, is `worst`, nor their mean `mean`."""
+    difference = np.abs(one - other) / one.max(axis=0)
+    assert one.max(axis=0).min() > 0.01 and difference.max() < worst, difference.max(axis=0)
+    assert difference.mean() < mean
+
+
+def images_agree(method, queries, worst, mean, without=()):
+    """Compare a method's answers (N, K) about all `IMAGES` but those `without`. A mirror reverses the sense of the
+    twists: without that the mirrored cloth answers otherwise."""
+    queries = on_lattice(queries)
+    own = method(LOPSIDED, queries)
+    for image, draw in IMAGES.items():
+        if image not in without:
+            there = method(*draw(queries))
+            order = [1, 0, 3, 2, *range(4, there.shape[1])] if image == "exchange" else slice(None)
+            agree(own, there[:, order], worst, mean)
+    wrong = method(redrawn(OVER[:, ::-1]), reversed_axes(queries, -1, 1))
+    assert np.abs(own - wrong).max() > 0.01 * own.max()
 
 
 def moved_far(queries):

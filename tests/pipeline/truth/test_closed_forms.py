@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.footprint.mixture import FINE_LINE
@@ -13,7 +12,7 @@ from pipeline.truth.geometry.pieces import first_cells
 from pipeline.truth.node_table.tables import NOT_REFINED, NodeTable
 from pipeline.truth.options import EstimatorName, Limits, TruthOptions
 from pipeline.truth.quadrature.adaptive import integrate_rows
-from tests.pipeline.truth.cloths import along_cylinders, answering, cylinder_answers, cylinders, fixed, woven
+from tests.pipeline.truth.cloths import along_cylinders, answering, cylinder_answers, cylinders, drawn, fixed, woven
 
 ROUND = cylinders(twist=20.0, roughness=0.4, blend=0.6).model_copy(update={"optical_thickness": 0.8})
 ASKED = along_cylinders(viewer=1.2)
@@ -62,7 +61,7 @@ def test_answers_are_exact_within_the_errors_they_state_also_under_a_lamp_at_the
     assert np.sqrt(np.mean(wrong**2)) < 1.5 * np.sqrt(np.mean(stated**2)) + 1e-6
     # Diffuse parts with cosines to the cloth alone: cos / pi, whatever the weave, the footprint and the direction.
     fabric, least = woven("cotton_twill", blend=0.0), 1.5 if estimator == "node_table" else 0.3
-    queries = draw_queries(QueryOptions(sigma=(least, 4.0), max_angle=70.0, stretch=3.0), fabric.weave.repeat, 3, 0, 40)
+    queries = drawn(fabric, 3, 40, sigma=(least, 4.0), max_angle=70.0, stretch=3.0)
     options = answering(estimator, max_count=256)
     found = estimate(fabric, queries._replace(wi=queries.wo), options, 1).mean[:, 2:].sum(axis=1)
     # Tables interpolate the horizon of light and viewer alike: a node is seen and lit, or neither.

@@ -7,7 +7,6 @@ from scipy import stats
 from pipeline.truth import invariants
 from pipeline.truth.estimator import estimate
 from pipeline.truth.invariants import SIGNIFICANCE, exact, quotient, worst
-from tests.pipeline.truth.cloths import woven
 from tests.presets import PRESETS
 from weaves.fabric import load_fabric
 
@@ -32,12 +31,6 @@ def test_a_preset_keeps_the_invariants_at_few_points(brief, test):
     found = test(FABRIC)
     assert found and not [item for item in found if item.status == "broken"]
     assert len({item.name for item in found}) == len(found)
-
-
-@pytest.mark.slow
-def test_narrow_yarns_let_light_through_and_keep_the_invariants(brief):
-    fabric = woven("polyester_lining", width=0.5)
-    assert not [name for test in invariants.INVARIANTS for name in broken(test, fabric)]
 
 
 def _scaled(factor, part=slice(None)):

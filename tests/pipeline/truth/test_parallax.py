@@ -7,16 +7,13 @@ area of A(p, wo) dp / wo_z. Points of the fabric with that place in the footprin
 import numpy as np
 import pytest
 
-from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.geometry.heightfield import height_field, surface_at
 from pipeline.truth.geometry.pieces import reference_plane
-from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.scattering.thread_colours import component_colours
 from tests.directions import unit
-from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, equal_queries, woven
+from tests.pipeline.truth.cloths import LOPSIDED, PALETTE, coloured, drawn, equal_queries, woven
 from tests.presets import slow
 from tests.refusals import refusal
 from weaves.validation import validated
@@ -34,8 +31,7 @@ def _answers(fabric, queries, parallax=True, estimator="owen", **options):
 def test_rays_and_displaced_points_of_the_fabric_have_the_same_mean(fabric, sigma):
     """Rays are sampled; quadrature integrates over the fabric, cut where light or view is lost. A third of the lights
     are behind the cloth. The bounds hold for 99.7 % of answers."""
-    options = QueryOptions(sigma=(sigma, 2 * sigma), max_angle=75.0, behind=0.3)
-    queries = draw_queries(options, fabric.weave.repeat, 5, 0, 60)
+    queries = drawn(fabric, 5, 60, sigma=(sigma, 2 * sigma), max_angle=75.0, behind=0.3)
     options = {"walls": "left_out", "max_count": 1 << 16}
     rays, points = (_answers(fabric, queries, estimator=name, **options) for name in ("owen", "quadrature"))
     difference = rays.mean - points.mean
@@ -48,30 +44,13 @@ def test_rays_and_displaced_points_of_the_fabric_have_the_same_mean(fabric, sigm
     assert sigma > 0.1 or np.linalg.norm(flat[front]) > 0.02 * size  # the heights are seen
 
 
-@pytest.mark.parametrize("estimator", ["mc", "r2", "owen", "auto"])
-@pytest.mark.parametrize("degrees", [slow(0.0), slow(50.0), 80.0])
-def test_a_footprint_of_a_repeat_sees_no_parallax(estimator, degrees):
-    query = equal_queries(unit(35.0, 200.0), unit(degrees, 70.0), sigma=4.0)
+@pytest.mark.parametrize("estimator", ["r2", "auto"])
+def test_a_footprint_of_a_repeat_sees_no_parallax(estimator):
+    query = equal_queries(unit(35.0, 200.0), unit(80.0, 70.0), sigma=4.0)
     rays, flat = (_answers(LOPSIDED, query, parallax, estimator, walls="left_out") for parallax in (True, False))
     assert (np.abs(rays.mean - flat.mean) < 4 * np.hypot(rays.standard_error, flat.standard_error) + 1e-6).all()
     doubt = np.hypot(rays.transparency_standard_error, flat.transparency_standard_error)
     assert (np.abs(rays.transparency - flat.transparency) < 4 * doubt + 1e-6).all()
-
-
-@pytest.mark.parametrize("degrees", [slow(0.0), slow(45.0), 75.0, slow(85.0)])
-def test_the_mean_over_places_does_not_depend_on_the_size_of_the_footprint(degrees):
-    """Where no ray meets a wall: warps that never bend, side by side, seen across, of which each hides a part. The mean
-    over a lattice of 256 places errs by less than .2 % for a smooth integrand with a few kinks."""
-    fabric = woven("denim", ("##", "##"), {"width": 1.0})
-    wi, wo = unit(30.0, 120.0), unit(degrees, 0.0)
-    small = equal_queries(wi, wo, sigma=0.03, rows=256)
-    small = small._replace(u=np.float32(np.arange(256) / 128))
-    wide = equal_queries(wi, wo, sigma=4.0)
-    near, far = (_answers(fabric, queries).mean.mean(axis=0) @ COLOUR for queries in (small, wide))
-    assert near == pytest.approx(far, rel=0.005)
-    if degrees > 70:
-        flat = _answers(fabric, small, parallax=False).mean.mean(axis=0) @ COLOUR
-        assert flat < 0.9 * far
 
 
 @pytest.mark.parametrize("walls", [slow("left_out"), "rim"])
@@ -94,24 +73,6 @@ def test_with_rims_no_place_weighs_less(walls):
 def test_rays_need_the_ply_model_estimators_of_rays_and_a_viewer_not_too_low(options):
     assert "parallax" in refusal(validated, TruthOptions, options, "recipe.toml")
     assert "89 degrees" in refusal(_answers, LOPSIDED, equal_queries(unit(20.0, 0.0), unit(89.5, 50.0)))
-
-
-@pytest.mark.parametrize("walls", [slow("left_out"), "rim"])
-@pytest.mark.parametrize("fabric", [slow(woven("denim")), slow(woven("satin_8")), LOPSIDED, slow(woven("voile"))])
-def test_tables_answer_footprints_of_rays(fabric, walls):
-    """Round, elliptic and rotated ones, views to 80 degrees, the light of every third query behind the cloth."""
-    options = QueryOptions(sigma=(0.8, 4.0), stretch=3.0, max_angle=75.0, behind=0.3)
-    queries = draw_queries(options, fabric.weave.repeat, 6, 0, 120)
-    physics = TruthOptions(walls=walls)
-    queries = queries.take(FINE.knows(cloth_side(fabric, physics), columns_of(queries)))
-    assert len(queries.u) > 60
-    exact = _answers(fabric, queries, walls=walls, relative_error=0.002, max_count=1 << 15)
-    found = estimate(fabric, queries, physics.model_copy(update={"estimator": "node_table"}), 1)
-    size = np.linalg.norm(exact.mean, axis=1)
-    wrong = np.linalg.norm(found.mean - exact.mean, axis=1)
-    assert np.median(wrong / size) < 0.01
-    assert (np.abs(found.mean - exact.mean) < found.bound + 3 * exact.standard_error + 1e-6).mean() > 0.99
-    assert np.abs(found.transparency - exact.transparency).max() < 0.02
 
 
 def test_a_crest_has_its_own_colour_where_the_viewer_sees_it():

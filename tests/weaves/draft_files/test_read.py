@@ -100,21 +100,12 @@ def test_single_colours_and_lengths_of_threads(read):
     assert draft.ends.width == pytest.approx((5 + 3 + 6 * 9) / (20 + 4 + 6 * 12))
 
 
-def test_a_real_draft_without_default_colours(read):
-    """Nine colours, no key Color, palette from 0 to 999, thickness above spacing, Windows-1252, a title with %."""
-    colours = [thread * 7 % 9 + 1 for thread in range(216)]
-    yarns, threads = "Threads=216\nSpacing=.212\nThickness=.2438\nUnits=", numbered([1, 2, 3, 4] * 54)
-    text = wif(
-        TEXT="Title=Café 50% laine", COLOR_PALETTE="Range=0,999\nEntries=9",
-        COLOR_TABLE=numbered([f"{100 * k},0,{999 - 100 * k}" for k in range(9)]),
-        WARP=yarns + "centimeters", WEFT=yarns + "Centimeters", WARP_COLORS=numbered(colours),
-        WEFT_COLORS=numbered(colours[::-1]), THREADING=threads, TREADLING=threads,
-    )  # fmt: skip
+def test_windows_text_with_a_title_in_per_cent_and_lengths_in_centimetres(read):
+    yarns = "Threads=8\nColor=1\nSpacing=.212\nThickness=.2438\nUnits="
+    text = wif(TEXT="Title=Café 50% laine", WARP=yarns + "centimeters", WEFT=yarns + "Centimeters")
     draft = read(text.replace("\n", "\r\n").encode("cp1252"))
-    assert draft.title == "Café 50% laine" and draft.remarks == ()
-    assert len(set(draft.ends.colours)) == 9 and draft.picks.colours == draft.ends.colours[::-1]
+    assert draft.title == "Café 50% laine" and draft.remarks == () and rows(draft) == BALANCED_ROWS
     assert draft.ends.width == pytest.approx(1.15) and draft.ends.per_cm == pytest.approx(4.717, abs=1e-3)
-    assert rows(draft) == BALANCED_ROWS
 
 
 def test_text_before_the_first_section_is_skipped_and_what_cannot_be_used_a_remark(read):

@@ -50,9 +50,7 @@ def test_a_table_is_small_and_bounces_grow_with_every_colour(closed):
     ("fabric", "least"),
     [
         pytest.param(CLOSED, 0.98, id="closed"),
-        pytest.param(woven("silk_charmeuse", width=1.0, blend=1.0), 0.98, id="satin", marks=pytest.mark.slow),
         pytest.param(LOPSIDED, 0.3, id="narrow", marks=pytest.mark.slow),
-        pytest.param(woven("voile"), 0.2, id="open", marks=pytest.mark.slow),
     ],
 )
 def test_white_cloth_in_a_furnace_makes_no_light(fabric, least):
@@ -69,7 +67,7 @@ def test_white_cloth_in_a_furnace_makes_no_light(fabric, least):
         assert least < total < 1.01
 
 
-@pytest.mark.parametrize(("name", "blend"), [slow("gauze", 1.0), slow("voile", 0.5), slow("organza", 0.0)])
+@pytest.mark.parametrize(("name", "blend"), [slow("gauze", 1.0), slow("organza", 0.0)])
 def test_white_cloth_that_lets_light_through_makes_none(name, blend):
     """Light from all around, k_d + k_dt = 1: what yarns return and what comes through gaps is at most 1."""
     fabric, around = woven(name, blend=blend), np.float32(sphere(32, 20))
@@ -84,15 +82,3 @@ def test_white_cloth_that_lets_light_through_makes_none(name, blend):
             once = np.where(around[:, 2:] > 0.0, share, 1.0 - share) * first
             gap = (1.0 - fabric.warp.width) * (1.0 - fabric.weft.width)
             assert 0.3 < (once.sum() + later) * 4.0 * math.pi / len(around) < 1.01 - 0.5 * gap * viewer[2]
-
-
-@pytest.mark.slow
-def test_yarns_that_transmit_nothing_look_as_in_the_table_of_reflections():
-    """Closed cloth, k_dt = 0: walks are the same up to the third yarn, then fewer; no light comes from behind."""
-    table, own = bounce_table(CLOSED, 1 << 14, through=True), bounce_table(CLOSED, 1 << 14)
-    colours = np.array([[1e-6, 0.9], [1e-6, 0.9], [0.0, 0.0], [0.0, 0.0]])
-    both, one = bounced(table, LIGHTS, VIEWERS, colours)[:, :2], bounced(own, LIGHTS, VIEWERS, colours[:2])
-    assert both[..., 0] == pytest.approx(one[..., 0], rel=1e-5, abs=1e-6 * one[..., 0].max())
-    assert np.sqrt(np.mean((both - one)[..., 1] ** 2)) < 0.05 * one[..., 1].mean()
-    behind = bounced(table, LIGHTS * np.float32([1.0, 1.0, -1.0]), VIEWERS, colours)
-    assert np.abs(behind[:, :2]).max() < 1e-6 and behind[:, 2:].max() > 1e-3

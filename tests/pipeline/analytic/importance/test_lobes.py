@@ -12,8 +12,7 @@ from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.slab import density, sigma
-from tests.pipeline.truth.cloths import LOPSIDED, OVER, redrawn, reversed_axes
-from weaves.fabric import load_fabric
+from tests.pipeline.truth.cloths import LOPSIDED, woven
 
 COUNT = 400
 
@@ -36,20 +35,9 @@ def lobes_of(fabric, queries):
     return lobes, pdf
 
 
-@pytest.mark.parametrize(("x", "y"), [(-1, -1), (-1, 1), (1, -1)])
-def test_a_cloth_turned_or_mirrored_has_its_lobes_turned_or_mirrored(x, y):
-    """A mirror reverses the twists. Points within a deviation of an edge, or of a cell of a grid, may lie beyond it."""
-    queries = points_of(LOPSIDED)
-    image = redrawn(OVER[::y, ::x], mirrored=x * y < 0), reversed_axes(queries, x, y)
-    own, there = (lobes_of(*pair)[1].astype(np.float64) for pair in ((LOPSIDED, queries), image))
-    assert np.quantile(np.abs(there / own - 1.0), 0.95) < 1e-2
-    assert np.quantile(np.abs(lobes_of(LOPSIDED, reversed_axes(queries, x, y))[1] / own - 1.0), 0.5) > 0.05
-
-
-@pytest.mark.parametrize("name", ["denim", "silk_charmeuse", "voile"])
-def test_the_lobe_of_a_point_is_that_of_the_truths_surface(name):
+@pytest.mark.parametrize("fabric", [woven("denim"), LOPSIDED, woven("voile")], ids=["closed", "narrow", "open"])
+def test_the_lobe_of_a_point_is_that_of_the_truths_surface(fabric):
     """Tangents to 1e-3, gaps and densities; points within a deviation of an edge may lie beyond it."""
-    fabric = load_fabric(name)
     front, queries = cloth_side(fabric, TruthOptions()).front, points_of(fabric)
     lobes, pdf = lobes_of(fabric, queries)
     right, seen_alike, checked = 0, 0, 0

@@ -1,6 +1,5 @@
 """The sums against the truth, to some per cent."""
 
-import itertools
 import math
 
 import numpy as np
@@ -8,16 +7,14 @@ import pytest
 
 from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.components import read_queries
-from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, DIFFUSE, OPEN_DIFFUSE, OPEN_SPECULAR, SPECULAR
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.estimator import estimate
-from pipeline.truth.footprint.mixture import deviations
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
+from tests.pipeline.analytic.methods import soft_table
 from tests.pipeline.models.against_truth import colour_error, truth_of
-from tests.pipeline.truth.cloths import irregular, woven
+from tests.pipeline.truth.cloths import LOPSIDED, drawn, irregular, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -34,7 +31,7 @@ def test_without_shadows_they_are_the_truth(name, walls, bound):
     fabric = load_fabric(name)
     options = TruthOptions(estimator="owen", walls=walls, relative_error=5e-3).model_copy(update={"shadows": False})
     for sigma in SIZES.values():
-        queries = draw_queries(QueryOptions(sigma=sigma, max_angle=60.0), fabric.weave.repeat, 3, 0, 48)
+        queries = drawn(fabric, 3, 48, sigma=sigma, max_angle=60.0)
         sums, gaps = query_sums(tabulate(fabric, rims=walls == "rim"), queries)
         assert not gaps.any()
         found = np.concatenate([sums[:, :, OPEN_SPECULAR], sums[:, :, OPEN_DIFFUSE] / math.pi], axis=1)
@@ -48,54 +45,34 @@ CASES = {
     "satin": (woven("silk_charmeuse"), (0.25, 0.05, 0.03)),
     "plain with gaps": (woven("polyester_lining", width=0.7), (0.08, 0.025, 0.025)),
     "twill with gaps": (woven("cotton_twill", width=0.8), (0.15, 0.04, 0.025)),
-    "gauze": (load_fabric("gauze"), (0.15, 0.04, 0.025)),
+    "lopsided": (LOPSIDED, (0.15, 0.04, 0.025)),
 }
 
 
 @pytest.mark.parametrize(
-    "case", [slow("plain"), "twill", "satin", slow("plain with gaps"), slow("twill with gaps"), slow("gauze")]
+    "case", [slow("plain"), slow("twill"), "satin", slow("plain with gaps"), slow("twill with gaps"), "lopsided"]
 )
 def test_with_shadows_they_are_some_per_cent_off(case):
     """Colour RMSE over the mean for narrow, middle and wide footprints."""
     fabric, bounds = CASES[case]
     table = tabulate(fabric)
     for sigma, bound in zip(((0.06, 0.24), (0.3, 1.0), (3.0, 8.0)), bounds, strict=True):
-        queries = draw_queries(QueryOptions(sigma=sigma, max_angle=75.0), fabric.weave.repeat, 7, 0, 80)
+        queries = drawn(fabric, 7, 80, sigma=sigma, max_angle=75.0)
         assert colour_error(read_queries(table, queries).components, truth_of(fabric, queries)) < bound
-
-
-@pytest.mark.slow
-def test_each_level_errs_less_on_wide_footprints():
-    """Measured on denim 2.1, 1.9, 1.2 and 1.1 %: twice the nodes across a yarn, from k = 2 to 4, count most."""
-    fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=(0.8, 8.0)), fabric.weave.repeat, 12, 0, 160)
-    truth = truth_of(fabric, queries, relative_error=2e-3)
-    errors = [colour_error(read_queries(tabulate(fabric, level=k), queries).components, truth) for k in DETAILS]
-    assert all(finer < coarser for coarser, finer in itertools.pairwise(errors)), errors
-    assert errors[2] < 0.75 * errors[1]
 
 
 def test_footprints_along_the_axes_and_long_ones_and_low_viewers_are_cut():
     """Stretched up to six times, either way round; the same through an angle of a right one."""
     fabric = load_fabric("cotton_twill")
-    queries = draw_queries(QueryOptions(sigma=(0.3, 2.0), max_angle=70.0), fabric.weave.repeat, 9, 0, 60)
+    queries = drawn(fabric, 9, 60, sigma=(0.3, 2.0), max_angle=70.0)
     stretch = np.geomspace(1.0, 6.0, 60).astype(np.float32)
     queries = queries._replace(sigma=queries.sigma * stretch, sigma_minor=queries.sigma / np.sqrt(stretch))
     turned = queries._replace(angle=np.full(60, math.pi / 2, np.float32))
-    table = tabulate(fabric)
+    table = soft_table(fabric)
     for asked in (queries, turned):
         assert colour_error(read_queries(table, asked).components, truth_of(fabric, asked)) < 0.04
-    swapped = queries._replace(sigma=queries.sigma_minor, sigma_minor=queries.sigma)
-    np.testing.assert_allclose(
-        read_queries(table, turned).components, read_queries(table, swapped).components, rtol=1e-5
-    )
-    # Under a wide footprint the projected area of all yarns is 1.
-    fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=SIZES["wide"]), fabric.weave.repeat, 6, 0, 100)
-    sums, gaps = query_sums(tabulate(fabric), queries._replace(wo=np.tile(np.float32([0.0, 0.0, 1.0]), (100, 1))))
-    np.testing.assert_allclose(sums[:, :, AREA].sum(axis=1) + gaps, 1.0, atol=1e-3)
     # A footprint longer than LONGEST and narrow across, or a viewer in the plane, answers as the nearest known one.
-    table, up = tabulate(load_fabric("denim")), [0.0, 0.0, 1.0]
+    table, up = soft_table(load_fabric("denim")), [0.0, 0.0, 1.0]
     for angle in (0.0, 0.3, math.pi / 2):
         long = Queries.round([0.3] * 2, [0.4] * 2, [1e4, 48.0], [up] * 2, [[0.6, 0.0, 0.8]] * 2)
         sums, _ = query_sums(table, long._replace(sigma_minor=np.float32([0.1, 0.1]), angle=np.float32([angle] * 2)))
@@ -107,29 +84,24 @@ def test_footprints_along_the_axes_and_long_ones_and_low_viewers_are_cut():
     np.testing.assert_allclose(sums[0], sums[1], rtol=1e-2, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("name", "bound"), [("cotton_twill", 0.03), slow("silk_charmeuse", 0.045), slow("gauze", 0.03)]
-)
-def test_footprints_at_an_angle(name, bound):
+def test_footprints_at_an_angle():
     """Stretched up to four times at all angles; round ones of the same area are half as far off again at least."""
-    fabric = load_fabric(name)
-    groups = QueryOptions(sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
-    queries = draw_queries(groups, fabric.weave.repeat, 9, 0, 96)
-    assert np.abs(deviations(queries)[2]).max() > 0.7
-    table, truth = tabulate(fabric), truth_of(fabric, queries)
+    fabric = load_fabric("cotton_twill")
+    queries = drawn(fabric, 9, 96, sigma=(0.3, 0.6), max_angle=70.0, stretch=4.0)
+    table, truth = soft_table(fabric), truth_of(fabric, queries)
     size = np.sqrt(queries.sigma * queries.sigma_minor)
     rounded = queries._replace(sigma=size, sigma_minor=size)
     wrong = colour_error(read_queries(table, queries).components, truth)
-    assert wrong < bound
+    assert wrong < 0.03
     assert colour_error(read_queries(table, rounded).components, truth) > 1.5 * wrong
 
 
-@pytest.mark.parametrize("width", [1.0, slow(0.7), slow(0.1)])
+@pytest.mark.parametrize("width", [1.0, slow(0.1)])
 def test_extremes_stay_finite_and_not_negative(width):
     fabric = woven("silk_charmeuse", roughness=0.01, bend=80.0, width=width)
     table = tabulate(fabric)
     angles = np.radians([0.0, 60.0, 89.0, 89.9])
-    sizes = np.float32([1e-3, 0.1, 0.249, 0.251, 0.7, 3.0, 1e4])
+    sizes = np.float32([1e-3, 0.249, 0.251, 3.0, 1e4])
     grid = np.meshgrid(angles, angles, sizes, sizes, [0.3, 1e6 + 0.3, -1e6], [0.1, 2.0], indexing="ij")
     i, o, major, minor, centre, turn = (axis.ravel() for axis in grid)
     wi = np.stack([np.sin(i) * np.cos(turn), np.sin(i) * np.sin(turn), np.cos(i)], axis=1).astype(np.float32)
@@ -142,11 +114,10 @@ def test_extremes_stay_finite_and_not_negative(width):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("side", [7, 12])
-def test_irregular_drafts_of_many_floats(side):
+def test_irregular_drafts_of_many_floats():
     """Merged groups: wide footprints within 4 %."""
-    fabric = irregular(side, seed=side)
-    queries = draw_queries(QueryOptions(sigma=(2.0, 8.0), max_angle=75.0), fabric.weave.repeat, 7, 0, 40)
+    fabric = irregular(12, seed=12)
+    queries = drawn(fabric, 7, 40, sigma=(2.0, 8.0), max_angle=75.0)
     truth = truth_of(fabric, queries, estimator="r2", max_count=1 << 14)
     assert colour_error(read_queries(tabulate(fabric), queries).components, truth) < 0.04
 
@@ -156,7 +127,7 @@ def test_irregular_drafts_of_many_floats(side):
 def test_sums_of_threads_add_up_to_those_of_the_families(name, sigma):
     fabric = load_fabric(name)
     ends, picks = fabric.weave.repeat
-    queries = draw_queries(QueryOptions(sigma=sigma, stretch=4.0, max_angle=60.0), (ends, picks), 3, 0, 200)
+    queries = drawn(fabric, 3, 200, sigma=sigma, stretch=4.0, max_angle=60.0)
     whole, gaps = query_sums(tabulate(fabric), queries)
     parts, own_gaps = query_sums(tabulate(fabric, by_thread=True), queries)
     assert parts.shape[1] == ends + picks
@@ -173,7 +144,7 @@ def test_sums_of_threads_add_up_to_those_of_the_families(name, sigma):
 def test_shadows_take_light_away(sigma):
     """No sum exceeds that of what is seen without shadows."""
     fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=sigma, max_angle=85.0), fabric.weave.repeat, 6, 0, 100)
-    sums, _ = query_sums(tabulate(fabric), queries)
+    queries = drawn(fabric, 6, 100, sigma=sigma, max_angle=85.0)
+    sums, _ = query_sums(soft_table(fabric), queries)
     for lit, whole in ((DIFFUSE, OPEN_DIFFUSE), (SPECULAR, OPEN_SPECULAR)):
         assert (sums[:, :, lit] >= 0.0).all() and (sums[:, :, lit] <= 1.001 * sums[:, :, whole] + 1e-7).all()

@@ -12,11 +12,10 @@ from weaves.fabric import load_fabric
     ("fabric", "most"),
     [
         (load_fabric("polyester_lining"), 3.5e5),
-        slow(load_fabric("satin_8"), 1e6),
         (irregular(8, seed=4, width=1.0), 1.3e6),
         slow(irregular(8, seed=4, width=0.8), 2e6),
     ],
-    ids=["plain", "satin", "irregular", "irregular with gaps"],
+    ids=["plain", "irregular", "irregular with gaps"],
 )
 def test_tables_stay_small(fabric, most):
     """Areas that a viewer sees are a third to a half of them."""

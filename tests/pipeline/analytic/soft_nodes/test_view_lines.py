@@ -9,14 +9,12 @@ from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA, OPEN_DIFFUSE, OPEN_SPECULAR
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices, directions_of, ray_share
 from tests.pipeline.models.against_truth import colour_error, truth_of
-from tests.pipeline.truth.cloths import woven
-from tests.presets import slow
+from tests.pipeline.truth.cloths import drawn, woven
 from weaves.fabric import load_fabric
 
 
@@ -29,7 +27,7 @@ def test_a_point_sees_what_its_ray_meets(curvature, rims):
     """
     fabric = woven("denim", relief=1.2, twist=30.0, blend=0.7)
     table, cloth = tabulate(fabric, curved=True, rims=rims), cloth_side(fabric, TruthOptions())
-    asked = draw_queries(QueryOptions(sigma=(1e-3, 1e-3), max_angle=75.0), fabric.weave.repeat, 5, 0, 400)
+    asked = drawn(fabric, 5, 400, sigma=(1e-3, 1e-3), max_angle=75.0)
     asked = asked._replace(curvature=np.full(400, curvature, np.float32))
     sums, gaps = query_sums(table, asked)
     choices, expected = Choices(macro=False, shadows=False, rims=rims), np.zeros((400, 2, 3))
@@ -82,11 +80,9 @@ def test_a_thin_ellipse_covers_what_its_gaussian_covers():
     [((0.1, 0.3), 12.0, 0.09), ((0.25, 0.6), 10.0, 0.05)],
     ids=["minor below .1", "below .25"],
 )
-@pytest.mark.parametrize("name", ["denim", slow("satin_8"), slow("gauze")])
-def test_thin_footprints_are_near_the_truth(name, sigma, stretch, bound):
+def test_thin_footprints_are_near_the_truth(sigma, stretch, bound):
     """RMSE of a grey cloth's colour over its mean; as round footprints of equal area they were 8 to 16 %, 4 to 6 %."""
-    fabric = load_fabric(name)
-    options = QueryOptions(sigma=sigma, stretch=stretch, max_angle=80.0)
-    queries = draw_queries(options, fabric.weave.repeat, 3, 0, 300)
+    fabric = load_fabric("denim")
+    queries = drawn(fabric, 3, 300, sigma=sigma, stretch=stretch, max_angle=80.0)
     queries = queries.take(queries.sigma > 2.0 * queries.sigma_minor)
     assert colour_error(read_queries(tabulate(fabric), queries).components, truth_of(fabric, queries)) < bound

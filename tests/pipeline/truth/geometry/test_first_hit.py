@@ -8,27 +8,12 @@ from pipeline.truth.geometry.heightfield import GAP, height_field, surface_at
 from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.pieces import reference_plane
 from tests.directions import unit
-from tests.pipeline.truth.cloths import LOPSIDED, cylinders, woven
+from tests.pipeline.truth.cloths import LOPSIDED, woven
+from tests.pipeline.truth.geometry.marches import NEVER, marched
 from tests.presets import slow
-from weaves.fabric import load_fabric
 from weaves.surface import surface_at as oracle
 
 STEP = 0.002
-NEVER = 1e9
-
-
-def _marched(fabric, x, y, towards, start, lowest):
-    """Return for each ray the first distance, in steps of STEP, at which the cloth is above it, or NEVER."""
-    found, left, s = np.full(len(x), NEVER), np.arange(len(x)), 0.0
-    while left.size:
-        s += STEP
-        altitude, slope = start + s * (towards.rise + 0.5 * towards.bend * s), towards.rise + towards.bend * s
-        if (altitude < lowest and slope < 0) or (altitude > start and slope > 0):
-            break
-        below = oracle(fabric, x[left] + s * towards.dx, y[left] + s * towards.dy).height > altitude
-        found[left[below]] = s
-        left = left[~below]
-    return found
 
 
 @pytest.mark.parametrize("fabric", [LOPSIDED, woven("silk_charmeuse"), woven("voile")], ids=["narrow", "satin", "open"])
@@ -43,9 +28,9 @@ def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
     hits = [first_hit(field, *at, field.highest, towards) for at in zip(x, y, strict=True)]
     what = np.array([hit.what for hit in hits])
     distance = np.array([hit.distance if hit.what != MISSED else NEVER for hit in hits])
-    marched = _marched(fabric, x, y, towards, field.highest, field.lowest)
+    line = towards.dx, towards.dy, towards.rise, towards.bend
+    late = marched(fabric, x, y, np.full(600, field.highest), line, STEP, field.lowest) - distance
     # A march steps over slivers of yarn, and finds the rest up to a step too late.
-    late = marched - distance
     assert ((late < -1e-6) | (late > STEP + 1e-6)).mean() < 0.01
     assert (what == ON_YARN).mean() > 0.3
 
@@ -56,21 +41,6 @@ def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
         assert height == pytest.approx(field.highest + s * (towards.rise + 0.5 * towards.bend * s), abs=1e-8)
         slope = (towards.rise + towards.bend * s) * nz + towards.dx * nx + towards.dy * ny
         assert slope < 1e-6
-
-
-def test_a_ray_along_the_normal_meets_what_is_seen_from_above_and_others_walls_where_floats_end():
-    field = height_field(load_fabric("voile"))
-    down, along, _ = sinking(ray(0.0, 0.0, 1.0, 0.0), field.highest, 0.1)
-    met = {first_hit(field, x, y, field.highest, down).what for x in np.linspace(0.0, 1.9, 20) for y in (0.02, 0.5)}
-    assert along == 0.0 and met == {ON_YARN, MISSED}
-    # Of denim, where the step between two floats faces the viewer; none along yarns that never end.
-    shares = []
-    for fabric in (load_fabric("denim"), cylinders()):
-        field = height_field(fabric)
-        towards, _, _ = sinking(ray(*unit(80.0, 20.0), 0.0), field.highest, field.highest)
-        hits = [first_hit(field, 0.21 * k, 0.137 * k, field.highest, towards).what for k in range(400)]
-        shares.append(np.mean(np.array(hits) == ON_WALL))
-    assert 0.02 < shares[0] < 0.5 and shares[1] == 0.0
 
 
 @pytest.mark.parametrize("fabric", [LOPSIDED, woven("denim"), woven("voile")], ids=["narrow", "closed", "open"])
@@ -102,9 +72,9 @@ def test_rays_from_yarn_to_yarn_are_those_of_a_march(fabric):
         altitude = z + s * towards.rise
         within = (altitude > field.lowest) & (altitude < field.highest)
         below = (oracle(fabric, x + s * towards.dx, y + s * towards.dy).height > altitude) & within
-        marched = s[np.argmax(below)] if below.any() else NEVER
+        first = s[np.argmax(below)] if below.any() else NEVER
         distance = hit.distance if hit.what != MISSED else NEVER
-        wrong += not -1e-6 <= marched - distance <= STEP + 1e-6
+        wrong += not -1e-6 <= first - distance <= STEP + 1e-6
         met, rising = met + (hit.what != MISSED), rising + (hit.what != MISSED and w[2] > 0.0)
     assert wrong <= 4 and met > 30 and rising > 10
 

@@ -10,9 +10,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from tests.pipeline.truth.cloths import CORDUROY, fixed, woven
 from tests.pipeline.truth.geometry.marches import leaves
-from tests.presets import slow
 from tests.refusals import refusal
-from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 from weaves.surface import GAP, surface_at
 
@@ -108,25 +106,15 @@ def test_closed_forms_and_limits_known_without_sampling():
     assert (mean == 1).all() and (error == 0).all()
 
 
-def test_opacity_grows_with_relief_and_cosine_falls_with_curvature_and_refuses_bad_input():
+def test_a_low_relief_is_met_at_any_cosine_and_bad_input_is_refused():
     """A relief beta makes depths beta times smaller; beta = .01 is all but the smooth cylinder, met at any cosine."""
     flat = woven("denim", ("#",), relief=0.01)
     q = math.sqrt(2 * 0.1 * 0.01 * (0.5 - math.sqrt(0.25 - 0.09)))
     np.testing.assert_allclose(grazing_cosine(flat, 0.2, 0.0, math.pi / 2, 0.1), q / math.sqrt(1 + q * q), rtol=1e-6)
     assert opacity(flat, _queries(_wo([0.04, 0.3]), 0.1), TruthOptions(), 0)[0].tolist() == [1.0, 1.0]
-    fabric, options = load_fabric("basket"), fixed(1024)
-    cosines = np.linspace(0.01, 0.6, 30)
-    by_curvature = [opacity(fabric, _queries(_wo(cosines, 1.0), k), options, 0)[0] for k in (0.01, 0.1, 1.0)]
-    for values, flatter in zip(by_curvature[1:], by_curvature, strict=False):
-        assert (values <= flatter + 0.02).all()
-        assert values.sum() < flatter.sum() - 0.5
-    assert all((np.diff(values) >= -0.02).all() for values in by_curvature)
-    x = np.linspace(0, 4, 50)
-    edges = grazing_cosine(fabric, x, 0.7, 1.0, np.array([[0.0], [1e-6], [0.01], [0.1], [1.0]]))
-    assert (np.diff(edges, axis=0) >= 0).all() and not edges[0].any() and edges[1].max() < 2e-3
     fabric = load_fabric("denim")
-    with pytest.raises(BadInput, match=r"curvature\[0\] = 2.0: must be from 0 to 1"):
-        opacity(fabric, _queries(_wo([-0.5]), 2.0), TruthOptions(), 0)
+    bent = _queries(_wo([-0.5]), 2.0)
+    assert "curvature[0] = 2.0: must be from 0 to 1" in refusal(opacity, fabric, bent, TruthOptions(), 0)
     assert "unit length" in refusal(opacity, fabric, _queries(2 * _wo([-0.5]), 0.5), TruthOptions(), 0)
     assert "curvature = -0.1: from 0 to 1" in refusal(grazing_cosine, fabric, 0.0, 0.0, 0.0, [0.1, -0.1])
     assert "azimuth = nan: must be finite" in refusal(grazing_cosine, fabric, 0.0, 0.0, math.nan, 0.1)
@@ -148,14 +136,12 @@ def test_grazing_cosine_is_the_step_of_opacity(name):
     np.testing.assert_allclose(grazing_cosine(fabric, x + 40.0, y - 40.0, azimuth, curvature), edge, rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("width", "curvature", "depth"), [(0.8, 0.0, 2.5), slow(0.8, 0.01, 312.0), slow(0.1, 1.0, 0.03), (0.1, 1.0, 0.12)]
-)
+@pytest.mark.parametrize(("width", "curvature", "depth"), [(0.8, 0.0, 2.5), (0.1, 1.0, 0.12)])
 def test_gaps_let_rays_through(width, curvature, depth):
     """Narrow yarns against a march through yarns with two sides, per ray, and their share of a patch. `depth` says how
-    far beneath the fabric plane the ray would sink (for flat cloth, its slope): in the last two cases it comes up
-    again, and some rays do so through another gap or the same one. Both take yarns for solid from their surface to the
-    plane. Strips beside a narrow yarn are searched at points: .6 % of the rays may differ."""
+    far beneath the fabric plane the ray would sink (for flat cloth, its slope): in the last case it comes up again, and
+    some rays do so through another gap or the same one. Both take yarns for solid from their surface to the plane.
+    Strips beside a narrow yarn are searched at points: .6 % of the rays may differ."""
     fabric = woven("denim", width=width)
     model = cloth_side(fabric, TruthOptions())
     highest, lowest = model.front.highest, -model.back.highest

@@ -9,12 +9,11 @@ from pipeline.truth.geometry.visibility import visible
 from tests.directions import unit
 from tests.pipeline.truth.cloths import woven
 from tests.pipeline.truth.geometry.marches import leaves
-from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
 @pytest.mark.parametrize(("name", "width"), [("denim", 1.0), ("silk_charmeuse", 1.0), ("basket", 0.8)])
-@pytest.mark.parametrize("degrees", [25.0, slow(55.0), 75.0])
+@pytest.mark.parametrize("degrees", [25.0, 75.0])
 def test_visibility_matches_a_march(name, width, degrees):
     fabric = woven(name, width=width)
     field = height_field(fabric)
@@ -31,21 +30,11 @@ def test_visibility_matches_a_march(name, width, degrees):
     assert (exact != marched)[above].mean() < 0.005 and above.sum() > 500
 
 
-@pytest.mark.parametrize("degrees", [slow(30.0), 50.0])
-def test_rays_that_leave_a_gap_find_the_yarn_beneath(degrees):
+def test_rays_that_leave_a_gap_find_the_yarn_beneath():
     """What a march meets is there: it hides a direction, however thin the sliver of yarn."""
-    fabric, w, random = load_fabric("gauze"), unit(degrees, 20.0), np.random.default_rng(int(degrees))
+    fabric, w, random = load_fabric("gauze"), unit(50.0, 20.0), np.random.default_rng(50)
     field, half = height_field(fabric), 0.5 * (1.0 - fabric.warp.width)
     x, y = (random.integers(0, 2, (2, 20_000)) + random.uniform(-half, half, (2, 20_000))) % 2.0
     sees = [visible(field, a, b, 0.0, UNDER, ray(*w, 0.0)) for a, b in zip(x, y, strict=True)]
     free = leaves(fabric, x, y, np.zeros(len(x)), w)
     assert 0.05 < free.mean() < 0.95 and not (np.array(sees) & ~free).any()
-
-
-def test_the_normal_is_always_visible_and_a_crest_sees_the_horizon():
-    field = height_field(load_fabric("polyester_lining"))
-    point = surface_at(field, 0.3, 0.4, 0, 0)
-    assert visible(field, 0.3, 0.4, point[2], point[1], ray(0.0, 0.0, 1.0, 0.0))
-    crest = max(((x + 0.5), (y + 0.5)) for x in range(2) for y in range(2) if field.crown[y, x] == field.highest)
-    height = surface_at(field, *crest, int(crest[0]), int(crest[1]))[2]
-    assert visible(field, *crest, height, 0, ray(math.cos(0.3), math.sin(0.3), 1e-6, 0.0))

@@ -6,39 +6,17 @@ import sys
 import numpy as np
 import pytest
 
-from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
-from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.geometry.pieces import different_cells
-from pipeline.truth.node_table.build import PIECE_FAMILY, tabulate
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.truth.cloths import fixed, woven
+from tests.pipeline.truth.cloths import LOPSIDED, drawn, fixed
 from tests.presets import slow
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 
-@pytest.mark.parametrize("name", ["polyester_lining", "satin_8", "silk_charmeuse", "basket"])
-def test_translations_leave_one_cell_of_each_orbit(name):
-    model = cloth_side(load_fabric(name), TruthOptions())
-    table = tabulate(model.front, model.back, False, nodes=8, azimuths=4)
-    assert len(table.pieces) == different_cells(model.front)
-    assert table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
-    assert len({tuple(cell) for piece in table.copies for cell in piece.tolist()}) == model.front.top.size
-
-
-def test_narrow_yarns_leave_gaps_of_the_right_area_and_the_table_says_what_it_does_not_know():
-    model = cloth_side(woven("polyester_lining", width=0.7), TruthOptions())
-    table = tabulate(model.front, model.back, False, nodes=16, azimuths=4)
-    areas = dict.fromkeys(range(3), 0.0)
-    for number, piece in enumerate(table.pieces):
-        stop = table.pieces[number + 1, 0] if number + 1 < len(table.pieces) else table.evenly.size
-        areas[int(piece[PIECE_FAMILY])] += float(table.evenly[piece[0] : stop].sum())
-    assert areas[GAP] == pytest.approx(0.3**2, rel=1e-4)
-    assert areas[0] == pytest.approx(0.5 * (0.7 + 0.7 * 0.3), rel=1e-4)
+def test_curved_cloth_is_refused_and_left_to_other_estimators():
     fabric = load_fabric("denim")
-    queries = draw_queries(QueryOptions(sigma=(1.0, 8.0), max_angle=60.0), fabric.weave.repeat, 3, 0, 4)
+    queries = drawn(fabric, 3, 4, sigma=(1.0, 8.0), max_angle=60.0)
     curved = queries._replace(curvature=np.float32([0, 0, 0.1, 0]))
     with pytest.raises(BadInput, match=r"node_table \(row 2\).*take auto"):
         estimate(fabric, curved, TruthOptions(estimator="node_table"), 0)
@@ -48,11 +26,9 @@ def test_narrow_yarns_leave_gaps_of_the_right_area_and_the_table_says_what_it_do
 @pytest.mark.parametrize(
     ("fabric", "behind"),
     [
-        pytest.param(load_fabric("polyester_lining"), False, id="plain"),
+        pytest.param(LOPSIDED, False, id="narrow"),
         pytest.param(load_fabric("denim"), True, id="twill_behind"),
         pytest.param(load_fabric("satin_8"), False, id="satin", marks=pytest.mark.slow),
-        pytest.param(woven("cotton_twill", width=0.8), False, id="narrow_twill", marks=pytest.mark.slow),
-        pytest.param(woven("polyester_lining", width=0.8), True, id="narrow_plain_behind", marks=pytest.mark.slow),
     ],
 )
 @pytest.mark.parametrize(
@@ -63,7 +39,7 @@ def test_answers_match_converged_ones(fabric, behind, choices):
     typical query is within .6 %; transparency likewise. Footprints of the fabric plane are narrower."""
     for options in choices:
         least = 0.4 if options else 1.5
-        queries = draw_queries(QueryOptions(sigma=(least, 8.0), max_angle=80.0), fabric.weave.repeat, 21, 0, 80)
+        queries = drawn(fabric, 21, 80, sigma=(least, 8.0), max_angle=80.0)
         if behind:
             queries = queries._replace(wi=queries.wi * np.float32([1, 1, -1]))
         exact = estimate(fabric, queries, fixed(1 << 15, **options), 4)

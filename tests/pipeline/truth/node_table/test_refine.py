@@ -3,7 +3,6 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.calibration import REFINED
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, cloth_side, columns_of
 from pipeline.truth.estimator import uncalibrated
@@ -13,7 +12,7 @@ from pipeline.truth.node_table.kernels import no_shares
 from pipeline.truth.node_table.refine import Known, Row, add_row, refine_room
 from pipeline.truth.node_table.tables import FINE
 from pipeline.truth.options import TruthOptions
-from tests.pipeline.truth.cloths import fixed
+from tests.pipeline.truth.cloths import drawn, fixed
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -23,10 +22,10 @@ EVERY_PLACE = Known(False, False, True)
 
 def mean_of_points(cloth, directions, x, y, size, tilt):
     sums = np.zeros((1, POINT_SUMS))
-    for u in (np.arange(60) + 0.5) / 60:
-        for v in (np.arange(60) + 0.5) / 60:
+    for u in (np.arange(40) + 0.5) / 40:
+        for v in (np.arange(40) + 0.5) / 40:
             add_point(cloth, x + u * size, y + v * size, 1.0 + tilt * (u - 0.5), directions, sums, 0)
-    return sums[0] / 3600
+    return sums[0] / 1600
 
 
 @pytest.mark.parametrize(("name", "behind"), [("denim", 0.0), slow("gauze", 0.0), slow("gauze", 1.0)])
@@ -34,11 +33,11 @@ def test_cut_rows_are_unbiased(name, behind):
     """Rows at random heights of a square of the fabric that borders cross agree with its points; half a node wide."""
     fabric = load_fabric(name)
     cloth = cloth_side(fabric, TruthOptions(parallax=False))
-    columns = columns_of(draw_queries(QueryOptions(behind=behind), fabric.weave.repeat, 61, 0, 60))
+    columns = columns_of(drawn(fabric, 61, 30, behind=behind))
     room, size, tilt = refine_room(1), 1.0 / 64, 0.6
     randoms = {known: np.random.default_rng(3) for known in (EVERYWHERE, EVERY_PLACE)}
     scores, crossed = {known: [] for known in randoms}, dict.fromkeys(randoms, 0)
-    for row in range(60):
+    for row in range(30):
         directions = query_directions(columns, row)
         x, y = (math.floor(64 * place) / 64 for place in (columns.u[row] % 1, columns.v[row] % 1))
         exact = mean_of_points(cloth, directions, x, y, size, tilt)
@@ -84,7 +83,7 @@ def test_nodes_that_are_left_keep_a_share_of_the_requested_error():
 @pytest.mark.parametrize(("parallax", "sigma", "angle"), [(True, (0.3, 2.0), 60.0), (False, (0.05, 0.5), 89.0)])
 def test_refined_answers_are_closer_than_the_table(parallax, sigma, angle):
     fabric = load_fabric("polyester_lining")
-    queries = draw_queries(QueryOptions(sigma=sigma, max_angle=angle), fabric.weave.repeat, 35, 0, 120)
+    queries = drawn(fabric, 35, 120, sigma=sigma, max_angle=angle)
     exact = uncalibrated(fabric, queries, fixed(1 << 15, parallax=parallax), 2).mean[:, :4]
     errors = {}
     for error in (1.0, 0.005):

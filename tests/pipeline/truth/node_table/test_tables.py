@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.cloth import cloth_side, columns_of
 from pipeline.truth.footprint.mixture import COARSE_LINE, FINE_LINE
 from pipeline.truth.node_table.tables import NodeTable
 from pipeline.truth.options import TruthOptions
+from tests.pipeline.truth.cloths import drawn
 from weaves.fabric import load_fabric
 
 DENIM = load_fabric("denim")
@@ -16,7 +16,7 @@ def _table(line=FINE_LINE, nodes=32):
 
 
 def _columns(rows=6):
-    return columns_of(draw_queries(QueryOptions(sigma=(0.5, 32.0), max_angle=60.0), DENIM.weave.repeat, 5, 0, rows))
+    return columns_of(drawn(DENIM, 5, rows, sigma=(0.5, 32.0), max_angle=60.0))
 
 
 def test_a_table_is_built_once_and_knows_neither_curved_cloth_nor_tiny_footprints():
