@@ -44,7 +44,7 @@ class RayValues:
 
     def __init__(self, count: int) -> None:
         self._count = count
-        self._scalar = mi.variant().startswith("scalar")
+        self._scalar = str(mi.variant()).startswith("scalar")
 
     def number(self, value: Any) -> Float64:
         """Return a number of each ray, (N,)."""
@@ -89,7 +89,7 @@ def bsdf_class() -> type[Any]:
         wanted = [any(ctx.is_enabled(flag, index) for flag in kind) for index, kind in enumerate(kinds)]
         return np.asarray(wanted)[component]
 
-    class Twillight(mi.BSDF):  # type: ignore[misc]  # Mitsuba has no types
+    class Twillight(mi.BSDF):
         """Woven cloth."""
 
         def __init__(self, props: Any) -> None:
@@ -162,7 +162,7 @@ _NOTHING: Any = (np.empty((0, 3)), np.empty(0), np.empty(0, np.bool_), np.empty(
 
 def _recorded() -> bool:
     """Return whether Dr.Jit records a call that no ray of a scene without cloth makes; BadInput if rays make it."""
-    if mi.variant().startswith("scalar") or not dr.flag(dr.JitFlag.SymbolicScope):
+    if str(mi.variant()).startswith("scalar") or not dr.flag(dr.JitFlag.SymbolicScope):
         return False
     if not WITHOUT_CLOTH.get():
         allowed = "use the integrator twillight_path; direct and prb work inside `with twillight_mitsuba.evaluated():`"
@@ -172,7 +172,7 @@ def _recorded() -> bool:
 
 def _hits(si: Any, active: Any, *others: Any) -> tuple[RayValues, Index, RayHits]:
     """Return the active rows with a viewer on either side, and what they meet; `others` have the same length."""
-    scalar = mi.variant().startswith("scalar")
+    scalar = str(mi.variant()).startswith("scalar")
     normal, du = si.sh_frame.n, si.dp_du
     handed = dr.dot(dr.cross(du, si.dp_dv), normal)
     stride, bend = _curved(si)

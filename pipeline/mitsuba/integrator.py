@@ -82,7 +82,7 @@ def evaluated() -> Iterator[None]:
 def integrator_class() -> type[Any]:
     """Return the class of the plugin for the variant of Mitsuba that is set."""
 
-    class TwillightPath(mi.SamplingIntegrator):  # type: ignore[misc]  # Mitsuba has no types
+    class TwillightPath(mi.SamplingIntegrator):
         """Path tracer with footprints."""
 
         def __init__(self, props: Any) -> None:
@@ -160,7 +160,7 @@ class _Path:
 
     def __init__(self, scene: Any, sampler: Any, options: PathOptions) -> None:
         self._scene, self._sampler, self._options = scene, sampler, options
-        self._scalar = mi.variant().startswith("scalar")
+        self._scalar = str(mi.variant()).startswith("scalar")
         self._context = mi.BSDFContext()
 
     def trace(self, ray: Any, active: Any) -> tuple[Any, Any]:

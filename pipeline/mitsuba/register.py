@@ -67,7 +67,7 @@ def _rgb(variant: str) -> bool:
 
 def _enter() -> None:
     """Enter the plugins for the variant that is set, once."""
-    variant = mi.variant()
+    variant = str(mi.variant())
     if not hasattr(mi.render, "__wrapped__"):
         mi.render = _guarded(mi.render)
     if variant in _registered:

@@ -39,7 +39,8 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
     refuse_large_repeat(fabric)
     sides = tabulate_sides(fabric, level, kinds)
     cloth = tables(sides)
-    threads, buffers, contents = (len(sides.tints[0]), len(sides.tints[1])), {}, {}
+    threads, buffers = (len(sides.tints[0]), len(sides.tints[1])), {}
+    contents: dict[str, bytes] = {}
     for name, (channels, files) in _BUFFERS.items():
         values, arrays = getattr(cloth, name), cloth.places.get(name, {})
         buffers[name] = Buffer(files=files, channels=channels, elements=values.size // channels, arrays=arrays)
