@@ -108,8 +108,8 @@ def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
         method = method_of(fabric)
         method.prepare(fabric)
         between = partial(bounces.light_between, tables=bounces.tables_of(_WALKS))
-        done = picture.answered(swatch.frame, parts, {"swatch": fabric}, method, pool, ("swatch",), between)
-        for number, part in enumerate(done, 1):
+        maker = picture.WindowMaker({"swatch": fabric}, method, pool, ("swatch",), between)
+        for number, part in enumerate(maker.made(swatch.frame, parts), 1):
             codes[shown_at(part)] = tiles.displayed(part.planes["rgb"])
             advance(number / len(parts))
     atomic_write(path, tiles.png(tiles.opaque(codes), 1))

@@ -11,13 +11,11 @@ bounces of the colours before subtracted, until they agree.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
-from pipeline.analytic.bounces.table import bounce_table
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.bsdf.klems import Basis, Scattering
@@ -25,8 +23,7 @@ from pipeline.bsdf.of_fabric import pair_queries
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.fitting.fitted import Interval
 from pipeline.fitting.straight import middles
-from pipeline.per_fabric import PerFabric
-from pipeline.scenes.bounces import Tables, light_between, seen_light
+from pipeline.scenes.bounces import light_between, seen_light, tables_of
 from pipeline.scenes.shade import colours_of
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND
 from weaves.fabric import Fabric
@@ -46,10 +43,7 @@ _NEAR_STRAIGHT = np.cos(np.radians(16.0))
 _BOUNDS = [np.log(0.03), np.log(0.03), 0.0], [0.0, 0.0, 1.0]  # log roughnesses, blend
 _STEP = 0.02  # of differences
 
-_TABLES: Final[Tables] = (
-    PerFabric(partial(bounce_table, walks=_WALKS)),
-    PerFabric(partial(bounce_table, walks=_WALKS, through=True)),
-)
+_TABLES: Final = tables_of(_WALKS)
 
 
 class Pairs(NamedTuple):

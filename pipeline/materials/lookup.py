@@ -64,17 +64,10 @@ def tabulate(
     levels = []
     while True:
         maps = textures(level, material)
-        planes = (
-            maps.opacity[..., None],
-            maps.base_color[..., :2],
-            maps.specular_color[..., :2] * material.largest_f0,
-            maps.transmission_color[..., :2],
-            maps.normal,
-            maps.tangent,
-            maps.alpha_along[..., None],
-            maps.alpha_across[..., None],
-        )
-        levels.append(np.concatenate(planes, axis=-1))
+        colours = (maps.base_color, maps.specular_color * material.largest_f0, maps.transmission_color)
+        of_families = (colour[..., :2] for colour in colours)
+        planes = (maps.opacity, *of_families, maps.normal, maps.tangent, maps.alpha_along, maps.alpha_across)
+        levels.append(np.dstack(planes))
         if maps.opacity.size == 1:
             break
         level = level.halved()

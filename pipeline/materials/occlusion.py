@@ -42,13 +42,14 @@ class _HorizonMap(NamedTuple):
     horizon: Float32
     """Sine of the horizon's elevation: azimuth by azimuth, line by line along the yarn, across it,
     (blocks * azimuths * grid * grid,)."""
-    grid: int
-    azimuths: int
-    """Nodes a block and side; azimuths from +x, counter-clockwise."""
+    grid: int  # nodes a block and side
 
 
 def _horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int) -> _HorizonMap:
-    """Tabulate a side of a cloth, `grid` nodes a block and side, for even `azimuths`; its `back` hides gaps too."""
+    """Tabulate a side of a cloth, `grid` nodes a block and side; its `back` hides gaps too.
+
+    Its `azimuths` are even, from +x, counter-clockwise.
+    """
     picks, ends = field.top.shape
     blocks = np.zeros((picks, ends, _SLOTS), np.int32)
     xs: list[Float64] = []
@@ -69,7 +70,7 @@ def _horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int
     sines = horizon_sines(field, back, np.concatenate(xs), np.concatenate(ys), gap, azimuths)
     sines = sines.reshape(azimuths, len(xs), grid * grid)
     horizon = np.ascontiguousarray(sines.transpose(1, 0, 2), np.float32).ravel()
-    return _HorizonMap(blocks.ravel(), horizon, grid, azimuths)
+    return _HorizonMap(blocks.ravel(), horizon, grid)
 
 
 def _slot_of(piece: CellPiece) -> int:

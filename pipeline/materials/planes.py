@@ -19,6 +19,7 @@ normals [Olano2010LEAN].
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -121,15 +122,10 @@ def _order(candidate: Layout) -> tuple[float, float, int]:
 def planes(fabric: Fabric, shown: Layout, share: Reflectance) -> Planes:
     """Sum a fabric's surface over the texels of the finest level."""
     per_texel = samples(shown)
-    width, height = shown.width * per_texel, shown.height * per_texel
     lowest, colours = lowest_height(fabric), material_colours(fabric, share)
-    x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (shown.ends / width)
-    y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (shown.picks / height)
-    rows = max(1, _BAND // width // per_texel) * per_texel
     bands = []
-    for first in range(0, height, rows):
-        surface = surface_at(fabric, x[None, :], y[first : first + rows, None])
-        sums = _sums(fabric, surface, x, y[first : first + rows], colours, lowest)
+    for surface, x, y in _surface_bands(fabric, shown, per_texel):
+        sums = _sums(fabric, surface, x, y, colours, lowest)
         for _ in range(per_texel.bit_length() - 1):
             sums = sums.halved()
         bands.append(sums)
@@ -147,16 +143,23 @@ def material_colours(fabric: Fabric, share: Reflectance) -> YarnColours:
 
 def yarn_ids(fabric: Fabric, shown: Layout) -> npt.NDArray[np.int32]:
     """Return the number of the yarn at each texel centre, (H, W): 0 in gaps, then the ends, then the picks."""
-    x = (np.arange(shown.width) + 0.5) * (shown.ends / shown.width)
-    y = (np.arange(shown.height) + 0.5) * (shown.picks / shown.height)
-    rows = max(1, _BAND // shown.width)
     bands = []
-    for first in range(0, shown.height, rows):
-        part = y[first : first + rows]
-        yarn = surface_at(fabric, x[None, :], part[:, None]).yarn
-        end, pick = 1 + x.astype(np.int32), 1 + shown.ends + part.astype(np.int32)
-        bands.append(np.where(yarn == GAP, 0, np.where(yarn == WARP, end[None, :], pick[:, None])).astype(np.int32))
+    for surface, x, y in _surface_bands(fabric, shown, 1):
+        end, pick = 1 + x.astype(np.int32), 1 + shown.ends + y.astype(np.int32)
+        on_yarn = np.where(surface.yarn == WARP, end[None, :], pick[:, None])
+        bands.append(np.where(surface.yarn == GAP, 0, on_yarn).astype(np.int32))
     return np.concatenate(bands)
+
+
+def _surface_bands(fabric: Fabric, shown: Layout, per_texel: int) -> Iterator[tuple[ClothSurface, Float64, Float64]]:
+    """Yield the surface, x and y of some rows of points at a time, in whole texels of `per_texel` points a side."""
+    width, height = shown.width * per_texel, shown.height * per_texel
+    x: Float64 = (np.arange(width, dtype=np.float64) + 0.5) * (shown.ends / width)
+    y: Float64 = (np.arange(height, dtype=np.float64) + 0.5) * (shown.picks / height)
+    rows = max(1, _BAND // width // per_texel) * per_texel
+    for first in range(0, height, rows):
+        part = y[first : first + rows]
+        yield surface_at(fabric, x[None, :], part[:, None]), x, part
 
 
 def samples(shown: Layout) -> int:

@@ -130,8 +130,7 @@ def _flakes(normal: Float64, fibres: Float64) -> tuple[Float64, Float64, Float64
     for entry, (a, b) in enumerate(PAIRS):
         matrix[..., a, b] = matrix[..., b, a] = fibres[..., entry]
     # A frame across the normal; its first axis is x, laid into the surface.
-    first = np.stack([np.ones_like(normal[..., 0]), np.zeros_like(normal[..., 0]), np.zeros_like(normal[..., 0])], -1)
-    first = first - normal * normal[..., :1]
+    first = (1.0, 0.0, 0.0) - normal * normal[..., :1]
     first /= np.linalg.norm(first, axis=-1, keepdims=True)
     second = np.cross(normal, first)
 

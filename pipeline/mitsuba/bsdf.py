@@ -17,6 +17,8 @@ from functools import reduce
 from operator import or_
 from typing import Any, Final
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
@@ -40,9 +42,9 @@ def wears_cloth(shape: Any) -> bool:
 class RayValues:
     """Values of Mitsuba as NumPy arrays with one row a ray (one ray if the variant is scalar), and back."""
 
-    def __init__(self, mi: Any, count: int) -> None:
-        self._mi, self._count = mi, count
-        self._scalar = mi.variant().startswith("scalar")
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._scalar = str(mi.variant()).startswith("scalar")
 
     def number(self, value: Any) -> Float64:
         """Return a number of each ray, (N,)."""
@@ -65,13 +67,13 @@ class RayValues:
             if values.ndim == 1:
                 return kind(values[0].item() if len(rows) else elsewhere)
             return kind(*(values[0].tolist() if len(rows) else [elsewhere] * values.shape[1]))
-        type_of = np.uint32 if kind is self._mi.UInt32 else np.bool_ if kind is self._mi.Bool else np.float32
+        type_of = np.uint32 if kind is mi.UInt32 else np.bool_ if kind is mi.Bool else np.float32
         whole = np.full((self._count, *values.shape[1:]), elsewhere, type_of)
         whole[rows] = values
         return kind(np.ascontiguousarray(whole.T))
 
 
-def bsdf_class(mi: Any, dr: Any) -> type[Any]:
+def bsdf_class() -> type[Any]:
     """Return the class of the plugin for the variant of Mitsuba that is set."""
     flags = mi.BSDFFlags
     everywhere = flags.FrontSide | flags.BackSide | flags.Anisotropic | flags.SpatiallyVarying | flags.NonSymmetric
@@ -87,7 +89,7 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
         wanted = [any(ctx.is_enabled(flag, index) for flag in kind) for index, kind in enumerate(kinds)]
         return np.asarray(wanted)[component]
 
-    class Twillight(mi.BSDF):  # type: ignore[misc]  # Mitsuba has no types
+    class Twillight(mi.BSDF):
         """Woven cloth."""
 
         def __init__(self, props: Any) -> None:
@@ -111,9 +113,9 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
             """Draw a direction; return it and the BSDF times its cosine, over its density."""
-            if _recorded(mi, dr):
+            if _recorded():
                 return dr.zeros(mi.BSDFSample3f), mi.Spectrum(0.0)
-            columns, rows, hits = _hits(mi, dr, si, active, sample1, sample2)
+            columns, rows, hits = _hits(si, active, sample1, sample2)
             random = np.column_stack([columns.number(sample1), columns.vector(sample2)])[rows]
             wo, pdf, straight, weight = self._worn.sample(hits, random) if len(rows) else _NOTHING
             component = np.where(straight, STRAIGHT_THROUGH, _component(hits, wo))
@@ -128,9 +130,9 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 
         def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
             """Return the share of light that goes straight through, or past a silhouette."""
-            if _recorded(mi, dr):
+            if _recorded():
                 return mi.Spectrum(0.0)
-            columns, rows, hits = _hits(mi, dr, si, active)
+            columns, rows, hits = _hits(si, active)
             share = self._worn.transparency(hits) if len(rows) else np.empty(0)
             return columns.to_mitsuba(mi.Spectrum, np.repeat(share[:, None], 3, axis=1), rows)
 
@@ -139,9 +141,9 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
             return f"{BSDF}[{self._worn.options}]"
 
         def _evaluated(self, ctx: Any, si: Any, wo: Any, active: Any, values: bool, density: bool) -> tuple[Any, Any]:
-            if _recorded(mi, dr):
+            if _recorded():
                 return mi.Spectrum(0.0), mi.Float(0.0)
-            columns, rows, hits = _hits(mi, dr, si, active, wo)
+            columns, rows, hits = _hits(si, active, wo)
             light = columns.vector(wo)[rows]
             rgb, pdf = np.zeros((len(rows), 3)), np.zeros(len(rows))
             if len(rows):
@@ -158,9 +160,9 @@ def bsdf_class(mi: Any, dr: Any) -> type[Any]:
 _NOTHING: Any = (np.empty((0, 3)), np.empty(0), np.empty(0, np.bool_), np.empty((0, 3)))
 
 
-def _recorded(mi: Any, dr: Any) -> bool:
+def _recorded() -> bool:
     """Return whether Dr.Jit records a call that no ray of a scene without cloth makes; BadInput if rays make it."""
-    if mi.variant().startswith("scalar") or not dr.flag(dr.JitFlag.SymbolicScope):
+    if str(mi.variant()).startswith("scalar") or not dr.flag(dr.JitFlag.SymbolicScope):
         return False
     if not WITHOUT_CLOTH.get():
         allowed = "use the integrator twillight_path; direct and prb work inside `with twillight_mitsuba.evaluated():`"
@@ -168,17 +170,17 @@ def _recorded(mi: Any, dr: Any) -> bool:
     return True
 
 
-def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[RayValues, Index, RayHits]:
+def _hits(si: Any, active: Any, *others: Any) -> tuple[RayValues, Index, RayHits]:
     """Return the active rows with a viewer on either side, and what they meet; `others` have the same length."""
-    scalar = mi.variant().startswith("scalar")
+    scalar = str(mi.variant()).startswith("scalar")
     normal, du = si.sh_frame.n, si.dp_du
     handed = dr.dot(dr.cross(du, si.dp_dv), normal)
-    stride, bend = _curved(dr, si)
+    stride, bend = _curved(si)
     names = (si.uv, si.wi, si.to_local(si.n), si.duv_dx, si.duv_dy)
     numbers = (handed, si.t, dr.norm(du), *stride, bend)
     if not scalar:
         dr.eval(names, numbers, active)
-    columns = RayValues(mi, 1 if scalar else dr.width((names, numbers, active, *others)))
+    columns = RayValues(1 if scalar else dr.width((names, numbers, active, *others)))
     rows = columns.active(active)
     uv, viewer, outward, duv_dx, duv_dy = (columns.vector(value)[rows] for value in names)
     handed, distance, length, along_u, along_v, bend = (columns.number(value)[rows] for value in numbers)
@@ -189,7 +191,7 @@ def _hits(mi: Any, dr: Any, si: Any, active: Any, *others: Any) -> tuple[RayValu
     return columns, rows[seen], RayHits(*(column[seen] for column in hits))
 
 
-def _curved(dr: Any, si: Any) -> tuple[tuple[Any, Any], Any]:
+def _curved(si: Any) -> tuple[tuple[Any, Any], Any]:
     """Return the change of u and v with the length towards the viewer, and the curvature that way; 0 if not known."""
     du, dv, normal, viewer = si.dp_du, si.dp_dv, si.sh_frame.n, si.to_world(si.wi)
     along = viewer - normal * dr.dot(viewer, normal)

@@ -26,13 +26,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from pydantic import Field
 
 from pipeline.mitsuba.bsdf import BSDF, wears_cloth
 from pipeline.mitsuba.worn import PIXEL
-from pipeline.scenes.loading import faceted, has_uv
-from weaves.errors import BadInput
+from pipeline.scenes.loading import refuse_mesh
 from weaves.validation import Frozen, validated
 
 INTEGRATOR: Final = "twillight_path"
@@ -68,23 +69,20 @@ def evaluated() -> Iterator[None]:
 
     Examples
     --------
-    >>> import mitsuba as mi
     >>> mi.set_variant("scalar_rgb")
     >>> with evaluated():
     ...     pass  # mi.render(scene, integrator=mi.load_dict({"type": "path"}))
     """
-    import drjit as dr
-
     with ExitStack() as stack:
         for name in ("SymbolicCalls", "SymbolicLoops", "SymbolicConditionals"):
             stack.enter_context(dr.scoped_set_flag(getattr(dr.JitFlag, name), False))
         yield
 
 
-def integrator_class(mi: Any, dr: Any) -> type[Any]:
+def integrator_class() -> type[Any]:
     """Return the class of the plugin for the variant of Mitsuba that is set."""
 
-    class TwillightPath(mi.SamplingIntegrator):  # type: ignore[misc]  # Mitsuba has no types
+    class TwillightPath(mi.SamplingIntegrator):
         """Path tracer with footprints."""
 
         def __init__(self, props: Any) -> None:
@@ -105,7 +103,8 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
             # Mitsuba calls this function again, for each part.
             if self._samples:
                 return super().render(scene, sensor, seed, spp, develop, evaluate)
-            _refuse_meshes(mi, scene)
+            for shape in filter(wears_cloth, scene.shapes()):
+                refuse_mesh(mi, shape, "scene", BSDF)
             seen = sensor if isinstance(sensor, mi.Sensor) else scene.sensors()[sensor]
             samples = spp or seen.sampler().sample_count()
             self._deviation = ray_deviation(seen.film().rfilter(), samples)
@@ -128,8 +127,7 @@ def integrator_class(mi: Any, dr: Any) -> type[Any]:
             """Return the radiance along rays, whether they hit anything, and no further channels."""
             # Mitsuba has divided differentials by the root of the samples.
             ray.scale_differential(self._deviation / PIXEL * math.sqrt(sampler.sample_count()))
-            path = _Path(mi, dr, scene, sampler, self._options)
-            return (*path.trace(ray, mi.Bool(active)), [])
+            return (*_Path(scene, sampler, self._options).trace(ray, mi.Bool(active)), [])
 
         def to_string(self) -> str:
             """Return the properties as text."""
@@ -157,30 +155,17 @@ def ray_deviation(rfilter: Any, samples: int) -> float:
     return math.sqrt(max(PIXEL**2 - spread, PIXEL**2 / max(samples, 4)))
 
 
-def _refuse_meshes(mi: Any, scene: Any) -> None:
-    """Refuse a scene in which a mesh wears cloth and does not say where its yarns are, or how it curves."""
-    for shape in scene.shapes():
-        if shape.is_mesh() and wears_cloth(shape):
-            name = shape.id() or shape.class_name()
-            if not has_uv(mi, shape):
-                raise BadInput("scene", "shape", name, f"a shape that wears {BSDF} needs uv coordinates")
-            if faceted(mi, shape):
-                allowed = f"a bent mesh that wears {BSDF} needs vertex normals, which tell its curvature"
-                raise BadInput("scene", "shape", name, allowed)
-
-
 class _Path:
     """Paths of one set of rays: a loop over bounces in Python, each of which is evaluated at once."""
 
-    def __init__(self, mi: Any, dr: Any, scene: Any, sampler: Any, options: PathOptions) -> None:
-        self._mi, self._dr, self._scene, self._sampler, self._options = mi, dr, scene, sampler, options
-        self._scalar = mi.variant().startswith("scalar")
+    def __init__(self, scene: Any, sampler: Any, options: PathOptions) -> None:
+        self._scene, self._sampler, self._options = scene, sampler, options
+        self._scalar = str(mi.variant()).startswith("scalar")
         self._context = mi.BSDFContext()
 
     def trace(self, ray: Any, active: Any) -> tuple[Any, Any]:
         """Return the radiance along rays with differentials, and whether they hit anything."""
-        mi, dr, sampler = self._mi, self._dr, self._sampler
-        cone = _Cone(mi, dr)
+        cone, sampler = _Cone(), self._sampler
         light, throughput, valid = mi.Spectrum(0.0), mi.Spectrum(1.0), mi.Bool(False)
         # Where paths come from, the density of their direction, and whether it is that of a delta lobe.
         place, pdf, delta = dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True)
@@ -217,7 +202,6 @@ class _Path:
 
     def _bend(self, si: Any, active: Any) -> Any:
         """Set the normal's derivatives where rays meet cloth; return how long a ray is inside that leaves it again."""
-        mi, dr = self._mi, self._dr
         cloth = active & mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Null)
         normal, step = si.sh_frame.n, _STEP * dr.norm(si.dp_du)
         viewer = si.to_world(si.wi)
@@ -239,7 +223,7 @@ class _Path:
 
     def _leave(self, ray: Any, si: Any, chord: Any, straight: Any) -> None:
         """Let rays that go straight on inside a bend start where they leave the shape, about a chord further on."""
-        dr, passing = self._dr, straight & (chord > 0.0)
+        passing = straight & (chord > 0.0)
         if not dr.any(passing):
             return
         hit = self._scene.ray_intersect(ray, passing)
@@ -249,20 +233,19 @@ class _Path:
 
     def _emitted(self, si: Any, place: Any, pdf: Any, delta: Any, active: Any) -> Any:
         """Return the light of emitters that rays hit, weighted against `_lit`."""
-        mi, dr, scene = self._mi, self._dr, self._scene
+        scene = self._scene
         emitter = si.emitter(scene, active)
         if self._scalar and emitter is None:
             return mi.Spectrum(0.0)
         emitted = mi.DirectionSample3f(scene, si, place)
         sampled = active & ~delta if not self._scalar else active and not delta
         other = scene.pdf_emitter_direction(place, emitted, sampled) if dr.any(sampled) else mi.Float(0.0)
-        weight = dr.select(delta, 1.0, self._heuristic(pdf, other))
+        weight = dr.select(delta, 1.0, _heuristic(pdf, other))
         return weight * emitter.eval(si, active)
 
     def _lit(self, si: Any, numbers: Any, active: Any) -> Any:
         """Return the light of emitters that are sampled, weighted against `_emitted`."""
-        mi, dr, scene = self._mi, self._dr, self._scene
-        bsdf = si.bsdf()
+        scene, bsdf = self._scene, si.bsdf()
         wanted = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         towards, power = scene.sample_emitter_direction(si, numbers, True, wanted)
         wanted = wanted & (towards.pdf != 0.0) & (dr.max(power) > 0.0)
@@ -271,30 +254,29 @@ class _Path:
         wo = si.to_local(towards.d)
         self._evaluate(wo, wanted, power, towards)
         value, pdf = bsdf.eval_pdf(self._context, si, wo, wanted)
-        weight = dr.select(towards.delta, 1.0, self._heuristic(towards.pdf, pdf))
+        weight = dr.select(towards.delta, 1.0, _heuristic(towards.pdf, pdf))
         return dr.select(wanted, weight * value * power, 0.0)
-
-    def _heuristic(self, own: Any, other: Any) -> Any:
-        """Return own^2 / (own^2 + other^2), 0 where both are 0."""
-        sum_of_squares = own * own + other * other
-        return self._dr.select(sum_of_squares > 0.0, own * own / self._dr.maximum(sum_of_squares, 1e-30), 0.0)
 
     def _evaluate(self, *values: Any) -> None:
         if not self._scalar:
             self._sampler.schedule_state()
-            self._dr.eval(*values)
+            dr.eval(*values)
+
+
+def _heuristic(own: Any, other: Any) -> Any:
+    """Return own^2 / (own^2 + other^2), 0 where both are 0."""
+    sum_of_squares = own * own + other * other
+    return dr.select(sum_of_squares > 0.0, own * own / dr.maximum(sum_of_squares, 1e-30), 0.0)
 
 
 class _Cone:
     """Footprints of rays along their paths: `state` is width, spread, blur and scatter, empty before the first hit."""
 
-    def __init__(self, mi: Any, dr: Any) -> None:
-        self._mi, self._dr = mi, dr
+    def __init__(self) -> None:
         self.state: tuple[Any, ...] = ()
 
     def meet(self, ray: Any, si: Any) -> None:
         """Set the partial derivatives of what rays meet; those of the first rays are their own."""
-        mi, dr = self._mi, self._dr
         if not self.state:
             self.state = self._start(ray, si)
             return
@@ -312,13 +294,12 @@ class _Cone:
 
     def scatter(self, pdf: Any, delta: Any) -> None:
         """Widen the rays by a bounce into a direction of this density."""
-        dr, (*others, scatter) = self._dr, self.state
+        *others, scatter = self.state
         added = dr.minimum(1.0 / (4.0 * math.pi * dr.maximum(pdf, 1e-6)), MOST_SCATTER)
         square = scatter * scatter + dr.select(delta, 0.0, added)
         self.state = (*others, dr.sqrt(dr.minimum(square, MOST_SCATTER)))
 
     def _start(self, ray: Any, si: Any) -> tuple[Any, ...]:
-        mi, dr = self._mi, self._dr
         none = mi.Float(0.0)
         if not ray.has_differentials:
             return (none,) * 4

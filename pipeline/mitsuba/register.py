@@ -7,6 +7,8 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, Final, NoReturn
 
+import mitsuba as mi
+
 from pipeline.mitsuba.bsdf import BSDF, WITHOUT_CLOTH, bsdf_class, wears_cloth
 from pipeline.mitsuba.integrator import INTEGRATOR, integrator_class
 from pipeline.models.patch_bsdf import USUAL_METHOD
@@ -25,21 +27,19 @@ _registered: set[str] = set()
 
 def register() -> Any:
     """Enter the plugins into Mitsuba and return the module; without a variant, set the best; BadInput if not RGB."""
-    import mitsuba as mi
-
     if mi.variant() is None:
         mi.set_variant(best_variant())
     if not _rgb(str(mi.variant())):
         _refuse_colours()
     if not _registered:
-        mi.detail.add_variant_callback(lambda old, new: _enter(mi))
-    _enter(mi)
+        mi.detail.add_variant_callback(lambda old, new: _enter())
+    _enter()
     return mi
 
 
 def dress(loaded: Loaded, method: str = USUAL_METHOD) -> Any:
     """Let the shapes of a loaded scene, which is changed, wear their cloth as a BSDF; return Mitsuba's scene."""
-    mi = register()
+    register()
     worn = {}
     alike: dict[str, Any] = {"type": BSDF, "method": method, "bounces": loaded.options.bounces}
     for key, (cloth, fabric) in loaded.cloths.items():
@@ -65,23 +65,19 @@ def _rgb(variant: str) -> bool:
     return variant.removesuffix("_double").endswith("_rgb")
 
 
-def _enter(mi: Any) -> None:
+def _enter() -> None:
     """Enter the plugins for the variant that is set, once."""
-    import drjit as dr
-
-    variant = mi.variant()
+    variant = str(mi.variant())
     if not hasattr(mi.render, "__wrapped__"):
         mi.render = _guarded(mi.render)
     if variant in _registered:
         return
     _registered.add(variant)
-    mi.register_bsdf(BSDF, bsdf_class(mi, dr) if _rgb(variant) else _refuse_colours)
-    mi.register_integrator(INTEGRATOR, integrator_class(mi, dr) if _rgb(variant) else _refuse_colours)
+    mi.register_bsdf(BSDF, bsdf_class() if _rgb(variant) else _refuse_colours)
+    mi.register_integrator(INTEGRATOR, integrator_class() if _rgb(variant) else _refuse_colours)
 
 
 def _refuse_colours(props: Any = None) -> NoReturn:
-    import mitsuba as mi
-
     raise BadInput("mitsuba", "variant", mi.variant(), "must have RGB colours, such as llvm_ad_rgb or scalar_rgb")
 
 

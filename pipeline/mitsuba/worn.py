@@ -20,10 +20,11 @@ import math
 import zlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from pipeline.analytic.importance.lobes import HEIGHT, SHARE, STRAIGHT, Lobes
@@ -33,6 +34,7 @@ from pipeline.models.fallback import Fallback
 from pipeline.models.named import TRUTH, named_method
 from pipeline.models.network import one_thread
 from pipeline.models.patch_bsdf import USUAL_METHOD, PatchBSDF, Sample
+from pipeline.scenes.frame import LEAST_SIGMA
 from pipeline.scenes.gbuffer import reduced
 from pipeline.scenes.options import BOUNCES, Bounces, SceneOptions
 from pipeline.scenes.picture import TruthAnswers
@@ -51,15 +53,12 @@ PIXEL: Final = SceneOptions().pixel_sigma  # standard deviation of a pixel's Gau
 LARGEST_FOOTPRINT: Final = SceneOptions().largest_sigma
 """Both axes of a footprint are cut here, in yarn spacings; where derivatives are not finite, they are this long."""
 
-_SMALLEST = 1e-6
-
 _KEPT = 2**20  # rows of lobes that are kept for the next call: 250 megabytes
 _TRUTH = TruthOptions(estimator="auto", relative_error=0.1, min_count=64, max_count=256)  # many rays share a pixel
 _LARGEST_ANGLE = SceneOptions().largest_angle
 _FLAT = 1e-6  # least |cosine| of a light
 
 Part = TypeVar("Part")
-_Answer = Callable[[Queries, int, Lobes | None], Part]
 
 
 class ClothOptions(Frozen):
@@ -85,37 +84,32 @@ class ClothOptions(Frozen):
     small after a bounce."""
 
 
-class Footprints(NamedTuple):
-    """N footprints; columns as in `pipeline.truth.query.Queries`."""
+Footprints = tuple[Float32, Float32, Float32]  # `sigma`, `sigma_minor` and `angle` of `Queries`, (N,) each
 
-    sigma: Float32
-    sigma_minor: Float32
-    angle: Float32
 
-    @classmethod
-    def of(cls, jacobian: Float64) -> Footprints:
-        """Return the footprints of N pixels, from d(uv in yarns)/d(pixel), (N, 2, 2)."""
-        lost = np.asarray(~np.isfinite(jacobian).all(axis=(1, 2)))
-        j = np.where(lost[:, None, None], np.eye(2) * (LARGEST_FOOTPRINT / PIXEL), jacobian)
-        j = np.clip(j, -1e12, 1e12)
-        # Eigenvalues of J J^T in closed form; the smaller one from the determinant, free of cancellation.
-        xx, yy, xy = (np.einsum("ni,ni->n", j[:, a], j[:, b]) for a, b in ((0, 0), (1, 1), (0, 1)))
-        apart = np.hypot(0.5 * (xx - yy), xy)
-        major = np.sqrt(0.5 * (xx + yy) + apart)
-        area = np.abs(j[:, 0, 0] * j[:, 1, 1] - j[:, 0, 1] * j[:, 1, 0])
-        minor = area / np.maximum(major, 1e-150)
-        angle = 0.5 * np.arctan2(xy, 0.5 * (xx - yy))
-        return cls(_cut(PIXEL * major), _cut(PIXEL * minor), angle.astype(np.float32))
+def footprints_of(jacobian: Float64) -> Footprints:
+    """Return the footprints of N pixels, from d(uv in yarns)/d(pixel), (N, 2, 2)."""
+    lost = np.asarray(~np.isfinite(jacobian).all(axis=(1, 2)))
+    j = np.where(lost[:, None, None], np.eye(2) * (LARGEST_FOOTPRINT / PIXEL), jacobian)
+    j = np.clip(j, -1e12, 1e12)
+    # Eigenvalues of J J^T in closed form; the smaller one from the determinant, free of cancellation.
+    xx, yy, xy = (np.einsum("ni,ni->n", j[:, a], j[:, b]) for a, b in ((0, 0), (1, 1), (0, 1)))
+    apart = np.hypot(0.5 * (xx - yy), xy)
+    major = np.sqrt(0.5 * (xx + yy) + apart)
+    area = np.abs(j[:, 0, 0] * j[:, 1, 1] - j[:, 0, 1] * j[:, 1, 0])
+    minor = area / np.maximum(major, 1e-150)
+    angle = 0.5 * np.arctan2(xy, 0.5 * (xx - yy))
+    return _cut(PIXEL * major), _cut(PIXEL * minor), angle.astype(np.float32)
 
-    @classmethod
-    def round(cls, sigma: Float64) -> Footprints:
-        """Return N round footprints."""
-        size = _cut(sigma)
-        return cls(size, size, np.zeros_like(size))
+
+def _round_footprints(sigma: Float64) -> Footprints:
+    """Return N round footprints."""
+    size = _cut(sigma)
+    return size, size, np.zeros_like(size)
 
 
 def _cut(deviation: Float64) -> Float32:
-    return np.clip(deviation, _SMALLEST, LARGEST_FOOTPRINT).astype(np.float32)
+    return np.clip(deviation, LEAST_SIGMA, LARGEST_FOOTPRINT).astype(np.float32)
 
 
 class RayHits(NamedTuple):
@@ -137,34 +131,27 @@ class Worn:
     def __init__(self, options: ClothOptions) -> None:
         self.options = options
         self._bsdf = _bsdf(load_fabric(options.fabric), options.method, options.bounces)
+        self.fabric = self._bsdf.fabric
         turn = math.radians(options.turn)
         self._turn = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
         self._known: tuple[Queries, list[Lobes]] | None = None
 
-    @property
-    def fabric(self) -> Fabric:
-        """The fabric."""
-        return self._bsdf.fabric
-
     def eval(self, hits: RayHits, light: Float64) -> Float64:
         """Return the BSDF times the cosine to N lights, linear RGB (N, 3), 1/sr."""
-        result = self._ask(self._queries(hits, light), lambda rows, seed, lobes: self._bsdf.eval(rows, seed))
-        values = np.where(_lit(hits, light)[:, None], np.concatenate(result), 0.0)
-        return values * self.coverage(hits)[:, None]
+        answers = _asked(self._bsdf.eval, self._queries(hits, light))
+        return np.where(_lit(hits, light)[:, None], answers, 0.0) * self.coverage(hits)[:, None]
 
     def pdf(self, hits: RayHits, light: Float64) -> Float32:
         """Return the density with which `sample` draws N lights, (N,), 1/sr."""
-        looks = self._queries(hits, light)
-        lobes = self._lobes(hits)
-        return np.concatenate(self._ask(looks, lambda rows, seed, known: self._bsdf.pdf(rows, known), lobes))
+        tasks = zip(_runs(self._queries(hits, light)), self._lobes(hits), strict=True)
+        return np.concatenate(_on_all_cores(self._bsdf.pdf, list(tasks)))
 
     def sample(self, hits: RayHits, random: Float64) -> Sample:
         """Draw a direction to the light for each hit, from random numbers (N, 3) in [0, 1)."""
-        looks, lobes = self._looks(hits), self._lobes(hits)
-        runs = [slice(start, start + RUN) for start in range(0, len(random), RUN)]
-        tasks = [(looks.take(run), random[run], known) for run, known in zip(runs, lobes, strict=True)]
-        draw = self._bsdf.sample
-        parts = _on_all_cores(lambda task: draw(task[0], task[1], task[2], _seed(task[0].u, task[1])), tasks)
+        numbers = np.split(random, range(RUN, len(random), RUN))
+        runs = zip(_runs(self._looks(hits)), numbers, self._lobes(hits), strict=True)
+        tasks = [(looks, drawn, lobes, _seed(looks.u, drawn)) for looks, drawn, lobes in runs]
+        parts = _on_all_cores(self._bsdf.sample, tasks)
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
         light = np.where(straight[:, None], -hits.viewer, _turned(wi.astype(np.float64), self._turn))
         weight[~straight & ~_lit(hits, light)] = 0.0
@@ -176,19 +163,18 @@ class Worn:
 
     def transparency(self, hits: RayHits) -> Float32:
         """Return the light straight through the cloth or past a silhouette, to the viewer of each hit, (N,)."""
-        method, covered = self._bsdf.method, self.coverage(hits)
-        parts = self._ask(self._looks(hits), lambda rows, seed, lobes: method.transparency(self.fabric, rows, seed))
-        return 1.0 - covered + covered * np.concatenate(parts)
+        covered = self.coverage(hits)
+        through = _asked(partial(self._bsdf.method.transparency, self.fabric), self._looks(hits))
+        return np.asarray(1.0 - covered + covered * through)
 
     def coverage(self, hits: RayHits) -> Float32:
         """Return the share of view rays that do not leave the cloth again, (N,)."""
         result = np.ones(len(hits.uv), np.float32)
-        looks, method = self._looks(hits), self._bsdf.method
+        looks = self._looks(hits)
         if (curved := np.flatnonzero(looks.curvature)).size:
             wo = _turned(hits.viewer[curved], self._turn.T).astype(np.float32)
             along = looks.take(curved)._replace(wi=wo, wo=wo)
-            parts = self._ask(along, lambda rows, seed, lobes: method.coverage(self.fabric, rows, seed))
-            result[curved] = np.concatenate(parts)
+            result[curved] = _asked(partial(self._bsdf.method.coverage, self.fabric), along)
         return result
 
     def _queries(self, hits: RayHits, light: Float64) -> Queries:
@@ -205,11 +191,11 @@ class Worn:
         facing = np.einsum("ni,ni->n", hits.outward, hits.viewer)
         side = np.where(np.where(facing == 0.0, hits.viewer[:, 2], facing) < 0.0, -1.0, 1.0)
         wo = tilted(_turned(hits.viewer, self._turn.T), side, _LARGEST_ANGLE).astype(np.float32)
-        footprints = self._footprints(hits, yarns)
+        sigma, sigma_minor, angle = self._footprints(hits, yarns)
         ends, picks = self.fabric.repeat
         u, v = reduced(place[:, 0], ends), reduced(place[:, 1], picks)
         curvature = np.where(side > 0.0, self._curvature(hits, own), 0.0).astype(np.float32)
-        return Queries(u, v, footprints.sigma, wo, wo, footprints.sigma_minor, footprints.angle, curvature)
+        return Queries(u, v, sigma, wo, wo, sigma_minor, angle, curvature)
 
     def _curvature(self, hits: RayHits, yarns: tuple[float, float]) -> Float64:
         """Return the curvature along the view ray, 1/yarn spacings; what is almost flat is flat."""
@@ -219,24 +205,25 @@ class Worn:
 
     def _footprints(self, hits: RayHits, yarns: Float64) -> Footprints:
         if self.options.sigma is not None:
-            return Footprints.round(np.full(len(hits.uv), self.options.sigma))
+            return _round_footprints(np.full(len(hits.uv), self.options.sigma))
         traced = np.asarray(hits.jacobian.any(axis=(1, 2)))
-        of_rays = Footprints.of(self._turn @ (hits.jacobian * yarns[..., None]))
+        of_rays = footprints_of(self._turn @ (hits.jacobian * yarns[..., None]))
         if traced.all():
             return of_rays
         if self.options.pixel_angle is None:
             allowed = "a ray without a footprint: use the integrator twillight_path, or state pixel_angle or sigma"
             raise BadInput(f"bsdf {self.fabric.name}", "pixel_angle", None, allowed)
         width = PIXEL * self.options.pixel_angle * hits.spread * self.options.yarns
-        others = Footprints.round(np.nan_to_num(width, nan=LARGEST_FOOTPRINT))
-        return Footprints(*(np.where(traced, a, b) for a, b in zip(of_rays, others, strict=True)))
+        round_size = _round_footprints(np.nan_to_num(width, nan=LARGEST_FOOTPRINT))
+        sigma, sigma_minor, angle = (np.where(traced, a, b) for a, b in zip(of_rays, round_size, strict=True))
+        return sigma, sigma_minor, angle
 
     def _lobes(self, hits: RayHits) -> list[Lobes]:
         """Return the lobes of each run; those of the last call if its hits were the same."""
         looks, known = self._looks(hits), self._known
         if known is not None and all(map(np.array_equal, known[0], looks)):
             return known[1]
-        lobes = self._ask(looks, lambda rows, seed, _: self._bsdf.lobes(rows))
+        lobes = _on_all_cores(self._bsdf.lobes, [(run,) for run in _runs(looks)])
         covered = self.coverage(hits)
         for start, run in zip(range(0, len(covered), RUN), lobes, strict=True) if (covered < 1.0).any() else ():
             share = covered[start : start + RUN, None]
@@ -245,12 +232,6 @@ class Worn:
             run.rest[:, STRAIGHT] += 1.0 - share[:, 0]
         self._known = (looks, lobes) if len(looks.u) <= _KEPT else None
         return lobes
-
-    def _ask(self, queries: Queries, answer: _Answer[Part], lobes: Sequence[Lobes] | None = None) -> list[Part]:
-        runs = [queries.take(slice(start, start + RUN)) for start in range(0, len(queries.u), RUN)]
-        known: Sequence[Lobes | None] = lobes or [None] * len(runs)
-        tasks = list(zip(runs, known, strict=True))
-        return _on_all_cores(lambda task: answer(task[0], _seed(task[0].u, task[0].wi), task[1]), tasks)
 
 
 def _turned(direction: Float64, turn: Float64) -> Float64:
@@ -272,13 +253,21 @@ def _seed(place: Float32, drawn: Float32 | Float64) -> int:
     return zlib.crc32(drawn.tobytes(), zlib.crc32(place.tobytes()))
 
 
-def _on_all_cores(answer: Callable[[Any], Part], tasks: Sequence[Any]) -> list[Part]:
-    """Return the answers to tasks, by threads if there are several."""
+def _runs(queries: Queries) -> list[Queries]:
+    return [queries.take(slice(start, start + RUN)) for start in range(0, len(queries.u), RUN)]
+
+
+def _asked(answer: Callable[[Queries, int], npt.NDArray[Any]], queries: Queries) -> npt.NDArray[Any]:
+    """Return the answers to queries and a seed, run by run."""
+    return np.concatenate(_on_all_cores(answer, [(run, _seed(run.u, run.wi)) for run in _runs(queries)]))
+
+
+def _on_all_cores(answer: Callable[..., Part], tasks: Sequence[tuple[Any, ...]]) -> list[Part]:
+    """Return the answers to the arguments of tasks, by threads if there are several."""
     with one_thread():
-        if len(tasks) == 1:
-            return [answer(tasks[0])]
         # Before any thread starts, the first task loads kernels and tabulates the fabric.
-        return [answer(tasks[0]), *_pool().map(answer, tasks[1:])] if tasks else []
+        first = [answer(*task) for task in tasks[:1]]
+        return [*first, *_pool().map(answer, *zip(*tasks[1:], strict=True))] if len(tasks) > 1 else first
 
 
 @cache

@@ -15,7 +15,7 @@ from pipeline.scenes.lights import Light, lights_of
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.rays import shape_numbers
 from pipeline.scenes.scene import PREFIX, Cloth, Scene
-from pipeline.scenes.sources import refuse_deadly
+from pipeline.scenes.sources import files, refuse_lost_vertices
 from pipeline.scenes.variant import instantiate, mitsuba
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric, load_fabric, preset_names
@@ -114,12 +114,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
         if key.startswith(PREFIX):
             worn.setdefault(key.removeprefix(PREFIX), []).append(number)
             dressed.setdefault(key, []).append(shape)
-            if shape.is_mesh() and not has_uv(mi, shape):
-                allowed = "a shape that wears a fabric needs uv coordinates"
-                raise BadInput(where, "shape", shape.id() or shape.class_name(), allowed)
-            if options.curvature != "none" and shape.is_mesh() and faceted(mi, shape):
-                allowed = "a bent mesh that wears a fabric needs vertex normals, which tell its curvature"
-                raise BadInput(where, "shape", shape.id() or shape.class_name(), allowed)
+            refuse_mesh(mi, shape, where, "a fabric", curved=options.curvature != "none")
     if not worn:
         allowed = f'a shape must wear a fabric: a bsdf with an id such as "{PREFIX}denim"'
         raise BadInput(where, "", "no fabric", allowed)
@@ -152,7 +147,8 @@ def _world(mi: Any, scene: Scene, where: str) -> Any:
     """Return the scene as Mitsuba loads it."""
     try:
         if isinstance(scene.source, Path):
-            refuse_deadly(scene)
+            for path in files(scene):
+                refuse_lost_vertices(path)
             world = instantiate(mi, scene.source, where)
         else:
             world = mi.load_dict(scene.source(mi), optimize=False)
@@ -164,7 +160,19 @@ def _world(mi: Any, scene: Scene, where: str) -> Any:
     return world
 
 
-def has_uv(mi: Any, mesh: Any) -> bool:
+def refuse_mesh(mi: Any, shape: Any, where: str, worn: str, curved: bool = True) -> None:
+    """Refuse a mesh that does not say where the yarns of what it wears are or, if `curved`, how it curves."""
+    if not shape.is_mesh():
+        return
+    name = shape.id() or shape.class_name()
+    if not _has_uv(mi, shape):
+        raise BadInput(where, "shape", name, f"a shape that wears {worn} needs uv coordinates")
+    if curved and _faceted(mi, shape):
+        allowed = f"a bent mesh that wears {worn} needs vertex normals, which tell its curvature"
+        raise BadInput(where, "shape", name, allowed)
+
+
+def _has_uv(mi: Any, mesh: Any) -> bool:
     """Return whether a mesh has uv coordinates that vary in both directions."""
     if not mesh.has_vertex_texcoords():
         return False
@@ -174,7 +182,7 @@ def has_uv(mi: Any, mesh: Any) -> bool:
     return bool((np.ptp(np.asarray(found["vertex_texcoords"]).reshape(-1, 2), axis=0) > 0.0).all())
 
 
-def faceted(mi: Any, mesh: Any) -> bool:
+def _faceted(mi: Any, mesh: Any) -> bool:
     """Return whether a mesh has facets in several planes, and no normals of its vertices, which tell its curvature."""
     if mesh.has_vertex_normals():
         return False

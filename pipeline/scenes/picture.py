@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
@@ -146,49 +146,42 @@ def picture(
     def trace(window: FilmWindow) -> SceneFrame:
         return render(fine, frame, whole, FilmWindow(*(side * edge for edge in window)))
 
-    yield from answered(trace, parts, fabrics, answerer, pool, names, between, side, layers)
+    yield from WindowMaker(fabrics, answerer, pool, names, between, side, layers).made(trace, parts)
 
 
-def answered(
-    trace: Callable[[FilmWindow], SceneFrame],
-    parts: Iterable[FilmWindow],
-    fabrics: Mapping[str, Fabric],
-    answerer: PictureMethod,
-    pool: Executor,
-    names: Sequence[object],
-    between: LightBetween | None = light_between,
-    side: int = 1,
-    layers: bool = False,
-) -> Iterator[PicturePart]:
-    """Yield windows of a frame, each finished, that `trace` turns into queries.
+@dataclass(frozen=True)
+class WindowMaker:
+    """Makes the windows of a frame: the threads of `pool` answer their queries.
 
     `fabrics` are those of its G-buffers by their keys; `names` and the window are the seed of random numbers. `between`
-    gives the light of all bounces after the first.
+    gives the light of all bounces after the first. `side` and `layers` are as for `picture`.
     """
-    under_way: deque[_UnderWay] = deque()
-    for window in parts:
-        under_way.append(_UnderWay(fabrics, between, answerer, pool, window, trace(window), *names, *window))
-        if len(under_way) == _AHEAD:
-            yield under_way.popleft().part(side, layers)
-    while under_way:
-        yield under_way.popleft().part(side, layers)
+
+    fabrics: Mapping[str, Fabric]
+    answerer: PictureMethod
+    pool: Executor
+    names: tuple[object, ...]
+    between: LightBetween | None = light_between
+    side: int = 1
+    layers: bool = False
+
+    def made(self, trace: Callable[[FilmWindow], SceneFrame], parts: Iterable[FilmWindow]) -> Iterator[PicturePart]:
+        """Yield windows, each finished, that `trace` turns into queries."""
+        under_way: deque[_UnderWay] = deque()
+        for window in parts:
+            under_way.append(_UnderWay(self, window, trace(window)))
+            if len(under_way) == _AHEAD:
+                yield under_way.popleft().part()
+        while under_way:
+            yield under_way.popleft().part()
 
 
 class _UnderWay:
     """A window that has been traced and whose queries are being answered."""
 
-    def __init__(
-        self,
-        fabrics: Mapping[str, Fabric],
-        between: LightBetween | None,
-        answerer: PictureMethod,
-        pool: Executor,
-        window: FilmWindow,
-        frame: SceneFrame,
-        *names: object,
-    ) -> None:
-        self._answerer, self._pool, self._window, self._frame, self._names = answerer, pool, window, frame, names
-        self._fabrics = fabrics
+    def __init__(self, maker: WindowMaker, window: FilmWindow, frame: SceneFrame) -> None:
+        self._maker, self._window, self._frame = maker, window, frame
+        fabrics, answerer, between = maker.fabrics, maker.answerer, maker.between
         queries = {key: gbuffer.queries(fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._asked = {key: self._ask(answerer.rows, key, asked, "query") for key, asked in queries.items()}
         self._colours = {key: self._ask(answerer.colours, key, asked, "colour") for key, asked in queries.items()}
@@ -200,9 +193,9 @@ class _UnderWay:
         rims = {key: gbuffer.rims(fabrics[key].repeat) for key, gbuffer in frame.gbuffers.items()}
         self._coverage = {key: self._ask(answerer.coverage, key, asked, "rim") for key, asked in rims.items()}
 
-    def part(self, side: int, layers: bool) -> PicturePart:
+    def part(self) -> PicturePart:
         """Return the finished window, when its queries are answered."""
-        frame = self._frame
+        frame, side, layers = self._frame, self._maker.side, self._maker.layers
         answers = {key: _gathered(asked, (0, 5)) for key, asked in self._asked.items()}
         colours = {key: _gathered(asked, (0, 4, 3)) for key, asked in self._colours.items()}
         later = {key: seen_light(_gathered(light, (0, 4, 3)), colours[key]) for key, light in self._between.items()}
@@ -240,18 +233,18 @@ class _UnderWay:
         result[gbuffer.place[answered]] = known[answered]
         behind = self._frame.backdrop.reshape(-1, 3)[gbuffer.pixel].any(axis=1)
         rest = np.flatnonzero(np.isnan(result) & behind)
-        looks = gbuffer.looks(self._fabrics[key].repeat).take(rest)
-        result[rest] = _gathered(self._ask(self._answerer.transparency, key, looks, "look"), (0,))
+        looks = gbuffer.looks(self._maker.fabrics[key].repeat).take(rest)
+        result[rest] = _gathered(self._ask(self._maker.answerer.transparency, key, looks, "look"), (0,))
         return np.nan_to_num(result, nan=0.0)
 
     def _ask(
         self, ask: Callable[[Fabric, Queries, int], Float32], key: str, queries: Queries, kind: str
     ) -> list[Future[Float32]]:
         """Send queries to the threads in chunks."""
-        asked = []
+        asked, maker = [], self._maker
         for start in range(0, len(queries.u), CHUNK):
-            seed = int(fingerprint([*self._names, key, kind, start]), 16)
-            asked.append(self._pool.submit(ask, self._fabrics[key], queries.take(slice(start, start + CHUNK)), seed))
+            seed = int(fingerprint([*maker.names, *self._window, key, kind, start]), 16)
+            asked.append(maker.pool.submit(ask, maker.fabrics[key], queries.take(slice(start, start + CHUNK)), seed))
         return asked
 
 

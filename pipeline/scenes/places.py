@@ -107,17 +107,15 @@ def least_curvature(loaded: Loaded, places: Places, wo: Float64, at_place: Float
     `wo` are tilted nowhere. Where no ray leaves the boundary, it is that at the place.
     """
     slope, shallow = _shallow(wo, at_place)
-    if not shallow.all():
-        least = at_place.copy()
-        if shallow.any():
-            part = Places(*(column[shallow] for column in places))
-            least[shallow] = least_curvature(loaded, part, wo[shallow], at_place[shallow])
-        return least
-    tangent, spacing = _along_view(places, wo)
-    slope = np.maximum(slope, 1e-6)
-    stretch = np.maximum(np.minimum(2.0 * slope / at_place, 1.0 / slope), _PROBES * _STEP)
+    result = at_place.copy()
+    if not shallow.any():
+        return result
+    places, least = Places(*(column[shallow] for column in places)), at_place[shallow]
+    tangent, spacing = _along_view(places, wo[shallow])
+    slope = np.maximum(slope[shallow], 1e-6)
+    stretch = np.maximum(np.minimum(2.0 * slope / least, 1.0 / slope), _PROBES * _STEP)
     normal = places.frame[:, 2]
-    place, turned, least = places.position, normal, at_place
+    place, turned = places.position, normal
     for probe in range(1, _PROBES + 1):
         along = (stretch * spacing * probe / _PROBES)[:, None] * -tangent
         start = places.position + along + (_STEP * spacing)[:, None] * normal
@@ -129,7 +127,8 @@ def least_curvature(loaded: Loaded, places: Places, wo: Float64, at_place: Float
         bend = dot(hits.normal - turned, met - place) / np.where(near, square, 1.0) * spacing
         least = np.where(near, np.minimum(least, bend), least)
         place, turned = (np.where(near[:, None], new, old) for new, old in ((met, place), (hits.normal, turned)))
-    return np.where(least > LEAST_CURVATURE, least, 0.0)
+    result[shallow] = np.where(least > LEAST_CURVATURE, least, 0.0)
+    return result
 
 
 def rims_of(loaded: Loaded, places: Places, wo: Float64, curvature: Float64) -> Index:

@@ -2,7 +2,7 @@
 
 Mitsuba itself ends without a sentence where elements are nested some ten thousand deep, or a face names a vertex that
 is not there, and waits for ever for a pipe that a scene names as a file. So a scene is checked before Mitsuba reads it:
-its XML (`elements`), and its triangles in PLY and in Mitsuba's own format (`refuse_deadly`).
+its XML (`elements`), and its triangles in PLY and in Mitsuba's own format (`refuse_lost_vertices`).
 """
 
 from __future__ import annotations
@@ -34,11 +34,10 @@ Corners = npt.NDArray[np.integer[Any]]
 
 
 class Element(NamedTuple):
-    """An element of a scene's XML, and the folder of the file that it stands in."""
+    """An element of a scene's XML."""
 
     tag: str
     attributes: dict[str, str]
-    folder: Path
 
     def filename(self) -> str:
         """Return the file that it names; empty if none."""
@@ -64,12 +63,6 @@ def files(scene: Scene) -> list[Path]:
     folder = scene.source.parent
     named = [folder / name for element in elements(scene) if (name := element.filename())]
     return [scene.source, *sorted({path for path in named if path.is_file()})]
-
-
-def refuse_deadly(scene: Scene) -> None:
-    """Refuse what Mitsuba would not survive: as `elements`, and faces of a vertex that is not there."""
-    for path in files(scene):
-        _refuse_lost_vertices(path)
 
 
 def elements(scene: Scene) -> list[Element]:
@@ -106,7 +99,7 @@ def _parsed(path: Path) -> list[Element]:
             raise BadInput(where, "", "nested too deeply", f"at most {_MOST_DEPTH} levels are allowed")
         if len(found) == _MOST_ELEMENTS:
             raise BadInput(where, "", "too many elements", f"at most {_MOST_ELEMENTS:,} are allowed")
-        found.append(Element(tag, attributes, path.parent))
+        found.append(Element(tag, attributes))
 
     def end(tag: str) -> None:
         nonlocal depth
@@ -136,7 +129,7 @@ def _refuse(element: Element, path: Path, home: Path) -> None:
         raise BadInput(where, "path", folder, "leave it out, and name files beside the scene")
     if "$" in name or "$" in element.attributes.get("name", ""):
         raise BadInput(where, "filename", name, "names of files and of properties are written out, without parameters")
-    for place in {home, element.folder} if name else ():
+    for place in {home, path.parent} if name else ():
         refuse_irregular(place / name, f"a file, which the scene {path.name} names,")
 
 
@@ -168,7 +161,7 @@ def _numbers(text: str) -> Float64:
         return np.empty(0)
 
 
-def _refuse_lost_vertices(path: Path) -> None:
+def refuse_lost_vertices(path: Path) -> None:
     """Refuse a mesh with a face of a vertex that is not there; what is no such mesh is left to Mitsuba."""
     with path.open("rb") as file:
         read = {b"ply": _ply, b"\x1c\x04\x03": _serialized, b"\x1c\x04\x04": _serialized}.get(file.read(3))

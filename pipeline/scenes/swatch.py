@@ -27,6 +27,7 @@ LIGHTS: Final = (((-0.55, 0.75, 0.75), 2.4), ((0.6, -0.5, 1.0), 0.5))
 """Direction to each light, of any length, and its irradiance on a surface that faces it."""
 BOARD: Final = 0.25  # albedo of the board
 HALF_BOARD: Final = 20.0  # half its side; that of the cloth is 1/2
+_PIXELS = PixelOptions()
 _STEPS = 8  # of Newton's method: the slope is at most .32
 
 
@@ -44,7 +45,6 @@ class Swatch(NamedTuple):
 
     yarns: float  # yarn spacings along each side
     size: tuple[int, int]  # width and height in pixels
-    options: PixelOptions = PixelOptions()
 
     def frame(self, window: FilmWindow) -> SceneFrame:
         """Return what every pixel of a window shows."""
@@ -95,11 +95,10 @@ class Swatch(NamedTuple):
         a, b, c = (dot(jacobian[:, i], jacobian[:, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
         middle, radius = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
         sizes = np.sqrt(np.maximum([middle + radius, middle - radius], 0.0))
-        options = self.options
-        sigma, sigma_minor = np.clip(options.pixel_sigma * sizes, LEAST_SIGMA, options.largest_sigma)
+        sigma, sigma_minor = np.clip(_PIXELS.pixel_sigma * sizes, LEAST_SIGMA, _PIXELS.largest_sigma)
 
         straight = np.einsum("nij,nj->ni", frame, unit(EYE - position))
-        wo = tilted(straight, np.ones(len(y)), options.largest_angle)
+        wo = tilted(straight, np.ones(len(y)), _PIXELS.largest_angle)
         share = np.square(wo[:, 1]) / np.maximum(np.square(wo[:, :2]).sum(axis=1), 1e-300)
         curvature = -bend * level**3 * share / self.yarns
         curvature = np.where(curvature > LEAST_CURVATURE, curvature, 0.0)

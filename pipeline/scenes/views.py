@@ -14,7 +14,6 @@ singular value (`major`). Local frame of the directions: x along the weft (dp/du
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -45,7 +44,8 @@ class _Surface(NamedTuple):
 def view(scene: View, width: int, height: int, frame: float = 0.0, options: ViewOptions | None = None) -> GBuffer:
     """Return what every pixel of a view shows; the cloth slides over the surface by ``frame * options.step`` pixels."""
     options = options or ViewOptions()
-    return _SCENES[scene](width, height, frame * options.step, options)
+    render = _sphere if scene == "sphere" else _plane
+    return render(width, height, frame * options.step, options)
 
 
 def _sphere(width: int, height: int, shift: float, options: ViewOptions) -> GBuffer:
@@ -155,6 +155,3 @@ def _direction(angles: tuple[float, float]) -> Float64:
     """Return the unit vector at (angle from z, azimuth from x) in degrees."""
     polar, azimuth = (math.radians(angle) for angle in angles)
     return np.array([math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)])
-
-
-_SCENES: Final[dict[View, Callable[[int, int, float, ViewOptions], GBuffer]]] = {"sphere": _sphere, "plane": _plane}

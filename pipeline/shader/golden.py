@@ -179,10 +179,7 @@ def read_sides(sides: Sides, queries: Queries) -> Float32:
 
     Bounds are known with light and viewer on one side; else they are the components.
     """
-    back = bool(queries.wo[0, 2] < 0.0)
-    table = sides.back if back else sides.front
-    assert table is not None
-    seen = queries.turned() if back else queries
+    table, seen = sides.seen(queries)
     result = np.empty((len(queries.u), ANSWER_COLUMNS), np.float32)
     behind = seen.wi[:, 2] < 0.0
     if not behind.all():
@@ -203,15 +200,13 @@ def read_sides(sides: Sides, queries: Queries) -> Float32:
 
 def lobes_of(sides: Sides, looks: Queries) -> Lobes:
     """Return the mixtures of N looks by pipeline.analytic.importance with the grids of `sides`; viewers on one side."""
-    back = bool(looks.wo[0, 2] < 0.0)
-    table = sides.back if back else sides.front
-    assert table is not None
+    table, seen = sides.seen(looks)
     surface = LobeSurface(
         table.repeat, table.yarn, table.thickness, table.uniform, table.piece_starts, table.pieces, table.bounds,
         table.grid.ravel(), table.grid.shape[-1], (sides.colours @ np.array(LUMINANCE, np.float32)).reshape(3, 2),
     )  # fmt: skip
-    result = find_lobes(surface, looks.turned() if back else looks, point_places(POINTS), WIDENING)
-    if back:
+    result = find_lobes(surface, seen, point_places(POINTS), WIDENING)
+    if table is sides.back:
         result.flakes[:, TZ] *= np.float32(-1.0)
     return result
 
@@ -249,13 +244,10 @@ def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits:
     change = np.zeros(len(answer))
     # Places are kept from the corner of a cell: a small one has no more digits there than 1, a large one no fewer.
     place = digits * np.spacing(np.float32(1.0))
+    steps = {name: np.maximum(place, np.spacing(getattr(queries, name))) for name in ("u", "v")}
+    steps |= {name: digits * np.spacing(getattr(queries, name)) for name in ("sigma", "sigma_minor")}
     for _ in range(_TRIALS):
-        moved = queries._replace(
-            u=_moved(queries.u, rng, np.maximum(place, np.spacing(queries.u))),
-            v=_moved(queries.v, rng, np.maximum(place, np.spacing(queries.v))),
-            sigma=_moved(queries.sigma, rng, digits * np.spacing(queries.sigma)),
-            sigma_minor=_moved(queries.sigma_minor, rng, digits * np.spacing(queries.sigma_minor)),
-        )  # fmt: skip
+        moved = queries._replace(**{name: _moved(getattr(queries, name), rng, step) for name, step in steps.items()})
         change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
 

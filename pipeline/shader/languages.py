@@ -21,10 +21,10 @@ class Program(NamedTuple):
     """A file that slangc makes of a source, with its entry points."""
 
     file: str
-    source: str
     entries: tuple[str, ...]
-    stage: str
-    textures: bool
+    source: str = "evaluate.slang"
+    stage: str = "compute"
+    """``compute``, or ``fragment``: then it reads textures."""
 
 
 class Language(NamedTuple):
@@ -34,25 +34,20 @@ class Language(NamedTuple):
     programs: tuple[Program, ...]
 
 
-def _rows(suffix: str) -> tuple[Program, ...]:
-    return (Program(f"evaluate.{suffix}", "evaluate.slang", ("evaluate", "scatter"), "compute", False),)
-
-
-def _single(entry: str, suffix: str, stage: str, source: str = "evaluate.slang") -> Program:
-    return Program(f"{entry}.{suffix}", source, (entry,), stage, stage == "fragment")
-
+_EVALUATE, _SCATTER, _DRAW = ("evaluate",), ("scatter",), ("draw",)  # entry points
+_ES_PROGRAMS: Final = (
+    Program("evaluate.frag", _EVALUATE, stage="fragment"), Program("draw.frag", _DRAW, "draw.slang", "fragment")
+)  # fmt: skip
 
 LANGUAGES: Final = {
-    "cpp": Language("cpp", _rows("cpp")),
-    "cuda": Language("cuda", _rows("cu")),
-    "glsl": Language("glsl", (_single("evaluate", "comp", "compute"), _single("scatter", "comp", "compute"))),
-    "glsles": Language(
-        "glsl", (_single("evaluate", "frag", "fragment"), _single("draw", "frag", "fragment", "draw.slang"))
-    ),
+    "cpp": Language("cpp", (Program("evaluate.cpp", _EVALUATE + _SCATTER),)),
+    "cuda": Language("cuda", (Program("evaluate.cu", _EVALUATE + _SCATTER),)),
+    "glsl": Language("glsl", (Program("evaluate.comp", _EVALUATE), Program("scatter.comp", _SCATTER))),
+    "glsles": Language("glsl", _ES_PROGRAMS),
     # slangc writes a file of HLSL for each entry point.
-    "hlsl": Language("hlsl", (_single("evaluate", "hlsl", "compute"), _single("scatter", "hlsl", "compute"))),
-    "metal": Language("metal", _rows("metal")),
-    "wgsl": Language("wgsl", _rows("wgsl")),
+    "hlsl": Language("hlsl", (Program("evaluate.hlsl", _EVALUATE), Program("scatter.hlsl", _SCATTER))),
+    "metal": Language("metal", (Program("evaluate.metal", _EVALUATE + _SCATTER),)),
+    "wgsl": Language("wgsl", (Program("evaluate.wgsl", _EVALUATE + _SCATTER),)),
 }
 """Languages that slangc makes, by name."""
 
@@ -110,7 +105,8 @@ def translate(
 
 def compile_program(compiler: Path, source: Path, program: Program, target: str, path: Path) -> None:
     """Write one program; what is to draw in a browser becomes GLSL ES 3.00. WorkFailed if slangc refuses it."""
-    options = ["-line-directive-mode", "none", *(["-DTEXTURES"] if program.textures else [])]
+    textures = program.stage == "fragment"
+    options = ["-line-directive-mode", "none", *(["-DTEXTURES"] if textures else [])]
     for entry in program.entries:
         options += ["-entry", entry, "-stage", program.stage]
     command = [str(compiler), str(source / program.source), *options, "-target", target, "-o", str(path)]
@@ -121,7 +117,7 @@ def compile_program(compiler: Path, source: Path, program: Program, target: str,
     if done.returncode != 0:
         raise WorkFailed(f"{compiler}: {one_line(done.stderr or done.stdout, 300)}")
     text = path.read_text(encoding="utf-8")
-    for pattern, other in _ES if program.textures else ():
+    for pattern, other in _ES if textures else ():
         text = re.sub(pattern, other, text)
     path.write_text(_dense(text), encoding="utf-8")
 

@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float32
 from pipeline.models.domain import Domain
 from pipeline.models.networks.layers import LinearLayer, layers_of
 from pipeline.models.networks.texture import DEPTH_SCALE, LAYERS, STEEPEST, texels_of
@@ -24,7 +23,7 @@ from pipeline.shader import descriptor
 from pipeline.shader.constants import TEXTURE_WIDTH, shared_constants
 from pipeline.shader.golden import GROUPS, golden_of
 from pipeline.shader.limits import MOST_HEIGHT
-from pipeline.shader.tables import Place, constants_slang
+from pipeline.shader.tables import PlacedArrays, constants_slang, encoded
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -35,22 +34,8 @@ MOST_ELEMENTS: Final = TEXTURE_WIDTH * MOST_HEIGHT
 """Most elements of the buffer: of a texture that every WebGL 2 allows."""
 
 
-class Weights:
-    """Arrays, one after another, that fill whole elements."""
-
-    def __init__(self) -> None:
-        self._parts: list[Float32] = []
-        self.count = 0
-        self.places: dict[str, Place] = {}
-
-    def add(self, name: str, values: Float32, meaning: str) -> Place:
-        """Append an array whose last axis is filled up to whole elements, and return its place."""
-        filled = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, -values.shape[-1] % 4)])
-        place = Place(offset=self.count, shape=filled.shape, meaning=meaning)
-        self._parts.append(filled.ravel())
-        self.count += filled.size // 4
-        self.places[name] = place
-        return place
+class Weights(PlacedArrays):
+    """Arrays that fill whole elements of four numbers."""
 
     def add_perceptron(self, network: str, layers: Sequence[LinearLayer]) -> list[descriptor.PlacedLayer]:
         """Append the layers of a network; inputs of the first one are filled up to whole elements."""
@@ -63,17 +48,6 @@ class Weights:
             entry = descriptor.PlacedLayer(network=network, biases=biases, weights=weights, activation=activation)
             described.append(entry)
         return described
-
-    def files(self) -> dict[str, bytes]:
-        """Return the files of the buffer, by their paths; BadInput for more than MOST_ELEMENTS."""
-        if self.count > MOST_ELEMENTS:
-            allowed = f"the shader takes at most {MOST_ELEMENTS:,} elements of weights"
-            raise BadInput("export", "shader", f"{self.count:,} elements", allowed)
-        values = np.concatenate(self._parts)
-        return {
-            "tables/weights.f32": values.astype("<f4").tobytes(),
-            "tables/weights.f16": values.astype("<f2").tobytes(),
-        }
 
 
 _NEUMIP_ONNX: Final = {
@@ -91,10 +65,13 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         raise BadInput("export", "kind", ", ".join(sorted(kinds)), f"{method.name} answers in front of flat cloth only")
     if level is not None:
         raise BadInput("export", "level", level, f"leave it out: {method.name} has no soft nodes")
-    network, weights = method.network_of(fabric), Weights()
+    network, weights = method.network_of(fabric), Weights(channels=4)
     options = network.options
     weights.add("colours", colours(fabric).astype(np.float32), "k_s and k_d of warp and weft")
     constants, layers = _pack(network, weights)
+    if weights.count > MOST_ELEMENTS:
+        allowed = f"the shader takes at most {MOST_ELEMENTS:,} elements of weights"
+        raise BadInput("export", "shader", f"{weights.count:,} elements", allowed)
     channels = [f"feature {n}" for n in range(options.channels)]
     channels += ["0"] * (-len(channels) % 4)
     trained_on, outside = _training(method.domain, fabric)
@@ -133,7 +110,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
             "layout.slang": constants_slang(shared_constants(), "pipeline.analytic.soft_nodes"),
             "network.slang": constants_slang(constants, "pipeline.models.neumip"),
         },
-        weights.files(),
+        {path: encoded(np.concatenate(weights.parts), kind) for kind, path in files.items()},
         described,
         golden_of(
             {"front": GROUPS["front"]},

@@ -9,7 +9,7 @@ from pipeline.analytic.soft_nodes.groups import DETAILS, USUAL
 from pipeline.shader.descriptor import Buffer, Descriptor, Shader, colours
 from pipeline.shader.golden import golden
 from pipeline.shader.limits import MOST_NODES, MOST_REPEAT_CELLS
-from pipeline.shader.tables import layout_slang, refuse_large_repeat, table_files, tables, tabulate_sides
+from pipeline.shader.tables import encoded, layout_slang, refuse_large_repeat, tables, tabulate_sides
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -28,7 +28,7 @@ _BUFFERS: Final = {
     "nodes": (4, {"float32": "tables/nodes.f32", "float16": "tables/nodes.f16"}),
     "grid": (1, {"uint8": "tables/grid.png"}),
 }
-"""Channels and files of each buffer, by type: little-endian, row after row; the grid as grey levels of a picture."""
+"""Channels and files of each buffer, by type, as `encoded` writes them: row after row."""
 
 
 def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
@@ -40,9 +40,11 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
     sides = tabulate_sides(fabric, level, kinds)
     cloth = tables(sides)
     threads, buffers = (len(sides.tints[0]), len(sides.tints[1])), {}
+    contents: dict[str, bytes] = {}
     for name, (channels, files) in _BUFFERS.items():
-        elements, arrays = getattr(cloth, name).size // channels, cloth.places.get(name, {})
-        buffers[name] = Buffer(files=files, channels=channels, elements=elements, arrays=arrays)
+        values, arrays = getattr(cloth, name), cloth.places.get(name, {})
+        buffers[name] = Buffer(files=files, channels=channels, elements=values.size // channels, arrays=arrays)
+        contents |= {path: encoded(values, kind) for kind, path in files.items()}
     described = Descriptor(
         fabric=fabric.name,
         level=level,
@@ -58,7 +60,7 @@ def soft_nodes_shader(fabric: Fabric, level: int | None, kinds: Collection[str])
     return Shader(
         SOFT_NODES_SOURCES,
         {"layout.slang": layout_slang(cloth)},
-        table_files(cloth),
+        contents,
         described,
         golden(sides),
         f"level {level}, {sides.front.evenly.size} nodes",

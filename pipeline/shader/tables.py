@@ -36,6 +36,7 @@ from pipeline.shader.languages import refuse_unknown
 from pipeline.shader.limits import MOST_HEIGHT, MOST_NODES, MOST_REPEAT_CELLS
 from pipeline.shader.threads import family_heights, thread_tints
 from pipeline.truth.geometry.heightfield import AXIS_DROP, BEND_RADIUS, HALF_LENGTH
+from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -57,6 +58,13 @@ class Sides(NamedTuple):
     back: SoftNodeTable | None
     colours: Float32
     tints: tuple[Float32, Float32]
+
+    def seen(self, queries: Queries) -> tuple[SoftNodeTable, Queries]:
+        """Return the table of the side that all viewers of N queries see, and the queries as that side has them."""
+        if queries.wo[0, 2] >= 0.0:
+            return self.front, queries
+        assert self.back is not None
+        return self.back, queries.turned()
 
 
 @dataclass(frozen=True)
@@ -142,17 +150,17 @@ def tables(sides: Sides) -> ClothTables:
     shared = {"colours": sides.colours, "point_places": point_places(POINTS), "tints": tints}
     first = known[0]
     own = len(first.integers) + 2 + len(first.of_integers) + len(first.of_numbers) + len(shared)
-    integers, numbers = _Buffer(own * len(known)), _Buffer(len(first.numbers) * len(known))
-    of_shared = numbers.add(shared)
+    integers, numbers = PlacedArrays(own * len(known)), PlacedArrays(len(first.numbers) * len(known))
+    of_shared = _added(numbers, shared)
     heads: list[dict[str, int | float]] = []
     node = grid = 0
     for prefix, side in zip(("", "back_"), known, strict=False):
-        offsets = integers.add(side.of_integers, prefix) | numbers.add(side.of_numbers, prefix) | of_shared
+        offsets = _added(integers, side.of_integers, prefix) | _added(numbers, side.of_numbers, prefix) | of_shared
         heads.append({**side.integers, "first_node": node, "first_grid": grid, **offsets, **side.numbers})
         node, grid = node + side.rows[..., 0].size, grid + side.grid.size
     return ClothTables(
-        integers.filled([value for head in heads for value in head.values() if isinstance(value, int)], np.int32),
-        numbers.filled([value for head in heads for value in head.values() if isinstance(value, float)], np.float32),
+        np.concatenate([_values(heads, int), *integers.parts]).astype(np.int32),
+        np.concatenate([_values(heads, float), *numbers.parts]).astype(np.float32),
         np.ascontiguousarray(np.concatenate([side.rows.reshape(-1, 4) for side in known]), np.float32),
         np.concatenate([side.grid for side in known]),
         heads[0],
@@ -161,26 +169,31 @@ def tables(sides: Sides) -> ClothTables:
     )
 
 
-class _Buffer:
-    """A buffer that begins with scalars; arrays are added after them."""
+class PlacedArrays:
+    """Arrays of a buffer, one after another, from the element `count` on; an element has so many `channels`."""
 
-    def __init__(self, scalars: int) -> None:
+    def __init__(self, count: int = 0, channels: int = 1) -> None:
+        self.count, self._channels = count, channels
         self.places: dict[str, Place] = {}
-        self._stop, self._values = scalars, [np.zeros(0)]
+        self.parts: list[npt.NDArray[Any]] = []
 
-    def add(self, arrays: dict[str, npt.NDArray[Any]], prefix: str = "") -> dict[str, int]:
-        """Add arrays; return their first elements by name."""
-        starts = {}
-        for name, values in arrays.items():
-            meaning = f"of the back: {_MEANINGS[name]}" if prefix else _MEANINGS[name]
-            self.places[prefix + name] = Place(self._stop, values.shape, meaning)
-            starts[name], self._stop = self._stop, self._stop + values.size
-            self._values.append(values.ravel())
-        return starts
+    def add(self, name: str, values: npt.NDArray[Any], meaning: str) -> Place:
+        """Append an array whose last axis is filled up to whole elements, and return its place."""
+        filled = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, -values.shape[-1] % self._channels)])
+        self.places[name] = Place(self.count, filled.shape, meaning)
+        self.parts.append(filled.ravel())
+        self.count += filled.size // self._channels
+        return self.places[name]
 
-    def filled(self, scalars: list[Any], kind: type) -> npt.NDArray[Any]:
-        """Return all numbers."""
-        return np.concatenate([scalars, *self._values]).astype(kind)
+
+def _added(buffer: PlacedArrays, arrays: dict[str, npt.NDArray[Any]], prefix: str = "") -> dict[str, int]:
+    """Add arrays to a buffer; return their first elements by name."""
+    about = "of the back: " if prefix else ""
+    return {name: buffer.add(prefix + name, values, about + _MEANINGS[name]).offset for name, values in arrays.items()}
+
+
+def _values(heads: list[dict[str, int | float]], kind: type) -> list[int | float]:
+    return [value for head in heads for value in head.values() if isinstance(value, kind)]
 
 
 class _Side(NamedTuple):
@@ -301,16 +314,12 @@ def _groups(table: SoftNodeTable) -> tuple[npt.NDArray[np.int32], npt.NDArray[np
     return np.column_stack([table.groups, first, counts]).astype(np.int32), cells.astype(np.int32)
 
 
-def table_files(cloth: ClothTables) -> dict[str, bytes]:
-    """Return the files of the four buffers, by their paths."""
+def encoded(values: npt.NDArray[Any], kind: str) -> bytes:
+    """Return the file of a buffer: numbers of a type, little-endian; those of ``uint8`` as grey levels of a picture."""
+    if kind != "uint8":
+        return values.astype(np.dtype(kind).newbyteorder("<")).tobytes()
     # The lowest row of the texture comes first.
-    rows = np.pad(cloth.grid, (0, -cloth.grid.size % TEXTURE_WIDTH)).reshape(-1, TEXTURE_WIDTH)
+    rows = np.pad(values, (0, -values.size % TEXTURE_WIDTH)).reshape(-1, TEXTURE_WIDTH)
     picture = io.BytesIO()
     Image.fromarray(rows).save(picture, format="PNG", compress_level=9)
-    return {
-        "tables/integers.i32": cloth.integers.astype("<i4").tobytes(),
-        "tables/numbers.f32": cloth.numbers.astype("<f4").tobytes(),
-        "tables/nodes.f32": cloth.nodes.astype("<f4").tobytes(),
-        "tables/nodes.f16": cloth.nodes.astype("<f2").tobytes(),
-        "tables/grid.png": picture.getvalue(),
-    }
+    return picture.getvalue()

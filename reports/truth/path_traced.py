@@ -20,7 +20,6 @@ from typing import Annotated, Any, Final
 import numpy as np
 
 from pipeline.compiled.arrays import Float64
-from pipeline.mitsuba.register import dress, register
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
@@ -81,6 +80,8 @@ def measure(
 
 def _frames(name: str, method: str, size: int) -> Callable[[int, int], tuple[Float64, float]]:
     """Return a function of samples a pixel and a seed: the frame (size, size, 3), and the processor's seconds."""
+    from pipeline.mitsuba.register import dress, register  # Mitsuba, which tables of Records need not wait for
+
     loaded = load(load_scene(name), SceneOptions())
     world, mi = dress(loaded, method), register()
     film = {"type": "hdrfilm", "width": size, "height": size, "component_format": "float32", "rfilter": {"type": "box"}}

@@ -59,7 +59,7 @@ def shader(name: str, files: dict[str, bytes]) -> str:
         main = Path(folder) / "main.slang"
         start = KINDS[name.removesuffix(THREADS)] + ("#define THREADS\n" if name.endswith(THREADS) else "")
         main.write_text(f'{start}#include "cloth.slang"\n', encoding="utf-8")
-        program = Program(f"{name}.frag", main.name, ("cloth",), "fragment", True)
+        program = Program(f"{name}.frag", ("cloth",), main.name, "fragment")
         made = Path(folder) / program.file
         compile_program(compiler, Path(folder), program, LANGUAGES["glsles"].target, made)
         version, _, rest = made.read_text(encoding="utf-8").partition("\n")

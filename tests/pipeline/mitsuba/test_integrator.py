@@ -7,7 +7,7 @@ import pytest
 from pipeline.analytic.coverage import quick_coverage
 from pipeline.mitsuba import worn
 from pipeline.mitsuba.integrator import MOST_SCATTER, _Cone, evaluated, ray_deviation
-from pipeline.mitsuba.worn import PIXEL, Footprints
+from pipeline.mitsuba.worn import PIXEL, footprints_of
 from pipeline.scenes.frame import render
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
@@ -53,8 +53,6 @@ def test_filter_and_footprint_together_are_one_pixel(scalar, rfilter, samples):
 
 def test_first_footprints_are_those_of_the_gbuffer_and_hidden_lights_are_hidden(scalar):
     """Rays through the middles of pixels of the scene `drape`; both know places in single precision."""
-    import drjit as dr
-
     loaded, size = load(SHIPPED["drape"], SceneOptions(variant="scalar_rgb", curvature="none")), (24, 18)
     gbuffer = render(loaded, size=size).gbuffers["wool_gabardine"]
     camera = loaded.camera.sensor(scalar, size)
@@ -63,10 +61,10 @@ def test_first_footprints_are_those_of_the_gbuffer_and_hidden_lights_are_hidden(
         place = [(column + 0.5) / size[0], (row + 0.5) / size[1]]
         ray, _ = camera.sample_ray_differential(0.0, 0.5, place, [0.5, 0.5])
         si = loaded.world.ray_intersect(ray)
-        _Cone(scalar, dr).meet(ray, si)
-        found = Footprints.of(jacobian(si) * 80.0)
+        _Cone().meet(ray, si)
+        sigma, sigma_minor, _ = footprints_of(jacobian(si) * 80.0)
         wanted = (gbuffer.sigma[index], gbuffer.sigma_minor[index])
-        np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=2e-2)
+        np.testing.assert_allclose((sigma[0], sigma_minor[0]), wanted, rtol=2e-2)
     scene = scalar.load_dict({"type": "scene", "sky": {"type": "constant"}, "sensor": sensor(scalar, 2)})
     shown, hidden = (
         np.asarray(scalar.render(scene, integrator=path(scalar, hide_emitters=hide), spp=1)) for hide in (False, True)
@@ -77,29 +75,29 @@ def test_first_footprints_are_those_of_the_gbuffer_and_hidden_lights_are_hidden(
 def test_a_bounce_widens_the_footprint_and_a_rare_direction_no_more_than_an_even_one(scalar):
     """A ray straight down four units to a floor and up again two units to a ceiling of side 2, u from 0 to 1. Its cone
     is PIXEL * .01 wide for every unit of way; the bounce, of density 3, adds 2 / sqrt(4 pi 3)."""
-    import drjit as dr
-
     mi = scalar
     scene = mi.load_dict({"type": "scene", "floor": floor(mi), "ceiling": floor(mi, height=2.0)})
     bottom = mi.load_dict({"type": "scene", "floor": floor(mi)})
     ray = mi.RayDifferential3f(mi.Point3f(0.1, 0.2, 4.0), mi.Vector3f(0, 0, -1))
     ray.o_x = ray.o_y = ray.o
     ray.d_x, ray.d_y, ray.has_differentials = mi.Vector3f(0.01, 0, -1), mi.Vector3f(0, 0.01, -1), True
-    cone = _Cone(mi, dr)
+    cone = _Cone()
     si = bottom.ray_intersect(ray)
     cone.meet(ray, si)
-    np.testing.assert_allclose(Footprints.of(jacobian(si)).sigma[0], PIXEL * 0.04 / 2.0, rtol=1e-4)
+    np.testing.assert_allclose(footprints_of(jacobian(si))[0], PIXEL * 0.04 / 2.0, rtol=1e-4)
     for delta, widened in ((True, 0.0), (False, 2.0 / math.sqrt(4.0 * math.pi * 3.0))):
-        cone = _Cone(mi, dr)
+        cone = _Cone()
         cone.meet(ray, si)
         cone.scatter(mi.Float(3.0), delta)
         up = mi.RayDifferential3f(si.spawn_ray(mi.Vector3f(0, 0, 1)))
         met = scene.ray_intersect(up)
         cone.meet(up, met)
         wanted = math.hypot(PIXEL * 0.06, widened) / 2.0
-        found = Footprints.of(jacobian(met))
-        np.testing.assert_allclose((found.sigma[0], found.sigma_minor[0]), wanted, rtol=1e-3)
-    cone = _Cone(scalar, dr)
+        sigma, sigma_minor, _ = footprints_of(jacobian(met))
+        np.testing.assert_allclose((sigma[0], sigma_minor[0]), wanted, rtol=1e-3)
+    import drjit as dr
+
+    cone = _Cone()
     cone.meet(scalar.RayDifferential3f(), dr.zeros(scalar.SurfaceInteraction3f))
     cone.scatter(1e-9, False)
     assert cone.state[-1] == pytest.approx(math.sqrt(MOST_SCATTER))

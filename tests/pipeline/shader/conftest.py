@@ -191,7 +191,7 @@ def webgl(exported, tmp_path_factory):
         if entry == "evaluate":
             return (folder / "glsles" / "evaluate.frag").read_text()
         path = tmp_path_factory.mktemp("glsles") / f"{entry}.frag"
-        program = Program(path.name, "evaluate.slang", (entry,), "fragment", True)
+        program = Program(path.name, (entry,), stage="fragment")
         compile_program(slangc(), folder / "slang", program, "glsl", path)
         return path.read_text()
 
