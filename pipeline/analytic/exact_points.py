@@ -13,26 +13,17 @@ from pipeline.truth.query import Queries
 
 
 def sample_points(cloth: ClothSide, queries: Queries, count: int, seed: int, r2: bool = False) -> Float32:
-    """Return the components from `count` points a query, (N, 4); the viewer is in front, rays no lower than 89 degrees.
+    """Return components and transparency from `count` points a query, (N, 5).
 
-    The points are independent, or with `r2` the first of that sequence, shifted once a query [Roberts2018R2].
+    The viewer is in front, rays count as no lower than 89 degrees. The points are independent, or with `r2` the first
+    of that sequence, shifted once a query [Roberts2018R2].
     """
-    return np.ascontiguousarray(_points(cloth, queries, count, seed, r2)[:, :4])
-
-
-def sample_transparency(cloth: ClothSide, looks: Queries, count: int, seed: int, r2: bool = False) -> Float32:
-    """Return the share of light from straight behind that passes at the same points, (N,)."""
-    return _points(cloth, looks, count, seed, r2)[:, 4]
-
-
-def _points(cloth: ClothSide, queries: Queries, count: int, seed: int, r2: bool) -> Float32:
     columns = columns_of(queries.raised() if cloth.parallax else queries)
     return _sample(cloth, columns, count, np.uint64(seed), r2)
 
 
 @allocating_kernel
 def _sample(cloth: ClothSide, columns: WideQueries, count: int, seed: np.uint64, r2: bool) -> Float32:
-    """Return components and transparency of N queries, (N, 5)."""
     rows = len(columns.u)
     mean = np.zeros((rows, AREA_SUM), np.float32)
     sums = np.zeros((1, POINT_SUMS))
@@ -45,6 +36,5 @@ def _sample(cloth: ClothSide, columns: WideQueries, count: int, seed: np.uint64,
             x, y, weight = place_point(columns, row, cloth, first, second)
             add_point(cloth, x, y, weight, query, sums, 0)
         if sums[0, AREA_SUM] > 0.0:
-            for c in range(AREA_SUM):
-                mean[row, c] = sums[0, c] / sums[0, AREA_SUM]
+            mean[row] = sums[0, :AREA_SUM] / sums[0, AREA_SUM]
     return mean

@@ -145,8 +145,7 @@ def _mean_colours(
             weights[0] += _add(warp.seen, masses[1], masses[0], sums[0], share, found[row, 0])
             weights[1] += _add(weft.seen, masses[0], masses[1], sums[1], share, found[row, 1])
         for family in range(2):
-            for c in range(9):
-                found[row, family, c] /= weights[family]
+            found[row, family] /= weights[family]
     return found
 
 
@@ -265,11 +264,8 @@ def _fold_seen(
 def _weigh(family: Threads, masses: Float64, sums: Float64, weights: Float64, found: Float64) -> None:
     """Write the mean colours of a family's threads, (2, 3), by the light of each."""
     for kind in range(2):
-        total = 0.0
-        for thread in range(len(masses)):
-            total += weights[thread, kind]
         # Threads of a family that sends no light count by their mass.
-        least, whole = max(_FAINT * total, _TINY), 0.0
+        least, whole = max(_FAINT * weights[:, kind].sum(), _TINY), 0.0
         for thread in range(len(masses)):
             if masses[thread] > 0.0:
                 weight = weights[thread, kind] / masses[thread] + least
@@ -286,7 +282,7 @@ def _weigh(family: Threads, masses: Float64, sums: Float64, weights: Float64, fo
 @kernel
 def _fold(family: Threads, centre: float, sigma: float, masses: Float64, sums: Float64) -> None:
     """Write the mass of an axis of a footprint on each thread of the weave's repeat, and the same times its colour."""
-    threads, colours = len(masses), family.colours
+    threads = len(masses)
     if sigma >= _SPREAD_OUT * family.repeat:
         masses[:] = 1.0 / threads
         for thread in range(threads):
@@ -301,10 +297,7 @@ def _fold(family: Threads, centre: float, sigma: float, masses: Float64, sums: F
         above = 1.0 if thread == last else math.erf((thread + 1 - centre) * scale)
         mass = 0.5 * (above - below)
         below = above
-        place, colour = thread % threads, thread % len(colours)
-        masses[place] += mass
-        for c in range(9):
-            sums[place, c] += mass * colours[colour, c]
+        _add_thread(family.colours, thread, thread % threads, mass, masses, sums)
 
 
 @kernel

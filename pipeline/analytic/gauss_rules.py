@@ -37,13 +37,15 @@ def gauss_rule(low: float, high: float, count: int, radius: float) -> Rule:
 
 def grid_edges(low: float, high: float, count: int, radius: float) -> Float64:
     """Return the borders of `count` cells of a grid: evenly from `low` to `high`, or evenly in v."""
-    share = np.linspace(0.0, 1.0, count + 1)
-    return 0.5 + radius * np.sin(math.pi * (share - 0.5)) if radius else low + (high - low) * share
+    return _between(low, high, np.linspace(0.0, 1.0, count + 1), radius)
 
 
 def grid_middles(low: float, high: float, count: int, radius: float) -> Float64:
     """Return the middles of the same cells."""
-    share = (np.arange(count) + 0.5) / count
+    return _between(low, high, (np.arange(count) + 0.5) / count, radius)
+
+
+def _between(low: float, high: float, share: Float64, radius: float) -> Float64:
     return 0.5 + radius * np.sin(math.pi * (share - 0.5)) if radius else low + (high - low) * share
 
 

@@ -135,7 +135,5 @@ def _answer(tables: PrefilteredMaps, queries: Queries, widening: int) -> Float32
             blend = yarn[family, 1]
             result[row, family] = covered * scattered / (nz * n)
             result[row, 2 + family] = projected * _INVERSE_PI * (blend * cos_i + (_1 - blend) * iz)
-        inverse = _1 / max(area, _TINY)
-        for c in range(4):
-            result[row, c] *= inverse
+        result[row] *= _1 / max(area, _TINY)
     return result

@@ -23,10 +23,9 @@ from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide, WideQueries, c
 from pipeline.truth.estimator import ESTIMATORS, estimate
 from pipeline.truth.footprint.place import BOX_SIDE
 from pipeline.truth.geometry.heightfield import GAP
-from pipeline.truth.monte_carlo import RANDOMISATIONS, query_directions, ratios
+from pipeline.truth.monte_carlo import RANDOMISATIONS, query_directions, ratios, share_at
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from pipeline.truth.scattering.point import ray_share
 from pipeline.truth.scattering.slab import density, reflection, sigma, transmission
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -295,9 +294,7 @@ def _lattice(
         for a in range(side * ends):
             for b in range(side * picks):
                 x, y = (a + shifts[r, 0]) / side, (b + shifts[r, 1]) / side
-                family, area, specular, diffuse, _, _, _ = ray_share(
-                    cloth.front, cloth.back, cloth.plane, x, y, directions, cloth.choices
-                )
+                family, area, specular, diffuse, _, _, _ = share_at(cloth, x, y, directions)
                 sums[r, AREA_SUM] += area
                 if family != GAP:
                     sums[r, family] += specular

@@ -91,15 +91,22 @@ def place_point(
 
 
 @inlined_kernel
+def share_at(
+    cloth: ClothSide, x: float, y: float, directions: Directions
+) -> tuple[int, float, float, float, float, float, float]:
+    """Return what `ray_share` does; of points of the fabric plane, which do not move, what `point_share` does."""
+    if cloth.parallax:
+        return ray_share(cloth.front, cloth.back, cloth.plane, x, y, directions, cloth.choices)
+    family, area, specular, diffuse, through = point_share(cloth.front, cloth.back, x, y, directions, cloth.choices)
+    return family, area, specular, diffuse, through, 0.0, 0.0
+
+
+@inlined_kernel
 def add_point(
     cloth: ClothSide, x: float, y: float, weight: float, directions: Directions, sums: Float64, r: int
 ) -> bool:
     """Add the weighted share of a point to row r of the sums, (rows, POINT_SUMS); return whether the viewer sees it."""
-    front, back, choices = cloth.front, cloth.back, cloth.choices
-    if cloth.parallax:
-        family, area, specular, diffuse, through, _, _ = ray_share(front, back, cloth.plane, x, y, directions, choices)
-    else:
-        family, area, specular, diffuse, through = point_share(front, back, x, y, directions, choices)
+    family, area, specular, diffuse, through, _, _ = share_at(cloth, x, y, directions)
     if family != GAP:
         sums[r, family] += weight * specular
         sums[r, 2 + family] += weight * diffuse
@@ -118,17 +125,13 @@ def query_directions(columns: WideQueries, row: int) -> Directions:
 @kernel
 def ratios(sums: Float64, mean: Float64, error: Float64) -> int:
     """Write ratios and standard errors from sums (RANDOMISATIONS, POINT_SUMS); return how many rows saw a point."""
-    area, seen = 0.0, 0
+    area, seen = sums[:, AREA_SUM].sum(), 0
     for r in range(RANDOMISATIONS):
-        area += sums[r, AREA_SUM]
         seen += sums[r, AREA_SUM] > 0.0
     for c in range(AREA_SUM):
         mean[c], error[c] = 0.0, 0.0
         if area > 0.0:
-            total = 0.0
-            for r in range(RANDOMISATIONS):
-                total += sums[r, c]
-            mean[c] = total / area
+            mean[c] = sums[:, c].sum() / area
             spread = 0.0
             for r in range(RANDOMISATIONS):
                 residual = sums[r, c] - mean[c] * sums[r, AREA_SUM]

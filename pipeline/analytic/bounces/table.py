@@ -145,15 +145,9 @@ def bounced(table: BounceTable, wi: Float32, wo: Float32, colours: Float64) -> F
 
 @kernel
 def _read(
-    table: BounceTable,
-    wi: Float32,
-    wo: Float32,
-    second: Float64,
-    reached: Float64,
-    later: Float64,
-    viewer: Float64,
+    table: BounceTable, wi: Float32, wo: Float32, second: Float64, reached: Float64, later: Float64, viewer: Float64,
     light: Float64,
-) -> None:
+) -> None:  # fmt: skip
     """Write C2, R, s e and m e' of pairs of directions; `viewer` and `light` are scratch."""
     places, ways, rows = second.shape[1], later.shape[1], later.shape[2]
     factors = places * places * RANK

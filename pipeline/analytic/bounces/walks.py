@@ -33,7 +33,7 @@ import numpy as np
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.footprint.sequences import derive, uniform
-from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, next_hit
+from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, first_hit
 from pipeline.truth.geometry.heightfield import BLEND, GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
 from pipeline.truth.geometry.march import ray, wrap
 from pipeline.truth.geometry.pieces import Cell, CellPiece, cell_pieces, leaders
@@ -316,7 +316,7 @@ def _next(job: _Job, place: _Place, way: int, choice: float, a: float, b: float)
         if dx * place.nx + dy * place.ny + dz * place.nz <= 0.0:
             return False, place
     x, y, z = place.x, place.y, place.z
-    hit = next_hit(field, x, y, z, place.side, ray(dx, dy, dz, 0.0))
+    hit = first_hit(field, x, y, z, ray(dx, dy, dz, 0.0), place.side)
     face = place.face
     if job.ways == 2 and dz < 0.0 and z > 0.0:
         down = -z / dz
@@ -326,7 +326,7 @@ def _next(job: _Job, place: _Place, way: int, choice: float, a: float, b: float)
             family, _, _, _, _, _, _, _, _ = surface_at(field, x, y, int(x), int(y))
             if family == GAP:
                 face, field, z, dz = 1 - face, other, 0.0, -dz
-                hit = next_hit(field, x, y, z, UNDER, ray(dx, dy, dz, 0.0))
+                hit = first_hit(field, x, y, z, ray(dx, dy, dz, 0.0))
     if hit.what == MISSED:
         return False, place
     if hit.what != ON_WALL:

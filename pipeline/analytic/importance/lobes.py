@@ -160,14 +160,9 @@ def find_lobes(cloth: LobeSurface, looks: Queries, places: Float32, widening: fl
 
 @kernel
 def _find_rows(
-    cloth: LobeSurface,
-    patches: Footprints,
-    wo: Float32,
-    places: Float32,
-    widening: np.float32,
-    points: Float32,
+    cloth: LobeSurface, patches: Footprints, wo: Float32, places: Float32, widening: np.float32, points: Float32,
     result: Lobes,
-) -> None:
+) -> None:  # fmt: skip
     """Write the mixtures of N looks; `points` is scratch."""
     u, v, deviation_x, deviation_y, correlation = patches
     ends, picks = cloth.repeat[0], cloth.repeat[1]
@@ -214,18 +209,15 @@ def _place_points(cloth: LobeSurface, look: Viewing, places: Float32, points: Fl
             p += 1
         family, shift = cloth.pieces[p, FAMILY], bounds[p, SHIFT]
         sine, place = _0, _0
+        column = (fx - bounds[p, X_LOW]) / (bounds[p, X_HIGH] - bounds[p, X_LOW])
+        row = (fy - bounds[p, Y_LOW]) / (bounds[p, Y_HIGH] - bounds[p, Y_LOW])
         if family == WARP:
             sine, place = (fx - _HALF) * cloth.yarn[WARP, INVERSE_RADIUS], fy - _HALF + shift
             column = arcsine(sine) * _INVERSE_PI + _HALF
-            row = (fy - bounds[p, Y_LOW]) / (bounds[p, Y_HIGH] - bounds[p, Y_LOW])
         elif family == WEFT:
             # Along a weft, y of its frame runs against x.
             sine, place = (fy - _HALF) * cloth.yarn[WEFT, INVERSE_RADIUS], _HALF - fx - shift
-            column = (fx - bounds[p, X_LOW]) / (bounds[p, X_HIGH] - bounds[p, X_LOW])
             row = arcsine(sine) * _INVERSE_PI + _HALF
-        else:
-            column = (fx - bounds[p, X_LOW]) / (bounds[p, X_HIGH] - bounds[p, X_LOW])
-            row = (fy - bounds[p, Y_LOW]) / (bounds[p, Y_HIGH] - bounds[p, Y_LOW])
         at = int(min(max(row * count, _0), last)) * size + int(min(max(column * count, _0), last))
         at += cloth.pieces[p, BLOCK] * AZIMUTHS * per_azimuth
         lower, upper = np.float32(cloth.grid[at + to_low]), np.float32(cloth.grid[at + to_high])

@@ -21,7 +21,7 @@ from pipeline.analytic.soft_nodes.shade import NODE_SUMS
 from pipeline.analytic.soft_nodes.view_lines import nodes_on_lines, sum_view_lines
 from pipeline.analytic.soft_nodes.wide import sum_fixed
 from pipeline.compiled.arrays import Float32
-from pipeline.compiled.decorators import allocating_kernel, kernel
+from pipeline.compiled.decorators import kernel
 from pipeline.truth.footprint.mixture import Footprints, footprints, narrow_axis
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import directions_of
@@ -39,25 +39,17 @@ _TINY = 1e-12  # keeps a quotient finite
 
 
 def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32]:
-    """Return what `sum_queries` returns for N queries, the viewer in front and no lower than LOWEST_VIEWER."""
-    looks = queries.raised()
-    columns = (np.ascontiguousarray(column, np.float32) for column in (looks.wi, looks.wo, looks.curvature))
-    return sum_queries(table, footprints(queries, SMALLEST), *columns)
-
-
-@allocating_kernel
-def sum_queries(
-    table: SoftNodeTable, patches: Footprints, wi: Float32, wo: Float32, curvature: Float32
-) -> tuple[Float32, Float32]:
     """Return the sums of N queries, the viewer in front, and the areas seen through gaps, (N,).
 
     The sums (N, K, NODE_SUMS) are of each kind of yarn (`SoftNodeTable.kinds`), five with the light behind. The light
-    is behind only if the table knows it; without falls in the table, all cloth counts as flat. `curvature` (N,) is that
-    of the cloth in the viewer's plane, 1/yarn spacings.
+    is behind only if the table knows it; without falls in the table, all cloth counts as flat. Viewers count as no
+    lower than LOWEST_VIEWER.
     """
-    kinds = table.kinds[0] + table.kinds[1]
-    result, gaps = np.zeros((len(wi), kinds, NODE_SUMS), np.float32), np.zeros(len(wi), np.float32)
-    _sum_rows(table, scratch_for(table), patches, wi, wo, curvature, result, gaps)
+    looks = queries.raised()
+    wi, wo, curvature = (np.ascontiguousarray(part, np.float32) for part in (looks.wi, looks.wo, looks.curvature))
+    result = np.zeros((len(wi), table.kinds.sum(), NODE_SUMS), np.float32)
+    gaps = np.zeros(len(wi), np.float32)
+    _sum_rows(table, scratch_for(table), footprints(queries, SMALLEST), wi, wo, curvature, result, gaps)
     return result, gaps
 
 
@@ -73,7 +65,6 @@ def shortened(
     return np.float32(x), np.float32(y), np.float32(share * correlation * deviation_x * deviation_y / (x * y))
 
 
-# Not in `sum_queries`: what allocates counts references to every slice, a third of the time of a query.
 @kernel
 def _sum_rows(
     table: SoftNodeTable, scratch: Scratch, patches: Footprints, wi: Float32, wo: Float32, curvature: Float32,

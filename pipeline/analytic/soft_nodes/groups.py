@@ -202,16 +202,9 @@ def piece_rows(yarn: Float64, piece: CellPiece, across: Rule, along: Rule) -> Fl
 
 @fast_kernel
 def _fill_rows(
-    sines: Float64,
-    places: Float64,
-    half_across: Float64,
-    half_along: Float64,
-    radius: float,
-    curvature: float,
-    limit: float,
-    fibre: Fibre,
-    found: Float64,
-) -> None:
+    sines: Float64, places: Float64, half_across: Float64, half_along: Float64, radius: float, curvature: float,
+    limit: float, fibre: Fibre, found: Float64,
+) -> None:  # fmt: skip
     """Write the rows of all nodes of a piece of yarn, (SURFACE_ROWS, nodes)."""
     for k in range(len(sines)):
         cos_v = math.sqrt((1.0 - sines[k]) * (1.0 + sines[k]))

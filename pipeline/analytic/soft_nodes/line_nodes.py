@@ -55,17 +55,6 @@ class LineRays(NamedTuple):
     inverse: np.float32  # 1 / deviation of the footprint along the lines
 
 
-class LineNode(NamedTuple):
-    """A node: its surface, change of the half vector's cosine with the tangent in its box, weight, and grid cell."""
-
-    frame: NodeFrame
-    along: np.float32
-    across: np.float32
-    weight: np.float32
-    row: np.float32
-    column: np.float32
-
-
 @fast_kernel
 def _sine(v: np.float32) -> np.float32:
     """Return the sine of |v| <= pi/2."""
@@ -78,8 +67,11 @@ def _sine(v: np.float32) -> np.float32:
 @inlined_fast_kernel
 def _node(
     draft: Float32, k: int, rays: LineRays, radius: np.float32, fibre: Fibre, size: np.float32, d: YarnDirections
-) -> LineNode:  # fmt: skip
-    """Return a drafted node."""
+) -> tuple[NodeFrame, np.float32, np.float32, np.float32, np.float32, np.float32]:  # fmt: skip
+    """Return a drafted node: surface, changes of the half vector's cosine with the tangent in its box, weight, cell.
+
+    The changes are along and across the yarn, the cell is row and column of the grid.
+    """
     # Place across and along the yarn.
     at, length, across, by_across = draft[AT, k], draft[LENGTH, k], draft[ACROSS, k], draft[BY_ACROSS, k]
     turned, rim = length > _0, length == _0
@@ -113,7 +105,7 @@ def _node(
     half_v = min(_HALF * (length * part_a + draft[APART, k] * part_b) / (radius * cosine), _HALF)
     half_along = _HALF * (length * part_b + draft[APART, k] * part_a)
     last = size - np.float32(0.01)
-    return LineNode(
+    return (
         NodeFrame(nx, ny, nz, _1 / nz, t.x, t.y, t.z),
         half_along * inner / angles.cos_u * _GAUSS * by_u,
         half_v * _GAUSS * by_v,
@@ -158,13 +150,13 @@ def shade_lines(
     near_end = _NEAR_END if hidden_ends else -_1
     total = (_0, _0, _0, _0, _0, _0)
     for k in range(len(firsts)):
-        at = _node(draft, k, rays, radius, fibre, np.float32(size), d)
-        cell = firsts[k] + np.uint32(int(at.column) * step_a + int(at.row) * step_b)
+        frame, along, across, weight, row, column = _node(draft, k, rays, radius, fibre, np.float32(size), d)
+        cell = firsts[k] + np.uint32(int(column) * step_a + int(row) * step_b)
         lit = _lit(light, bent, cell, level, sharp)
         if behind is not None and draft[LENGTH, k] == _0:
             inwards = d.iy * draft[ROWS_PER, k]
-            inwards = -inwards if at.row > np.float32(size) - near_end else (inwards if at.row < near_end else -_1)
+            inwards = -inwards if row > np.float32(size) - near_end else (inwards if row < near_end else -_1)
             lit = _0 if inwards > _0 else lit
-        own = shade.shade_node(d, at.frame, at.along, at.across, _1, lit, at.weight, layer, behind)
+        own = shade.shade_node(d, frame, along, across, _1, lit, weight, layer, behind)
         total = shade.added(total, own)
     return total

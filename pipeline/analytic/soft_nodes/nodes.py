@@ -159,7 +159,9 @@ def tabulate(
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
-    rays = _ray_columns(model, located, grid, numbered, evenly, starts[-2] * BLOCK_NODES, rims, behind)
+    spots = _spots(front, numbered, stop)
+    shown = spots[:, 3][spots[:, 2] > 0.0]
+    areas, walls = _areas(front, located.samples, grid, numbered, evenly, starts[-2] * BLOCK_NODES, rims)
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
@@ -181,7 +183,13 @@ def tabulate(
         behind_grid=behind_grid,
         falls=_in_blocks(falls),
         grid_falls=grid_falls,
-        **rays,
+        floats=np.array([front.floats[pick, end, piece.side] for (end, pick), piece, _ in located.pieces]),
+        crowns=np.array([front.crown[pick, end] for (end, pick), _, _ in located.pieces]),
+        heights=front.yarn, highest=front.highest, lowest=front.lowest, plane=model.plane,
+        spots=spots,
+        shown=np.array([shown.min(), shown.max()], np.float32),
+        areas=_in_blocks(areas),
+        end_walls=_in_blocks(walls[: AZIMUTHS if behind and rims else 0]).astype(np.uint8),
         view_lines=detail.lines, spacing=detail.spacing, rims=rims,
     )  # fmt: skip
 
@@ -206,35 +214,24 @@ def _horizon_grids(
     return grid, grid_falls, behind_grid
 
 
-def _ray_columns(
-    model: ClothSide, located: _Located, grid: npt.NDArray[np.uint8], numbered: list[tuple[PieceGroup, int]],
-    evenly: Float64, gaps: int, rims: bool, behind: bool,
-) -> dict[str, Any]:  # fmt: skip
-    """Return the columns of `SoftNodeTable` by which view rays meet heights; groups come with their first node."""
-    stop = len(evenly)
-    front, spots = model.front, _spots(model.front, numbered, stop)
-    shown = spots[:, 3][spots[:, 2] > 0.0]
-    areas, ends = np.zeros((2, AZIMUTHS, SEEN_ANGLES, stop))
-    of_groups = seen_areas(front, located.samples, grid, [group for group, _ in numbered], rims)
+def _areas(
+    front: HeightField, samples: list[Sample], grid: npt.NDArray[np.uint8], numbered: list[tuple[PieceGroup, int]],
+    evenly: Float64, gaps: int, rims: bool,
+) -> tuple[Float64, Float64]:  # fmt: skip
+    """Return the area that a viewer sees of each node's box, and the share of it that are walls, of LEVELS.
+
+    Groups come with their first node; nodes from `gaps` on are gaps.
+    """
+    areas, ends = np.zeros((2, AZIMUTHS, SEEN_ANGLES, len(evenly)))
+    of_groups = seen_areas(front, samples, grid, [group for group, _ in numbered], rims)
     for (group, first), own in zip(numbered, of_groups, strict=True):
         indices = _node_indices(group, first)
         areas[..., indices], ends[..., indices] = own
     dark = LEVELS * (1.0 if front.yarn[:, RADIUS].min() >= 0.5 else _DARK_BESIDE_GAPS)
-    shares = np.rint(dark * ends / np.maximum(areas, _LEAST_AREA))[: AZIMUTHS if behind and rims else 0]
+    shares = np.rint(dark * ends / np.maximum(areas, _LEAST_AREA))
     if rims:
         areas[..., :gaps] *= rays_left(areas * evenly, gaps)[..., None]
-    return {
-        "floats": np.array([front.floats[pick, end, piece.side] for (end, pick), piece, _ in located.pieces]),
-        "crowns": np.array([front.crown[pick, end] for (end, pick), _, _ in located.pieces]),
-        "heights": front.yarn,
-        "highest": front.highest,
-        "lowest": front.lowest,
-        "plane": model.plane,
-        "spots": spots,
-        "shown": np.array([shown.min(), shown.max()], np.float32),
-        "areas": _in_blocks(areas),
-        "end_walls": _in_blocks(shares).astype(np.uint8),
-    }
+    return areas, shares
 
 
 def _node_indices(group: PieceGroup, first: int) -> Index:

@@ -10,7 +10,6 @@ import numpy.typing as npt
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable
 from pipeline.compiled.arrays import Float32, Float64, Index
-from pipeline.compiled.decorators import allocating_kernel
 
 
 class SoftQuery(NamedTuple):
@@ -75,25 +74,19 @@ class Scratch(NamedTuple):
     of the area are walls that light from behind does not reach, of LEVELS, (B, BLOCK_NODES)."""
 
 
-@allocating_kernel
 def scratch_for(table: SoftNodeTable) -> Scratch:
     """Return what the queries of a call need."""
-    kinds, fixed = table.kinds[0] + table.kinds[1], len(table.evenly)
-    weight = np.zeros((fixed, BLOCK_NODES), np.float32)
+    kinds, fixed, most = table.kinds.sum(), len(table.evenly), MOST_ON_LINES
+    weight, areas, freed, walls = np.zeros((4, fixed, BLOCK_NODES), np.float32)
     return Scratch(
-        weight,
-        weight.reshape(fixed * BLOCK_NODES // COLUMNS, COLUMNS),
+        weight, weight.reshape(-1, COLUMNS),
         np.zeros(kinds, np.int64),
         np.zeros((2, 8), np.float32),
-        table.grid.reshape(table.grid.size),
-        table.behind_grid.reshape(table.behind_grid.size),
+        table.grid.ravel(), table.behind_grid.ravel(),
         table.grid_falls.reshape(len(table.grid_falls), table.grid.size if len(table.grid_falls) else 0),
         np.zeros((2, fixed, BLOCK_NODES), np.float32),
         np.empty((2, 512)),
-        np.empty((kinds, DRAFT_ROWS, MOST_ON_LINES), np.float32),
-        np.empty((kinds, MOST_ON_LINES), np.uint32),
+        np.empty((kinds, DRAFT_ROWS, most), np.float32), np.empty((kinds, most), np.uint32),
         np.empty((len(table.spots), 2, COLUMNS), np.float32),
-        np.zeros((fixed, BLOCK_NODES), np.float32),
-        np.zeros((fixed, BLOCK_NODES), np.float32),
-        np.zeros((fixed, BLOCK_NODES), np.float32),
-    )
+        areas, freed, walls,
+    )  # fmt: skip

@@ -24,7 +24,7 @@ from pipeline.analytic.soft_nodes.groups import PieceGroup
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, fast_kernel, inlined_kernel
 from pipeline.truth.geometry import heightfield
-from pipeline.truth.geometry.heightfield import GAP, OFFSET, TOP, UNDER, WARP, WEFT, HeightField
+from pipeline.truth.geometry.heightfield import GAP, OFFSET, UNDER, WARP, WEFT, HeightField
 from pipeline.truth.geometry.horizon import horizon
 from pipeline.truth.geometry.pieces import CellPiece
 
@@ -109,10 +109,7 @@ def heights(
         for i in range(len(across)):
             x, y = (across[i], along[j]) if family == WARP else (along[j], across[i])
             a, b = heightfield.local_position(family, own[OFFSET], x + end, y + pick, end, pick)
-            if side == TOP:
-                height[j, i], _, _ = heightfield.torus_height(yarn, own, a, b)
-            else:
-                height[j, i], _, _ = heightfield.height_beneath(yarn, own, a, b)
+            height[j, i], _, _ = heightfield.float_height(yarn, own, side, a, b)
     return height
 
 

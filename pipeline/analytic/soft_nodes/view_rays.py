@@ -129,7 +129,7 @@ def sunk(ray: ViewRay, height: float) -> tuple[float, float]:
 @inlined_fast_kernel
 def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
     """Return the height at s, and two numbers whose quotient is the slope towards -s, smooth up to the border."""
-    # As `torus_height` and `height_beneath`: sqrt((R +- rho)^2 - b^2) - R cos u_max, times the relief.
+    # As `float_height`: sqrt((R +- rho)^2 - b^2) - R cos u_max, times the relief.
     sine = min(1.0, max(-1.0, (curve.across + s * curve.by_across) * curve.per_radius))
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     rho, b = curve.radius * cosine, curve.along + s * curve.by_along

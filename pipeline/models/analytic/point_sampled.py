@@ -67,12 +67,12 @@ class ExactPoints(Analytic["ClothSide"]):
             options,
             count,
             PerFabric(lambda fabric: cloth_side(fabric, truth)),
-            lambda cloth, queries, seed: sample_points(cloth, queries, count, seed, self._r2),
+            lambda cloth, queries, seed: sample_points(cloth, queries, count, seed, self._r2)[:, :4].copy(),
             lambda cloth: nbytes(cloth.front),
         )
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, float32 (N,), of the points that `predict` has with this seed."""
-        from pipeline.analytic.exact_points import sample_transparency
+        from pipeline.analytic.exact_points import sample_points
 
-        return sample_transparency(self._tables.of(fabric), looks, self._count, seed, self._r2)
+        return sample_points(self._tables.of(fabric), looks, self._count, seed, self._r2)[:, 4]

@@ -111,39 +111,24 @@ def _ends_in(
 
 
 @kernel
-def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray) -> Hit:
+def first_hit(field: HeightField, x: float, y: float, z: float, towards: Ray, side: int = UNDER) -> Hit:
     """Return what a ray meets first that starts at (x, y, z), not below the surface.
 
-    The ray sinks at first (towards.z < 0), or runs straight down; (x, y) may lie anywhere on the endless cloth. The
-    point of a ray that ends on a wall is just inside the piece above it: the border itself would belong to either side,
-    as numbers are rounded.
+    The ray sinks at first (towards.z < 0), or runs straight down; (x, y) may lie anywhere on the endless cloth. Over
+    flat cloth it may also leave the cloth's own point, above its tangent plane, and rise; `side` is TOP on the yarn on
+    top. The point of a ray that ends on a wall is just inside the piece above it: the border itself would belong to
+    either side, as numbers are rounded.
     """
     picks, ends = field.top.shape
     x, y = wrap(x, ends), wrap(y, picks)
-    if towards.rise == -math.inf:
-        cell = first_cell(x, y, towards)
-        family, _, _, _, _, _, _, _, _ = surface_at(field, x, y, cell.end, cell.pick)
-        return Hit(MISSED if family == GAP else ON_YARN, x, y, cell.end, cell.pick, 0.0)
-    return _end_of(field, x, y, z, UNDER, towards)
-
-
-@kernel
-def next_hit(field: HeightField, x: float, y: float, z: float, side: int, towards: Ray) -> Hit:
-    """Return what a ray meets first that leaves the cloth's own point (x, y, z), above its tangent plane.
-
-    0 <= x < ends, 0 <= y < picks; `side` is TOP on the yarn on top. The ray may rise or sink; the cloth is flat.
-    """
-    if towards.rise == math.inf:
-        return Hit(MISSED, x, y, int(x), int(y), 0.0)
-    return _end_of(field, x, y, z, side, towards)
-
-
-@inlined_kernel
-def _end_of(field: HeightField, x: float, y: float, z: float, side: int, towards: Ray) -> Hit:
-    """Return where a ray that is not vertical ends; `side` is TOP if it leaves the float on top at (x, y)."""
     rise, bend = towards.rise, towards.bend
     cell = first_cell(x, y, towards)
-    own_family, own_yarn, own_centre = float_on_top(field, cell)
+    if rise == math.inf:
+        return Hit(MISSED, x, y, cell.end, cell.pick, 0.0)
+    if rise == -math.inf:
+        family, _, _, _, _, _, _, _, _ = surface_at(field, x, y, cell.end, cell.pick)
+        return Hit(MISSED if family == GAP else ON_YARN, x, y, cell.end, cell.pick, 0.0)
+    own = float_on_top(field, cell)
     distance = 0.0
     bottom = _level_at(towards, z - field.lowest)
     for _ in range(_MAX_CELLS):
@@ -151,10 +136,7 @@ def _end_of(field: HeightField, x: float, y: float, z: float, side: int, towards
         # A ray is lowest where it leaves the cell, unless it rises, or will again.
         lowest = min(max(-rise / bend, distance), leave) if bend > 0.0 else (distance if rise > 0.0 else leave)
         if leave > distance and field.crown[cell.pick, cell.end] >= z + lowest * (rise + 0.5 * bend * lowest):
-            is_own = False
-            if side == TOP:
-                family, yarn, centre = float_on_top(field, cell)
-                is_own = family == own_family and yarn == own_yarn and centre == own_centre
+            is_own = side == TOP and float_on_top(field, cell) == own
             enter, exit_ = span_on_top(field, cell, x, y, towards, distance, leave)
             what, s = _ends_in(field, UNDER, x, y, z, towards, distance, enter, cell)
             if what == MISSED and not is_own:

@@ -100,10 +100,11 @@ def has_gaps(field: HeightField) -> bool:
 
 
 @kernel
-def torus_height(yarn: Float64, own: Float64, x: float, y: float) -> tuple[float, float, float]:
-    """Return height and its slopes along local x and y, for a float on top; |x| <= r.
+def float_height(yarn: Float64, own: Float64, side: int, x: float, y: float) -> tuple[float, float, float]:
+    """Return the height of a float and its slopes along local x and y; |x| <= r.
 
-    `yarn` and `own` are the rows of its yarn and its float in a `HeightField`.
+    `yarn` and `own` are the rows of its yarn and its float in a `HeightField`. On the yarn beneath (`side` UNDER) the
+    bend is reversed (u -> -u).
     """
     r, beta, bend = yarn[RADIUS], yarn[BETA], own[BEND_RADIUS]
     sine = min(1.0, abs(x) * yarn[INVERSE_RADIUS])
@@ -111,25 +112,16 @@ def torus_height(yarn: Float64, own: Float64, x: float, y: float) -> tuple[float
     steepness = math.copysign(sine, x) / max(cosine, _EDGE)
     if bend == 0.0:
         return beta * r * cosine, -beta * steepness, 0.0
-    rho, half = r * cosine, own[HALF_LENGTH]
-    root = math.sqrt((bend + rho - y) * (bend + rho + y))
-    # The difference root - R cos(u_max), as a quotient without cancellation: small bends keep every digit.
-    rise = 2.0 * bend * rho + rho * rho + (half - y) * (half + y)
-    height = rise / (root + own[AXIS_DROP])
-    inverse = beta / root
-    return beta * height, -(bend + rho) * inverse * steepness, -y * inverse
-
-
-@kernel
-def height_beneath(yarn: Float64, own: Float64, x: float, y: float) -> tuple[float, float, float]:
-    """Return the same for the yarn beneath, its bend reversed (u -> -u)."""
-    r, beta, bend = yarn[RADIUS], yarn[BETA], own[BEND_RADIUS]
-    sine = min(1.0, abs(x) * yarn[INVERSE_RADIUS])
-    cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
-    steepness = math.copysign(sine, x) / max(cosine, _EDGE)
-    if bend == 0.0:
-        return beta * r * cosine, -beta * steepness, 0.0
-    inner, half, drop = bend - r * cosine, own[HALF_LENGTH], own[AXIS_DROP]
+    half, drop = own[HALF_LENGTH], own[AXIS_DROP]
+    if side == TOP:
+        rho = r * cosine
+        root = math.sqrt((bend + rho - y) * (bend + rho + y))
+        # The difference root - R cos(u_max), as a quotient without cancellation: small bends keep every digit.
+        rise = 2.0 * bend * rho + rho * rho + (half - y) * (half + y)
+        height = rise / (root + drop)
+        inverse = beta / root
+        return beta * height, -(bend + rho) * inverse * steepness, -y * inverse
+    inner = bend - r * cosine
     # The inner arc is shorter than the float; past its end the yarn runs on straight at u_max.
     bound = inner * half / bend
     y_arc = min(max(y, -bound), bound)
@@ -170,16 +162,13 @@ def surface_at(
     sin_v = min(1.0, max(-1.0, across * yarn[INVERSE_RADIUS]))
     cos_v = math.sqrt((1.0 - sin_v) * (1.0 + sin_v))
     sin_u = 0.0
-    if side == TOP:
-        height, _, _ = torus_height(yarn, own, across, along)
-        if bend > 0.0:
-            sin_u = along / (bend + radius * cos_v)
-    else:
-        height, _, _ = height_beneath(yarn, own, across, along)
-        if bend > 0.0:
-            bound = own[HALF_LENGTH] / bend
-            sin_u = min(max(-along / (bend - radius * cos_v), -bound), bound)
+    if bend > 0.0 and side == TOP:
+        sin_u = along / (bend + radius * cos_v)
+    elif bend > 0.0:
+        bound = own[HALF_LENGTH] / bend
+        sin_u = min(max(-along / (bend - radius * cos_v), -bound), bound)
     cos_u = math.sqrt((1.0 - sin_u) * (1.0 + sin_u))
+    height, _, _ = float_height(yarn, own, side, across, along)
 
     # Normal and twisted tangent of the cylinder, then the relief's stretch along z.
     sin_t, cos_t, beta = yarn[SIN_TWIST], yarn[COS_TWIST], yarn[BETA]

@@ -49,13 +49,13 @@ def _slope_of_top(
         dx, dy = dy, -dx
 
     a = max(a, _NEAREST)
-    low, slope_x, slope_y = heightfield.torus_height(yarn, own, x + a * dx, y + a * dy)
+    low, slope_x, slope_y = heightfield.float_height(yarn, own, TOP, x + a * dx, y + a * dy)
     rise_a = slope_x * dx + slope_y * dy - curvature * a
     low -= z + 0.5 * curvature * a * a
     fall_a = low - a * rise_a
     if fall_a >= 0.0:
         return max(best, low / a)
-    high, slope_x, slope_y = heightfield.torus_height(yarn, own, x + b * dx, y + b * dy)
+    high, slope_x, slope_y = heightfield.float_height(yarn, own, TOP, x + b * dx, y + b * dy)
     rise_b = slope_x * dx + slope_y * dy - curvature * b
     high -= z + 0.5 * curvature * b * b
     fall_b = high - b * rise_b
@@ -76,7 +76,7 @@ def _slope_of_top(
             share = min(max(fall_a / (fall_a - fall_b), 0.02), 0.98)
         theta = first + (last - first) * share
         s = middle - half * math.cos(theta)
-        height, slope_x, slope_y = heightfield.torus_height(yarn, own, x + s * dx, y + s * dy)
+        height, slope_x, slope_y = heightfield.float_height(yarn, own, TOP, x + s * dx, y + s * dy)
         height -= z + 0.5 * curvature * s * s
         rise = slope_x * dx + slope_y * dy - curvature * s
         best = max(best, height / s)
@@ -114,7 +114,7 @@ def horizon(
     """
     towards = march.level_ray(dx, dy, curvature)
     cell = march.first_cell(x, y, towards)
-    own_family, own_yarn, own_centre = march.float_on_top(field, cell)
+    own = march.float_on_top(field, cell)
     # A ray below the first value meets the base at the cloth's lowest point.
     best = 0.0 if curvature == 0.0 else -math.sqrt(2.0 * curvature * max(z - field.lowest, 0.0))
     distance = 0.0
@@ -128,8 +128,7 @@ def horizon(
         nearest = distance if curvature == 0.0 else min(max(-best / curvature, distance), leave)
         reached = best * nearest + 0.5 * curvature * nearest * nearest
         if field.crown[cell.pick, cell.end] - z > reached and leave > distance:
-            family, yarn, centre = march.float_on_top(field, cell)
-            is_own = side == TOP and family == own_family and yarn == own_yarn and centre == own_centre
+            is_own = side == TOP and march.float_on_top(field, cell) == own
             enter, exit_ = march.span_on_top(field, cell, x, y, towards, distance, leave)
             if enter > distance:
                 best = _slope_of_strip(field, x, y, z, towards, distance, enter, cell, best)

@@ -1,4 +1,4 @@
-"""The endless cloth: positions wrapped into its repeat, rays that march from cell to cell, azimuths of tables."""
+"""The endless cloth: positions wrapped into its repeat, and rays that march from cell to cell."""
 
 from __future__ import annotations
 
@@ -115,10 +115,7 @@ def height_along(
     yarn, own, dx, dy = field.yarn[family], field.floats[cell.pick, cell.end, side], towards.dx, towards.dy
     x, y = x + distance * dx, y + distance * dy
     across, along = heightfield.local_position(family, own[OFFSET], x, y, cell.column, cell.row)
-    if side == TOP:
-        height, slope_x, slope_y = heightfield.torus_height(yarn, own, across, along)
-    else:
-        height, slope_x, slope_y = heightfield.height_beneath(yarn, own, across, along)
+    height, slope_x, slope_y = heightfield.float_height(yarn, own, side, across, along)
     if family == WARP:
         return height, slope_x * dx + slope_y * dy
     return height, slope_x * dy - slope_y * dx
@@ -151,11 +148,3 @@ def span_on_top(
     low, high = span_over(field, family, x, y, towards, start, stop, cell)
     enter = min(low, stop)
     return enter, max(high, enter)
-
-
-@kernel
-def azimuth_rows(x: float, y: float, count: int) -> tuple[int, int, float]:
-    """Return the two of `count` azimuths, even from +x counter-clockwise, around a direction, and its place between."""
-    place = math.atan2(y, x) / (2.0 * math.pi) * count
-    row = math.floor(place)
-    return int(row) % count, int(row + 1) % count, place - row

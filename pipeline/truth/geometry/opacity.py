@@ -31,8 +31,7 @@ from pipeline.truth.geometry.march import Ray, ray, wrap
 from pipeline.truth.geometry.visibility import visible
 from pipeline.truth.monte_carlo import RANDOMISATIONS, place_point
 from pipeline.truth.options import Limits, TruthOptions
-from pipeline.truth.query import STEEPEST_CURVATURE, Queries, validate
-from weaves.errors import BadInput
+from pipeline.truth.query import Queries, validate
 from weaves.fabric import Fabric
 
 _STEP = 1.0 / 256.0  # in yarn spacings, below the fabric plane only, where no concave form helps
@@ -153,31 +152,15 @@ def _opacity_rows(
 
 
 def opacity(
-    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0
+    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0, filled: bool = False
 ) -> tuple[Float32, Float32]:
     """Return the share of a footprint's camera rays that hit any yarn before they leave the boundary, and its error.
 
     Both are float32 (N,); the standard error is 0 only where the answer is known without sampling. Always from `owen`
     points, with shadows; `relative_error` is taken of full opacity. `wi` plays no part; `wo` may have any sign: with
     wo.z <= 0 a ray leaves the boundary where it enters, which is an opacity of 0. Seed, start and errors are as in
-    `pipeline.truth.estimator.estimate`.
+    `pipeline.truth.estimator.estimate`. With `filled` gaps stop rays, too.
     """
-    return _shares(fabric, queries, options, seed, start, filled=False)
-
-
-def coverage(
-    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0
-) -> tuple[Float32, Float32]:
-    """Return the share of a footprint's camera rays that do not leave the boundary again, and its error.
-
-    As `opacity`, from the same rays, but gaps count as filled: it is 1 for flat cloth.
-    """
-    return _shares(fabric, queries, options, seed, start, filled=True)
-
-
-def _shares(
-    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int, filled: bool
-) -> tuple[Float32, Float32]:
     # Viewers at or beyond the horizon are no fault here, so they are lifted above it for the check.
     lifted = queries.wo.copy()
     lifted[:, 2] = np.maximum(np.abs(lifted[:, 2]), np.float32(1e-30))
@@ -186,6 +169,14 @@ def _shares(
     columns = columns_of(queries._replace(wi=lifted))
     mean, error = _opacity_rows(cloth_side(fabric, options), columns, index, options.limits, np.uint64(seed), filled)
     return mean.astype(np.float32), error.astype(np.float32)
+
+
+def coverage(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int) -> tuple[Float32, Float32]:
+    """Return the share of a footprint's camera rays that do not leave the boundary again, and its error.
+
+    As `opacity`, from the same rays, but gaps count as filled: it is 1 for flat cloth.
+    """
+    return opacity(fabric, queries, options, seed, filled=True)
 
 
 @allocating_kernel
@@ -220,15 +211,9 @@ def grazing_cosine(
 
     The ray enters the boundary at (u, v), any place in yarn spacings, from the viewer's `azimuth`, the angle from x in
     radians, and kappa along it is `curvature`, 1/yarn spacings, 0 <= kappa <= 1. All are broadcast; cosines are in
-    [0, 1). BadInput if a value is not finite or a curvature out of range.
+    [0, 1).
     """
     columns = np.broadcast_arrays(*(np.asarray(column, np.float64) for column in (u, v, azimuth, curvature)))
-    for name, column in zip(("u", "v", "azimuth", "curvature"), columns, strict=True):
-        if not np.isfinite(column).all():
-            raise BadInput("queries", name, column[~np.isfinite(column)].flat[0], "must be finite")
-    wrong = (columns[3] < 0) | (columns[3] > STEEPEST_CURVATURE)
-    if wrong.any():
-        raise BadInput("queries", "curvature", float(columns[3][wrong].flat[0]), f"from 0 to {STEEPEST_CURVATURE:g}")
     flat = [np.ascontiguousarray(column).reshape(-1) for column in columns]
     cosines = _grazing_rows(cloth_side(fabric, TruthOptions()).front, *flat)
     return np.asarray(cosines.reshape(columns[0].shape))

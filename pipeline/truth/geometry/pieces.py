@@ -172,12 +172,10 @@ def _sums(field: HeightField, nodes: Float64, weights: Float64) -> tuple[float, 
         for end in range(ends):
             top = int(field.top[pick, end])
             radius = field.yarn[top, RADIUS]
-            h, a = _piece(field, top, TOP, pick, end, -0.5, 0.5, nodes, weights)
-            height, area = height + h, area + a
-            if radius < 0.5:
-                for sign in (-1.0, 1.0):
-                    low, high = min(sign * radius, sign * 0.5), max(sign * radius, sign * 0.5)
-                    h, a = _piece(field, 1 - top, UNDER, pick, end, low, high, nodes, weights)
+            for side, low, high in ((TOP, -0.5, 0.5), (UNDER, -0.5, -radius), (UNDER, radius, 0.5)):
+                if low < high:
+                    family = top if side == TOP else 1 - top
+                    h, a = _piece(field, family, side, pick, end, low, high, nodes, weights)
                     height, area = height + h, area + a
     return height, area
 
@@ -196,10 +194,7 @@ def _piece(
         share = 0.5 * math.pi * weights[i] * radius * math.cos(v) * half
         for k in range(len(nodes)):
             y = middle + half * nodes[k]
-            if side == TOP:
-                h, _, _ = heightfield.torus_height(yarn, own, radius * math.sin(v), y)
-            else:
-                h, _, _ = heightfield.height_beneath(yarn, own, radius * math.sin(v), y)
+            h, _, _ = heightfield.float_height(yarn, own, side, radius * math.sin(v), y)
             height += share * weights[k] * h
             area += share * weights[k]
     return height, area

@@ -123,7 +123,7 @@ def visible(field: HeightField, x: float, y: float, z: float, side: int, towards
     if rise <= 0.0 and (bend <= 0.0 or z - 0.5 * rise * rise / bend <= field.lowest):
         return False
     cell = march.first_cell(x, y, towards)
-    own_family, own_yarn, own_centre = march.float_on_top(field, cell)
+    own = march.float_on_top(field, cell)
     distance = 0.0
     for _ in range(_MAX_CELLS):
         if rise + bend * distance >= 0.0 and _altitude(z, towards, distance) >= field.highest:
@@ -132,8 +132,7 @@ def visible(field: HeightField, x: float, y: float, z: float, side: int, towards
         # A ray is lowest where it enters the cell, unless it still sinks.
         turn = min(max(-rise / bend, distance), leave) if bend > 0.0 else distance
         if field.crown[cell.pick, cell.end] > _altitude(z, towards, turn) and leave > distance:
-            family, yarn, centre = march.float_on_top(field, cell)
-            is_own = side == TOP and family == own_family and yarn == own_yarn and centre == own_centre
+            is_own = side == TOP and march.float_on_top(field, cell) == own
             enter, exit_ = march.span_on_top(field, cell, x, y, towards, distance, leave)
             if exit_ > enter and not is_own and _piece_blocks(field, x, y, z, towards, enter, exit_, cell):
                 return False

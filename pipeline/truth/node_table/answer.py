@@ -25,12 +25,11 @@ from pipeline.truth.geometry.heightfield import BLEND, GAP
 from pipeline.truth.monte_carlo import conceal, query_directions
 from pipeline.truth.node_table import build, kernels
 from pipeline.truth.node_table.build import ExactNodes
-from pipeline.truth.node_table.displaced import DensityRoom, density_room, fill_displaced
 from pipeline.truth.node_table.doubts import doubtful_from
 from pipeline.truth.node_table.kernels import HorizonSlopes, NodeDirections, NodeShares, Normals, Tangents
 from pipeline.truth.node_table.refine import UNSEEN, Refinement, RefineRoom, refine, refine_room
 from pipeline.truth.node_table.seen_walls import WallRoom, sum_walls, wall_room
-from pipeline.truth.node_table.weights import WeightRoom, any_weight, fill_weights, weight_room
+from pipeline.truth.node_table.weights import WeightRoom, any_weight, fill_displaced, fill_weights, weight_room
 
 UNDECIDED: Final = 0.3
 """Error by nodes whose horizons disagree, relative to the components of the patch and to the share of the nodes."""
@@ -60,7 +59,6 @@ class _Work(NamedTuple):
     own: NodeShares
     everywhere: NodeShares
     weights: WeightRoom
-    density: DensityRoom
     walls: WallRoom
     moved: Float64
     mean: Float64
@@ -77,12 +75,10 @@ def sum_rows(
     another, and there is light from behind only if the table has horizons there.
     """
     nodes = table.normal.shape[1]
-    own, sums = kernels.no_shares(nodes), np.zeros((3, 5))
-    shares = own, own._replace(weight=table.evenly)
-    weights, density, walls = weight_room(table, line), density_room(table, line), wall_room(table)
-    moved, mean, error = sums
-    rest = refine_room(nodes)
-    work = _Work(cloth, table, requested, line, *shares, weights, density, walls, moved, mean, error, rest)
+    own = kernels.no_shares(nodes)
+    shares, rooms = (own, own._replace(weight=table.evenly)), (weight_room(table, line), wall_room(table))
+    moved, mean, error = np.zeros((3, 5))
+    work = _Work(cloth, table, requested, line, *shares, *rooms, moved, mean, error, refine_room(nodes))
     answers = Raw.empty(len(columns.u))
     _answer_rows(work, columns, index, np.uint64(seed), answers)
     return answers
@@ -95,7 +91,7 @@ def _answer_rows(work: _Work, columns: WideQueries, index: Index, seed: np.uint6
         even = cloth.shape == GAUSSIAN and min(columns.sigma[row], columns.sigma_minor[row]) >= table.uniform
         points = 0
         if not even and cloth.parallax:
-            points = fill_displaced(table, cloth.plane, columns, row, line, work.density, work.own.weight)
+            points = fill_displaced(table, cloth.plane, columns, row, line, work.weights, work.own.weight)
         elif not even:
             fill_weights(table, cloth.shape, columns, row, line, work.weights, work.own.weight)
         shares = work.everywhere if even else work.own
@@ -116,7 +112,7 @@ def _answer_row(
     area, area_error, moved_area, undecided, nodes = sum_pieces(cloth, table, towards, shares, mean, moved, error)
     answers.count[row] += nodes
     if cloth.choices.rims:
-        of_walls, doubt = sum_walls(cloth, table, towards, points, work.density, work.walls, mean, error)
+        of_walls, doubt = sum_walls(cloth, table, towards, points, work.weights, work.walls, mean, error)
         area, area_error = area + of_walls, area_error + doubt
     cosine = columns.wo[row, 2]
     if area <= 0.0:
@@ -166,21 +162,16 @@ def _squared_error(mean: Float64, error: Float64, factors: Factors) -> float:
 
 @kernel
 def sum_pieces(
-    cloth: ClothSide,
-    table: ExactNodes,
-    towards: NodeDirections,
-    shares: NodeShares,
-    sums: Float64,
-    moved: Float64,
+    cloth: ClothSide, table: ExactNodes, towards: NodeDirections, shares: NodeShares, sums: Float64, moved: Float64,
     squares: Float64,
-) -> tuple[float, float, float, float, int]:
+) -> tuple[float, float, float, float, int]:  # fmt: skip
     """Write the sums over all nodes, their changes by borders, and their squared errors.
 
     Returns the denominator, its squared error, its change by borders, the share of undecided nodes in it, and the
     number of nodes visited.
     """
     area, area_error, moved_area, undecided = np.float64(0.0), np.float64(0.0), np.float64(0.0), np.float64(0.0)
-    nodes, viewer, fine = 0, towards.viewer, table.fine
+    nodes, viewer, n, fine = 0, towards.viewer, table.normal, table.fine
     moved[:] = 0.0
     for p in range(len(table.pieces)):
         piece = table.pieces[p]
@@ -191,21 +182,11 @@ def sum_pieces(
             continue
         nodes += count
         own = NodeShares(
-            shares.weight[start:stop],
-            shares.lit[start:stop],
-            shares.areas[start:stop],
-            shares.diffuses[start:stop],
-            shares.speculars[start:stop],
-            shares.margins[start:stop],
-            shares.lit_margins[start:stop],
+            shares.weight[start:stop], shares.lit[start:stop], shares.areas[start:stop], shares.diffuses[start:stop],
+            shares.speculars[start:stop], shares.margins[start:stop], shares.lit_margins[start:stop],
             shares.undecided[start:stop],
-        )
-        normal = Normals(
-            table.normal[0, start:stop],
-            table.normal[1, start:stop],
-            table.normal[2, start:stop],
-            table.normal[3, start:stop],
-        )
+        )  # fmt: skip
+        normal = Normals(n[0, start:stop], n[1, start:stop], n[2, start:stop], n[3, start:stop])
         # The straight way through a gap must clear both sides of the cloth, so a gap is lit by its own ray.
         light = towards.through if family == GAP else towards.light
         slope = table.slope_behind if family == GAP or towards.behind else table.slope
@@ -243,9 +224,9 @@ def sum_pieces(
         if family == GAP:
             moved[4] += a1
             squares[4] += a2
-        else:
-            moved[family] += s1
-            moved[2 + family] += c1 / math.pi
-            squares[family] += s2
-            squares[2 + family] += c2 / (math.pi * math.pi)
+            continue
+        moved[family] += s1
+        moved[2 + family] += c1 / math.pi
+        squares[family] += s2
+        squares[2 + family] += c2 / (math.pi * math.pi)
     return area, area_error, moved_area, undecided, nodes

@@ -73,7 +73,7 @@ def tabulate(
             rows.append((start, columns, lines, kind_x, kind_y, family, fine_start, finer[0] * finer[1]))
             copies.append([(e, p) for p, e in orbit])
             grids.append((end, pick, family, x_edges, y_edges))
-            at.append(_positions(front, grids[-1], finer))
+            at.append((*_positions(front, grids[-1], (1, 1)), *_positions(front, grids[-1], finer)))
             areas.append(np.outer(np.diff(y_edges), np.diff(x_edges)).ravel() * len(orbit))
             start += columns * lines
             fine_start += columns * lines * finer[0] * finer[1]
@@ -142,11 +142,12 @@ def _finer(field: HeightField, family: int, pick: int, end: int, columns: int, l
     return (counts[0], counts[1]) if family == WARP else (counts[1], counts[0])
 
 
-def _positions(field: HeightField, grid: Grid, finer: tuple[int, int]) -> tuple[Float64, Float64, Float64, Float64]:
-    """Return x and y of the nodes of a piece, row by row, and of its finer nodes, place by place."""
+def _positions(field: HeightField, grid: Grid, counts: tuple[int, int]) -> tuple[Float64, Float64]:
+    """Return x and y of so many even places along x and y in each node of a piece, place by place, row by row."""
     end, pick, family, x_edges, y_edges = grid
+    radius = 0.0 if family == GAP else float(field.yarn[family, RADIUS])
 
-    def middles(edges: Edges, count: int, bent: bool, radius: float) -> Float64:
+    def middles(edges: Edges, count: int, bent: bool) -> Float64:
         # (count, nodes): within each node, `count` evenly spaced places; evenly in v across a yarn.
         places = np.array(edges)
         borders = np.arcsin(np.clip((places - 0.5) / radius, -1.0, 1.0)) if bent else places
@@ -154,16 +155,9 @@ def _positions(field: HeightField, grid: Grid, finer: tuple[int, int]) -> tuple[
         at = borders[:-1] + share * np.diff(borders)
         return 0.5 + radius * np.sin(at) if bent else at
 
-    radius = 0.0 if family == GAP else float(field.yarn[family, RADIUS])
-    bent = (family == WARP, family not in (WARP, GAP))
-    places = []
-    for counts in ((1, 1), finer):
-        xs = end + middles(x_edges, counts[0], bent[0], radius)
-        ys = pick + middles(y_edges, counts[1], bent[1], radius)
-        shape = (counts[1], counts[0], ys.shape[1], xs.shape[1])
-        places.append(np.broadcast_to(xs[None, :, None, :], shape).ravel())
-        places.append(np.broadcast_to(ys[:, None, :, None], shape).ravel())
-    return places[0], places[1], places[2], places[3]
+    xs, ys = end + middles(x_edges, counts[0], family == WARP), pick + middles(y_edges, counts[1], family == WEFT)
+    shape = (counts[1], counts[0], ys.shape[1], xs.shape[1])
+    return np.broadcast_to(xs[None, :, None, :], shape).ravel(), np.broadcast_to(ys[:, None, :, None], shape).ravel()
 
 
 @allocating_kernel

@@ -14,7 +14,6 @@ import numpy as np
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
 from pipeline.truth.geometry.heightfield import ALPHA, HeightField
-from pipeline.truth.geometry.march import azimuth_rows
 from pipeline.truth.scattering.slab_float32 import reflection, transmission, unscattered
 
 _STEEPEST = 1e4
@@ -64,8 +63,10 @@ def node_directions(wi: Float64, wo: Float64, azimuths: int) -> NodeDirections:
 @kernel
 def _direction(x: float, y: float, z: float, sign: float, azimuths: int) -> Direction:
     """Return `sign` times a direction, with the slope and the azimuths of the direction itself."""
-    first, second, turn = azimuth_rows(x, y, azimuths)
-    slope = min(abs(z) / max(math.sqrt(x * x + y * y), 1e-9), _STEEPEST)
+    place = math.atan2(y, x) / (2.0 * math.pi) * azimuths
+    row = math.floor(place)
+    first, second = int(row) % azimuths, int(row + 1) % azimuths
+    slope, turn = min(abs(z) / max(math.sqrt(x * x + y * y), 1e-9), _STEEPEST), place - row
     x, y, z = sign * x, sign * y, sign * z
     return Direction(np.float32(x), np.float32(y), np.float32(z), np.float32(slope), first, second, np.float32(turn))
 
@@ -139,14 +140,9 @@ def flake_layer(field: HeightField, family: int, places: int) -> FlakeLayer:
 
 @fast_kernel
 def weigh(
-    normal: Normals,
-    light: Direction,
-    light_horizon: HorizonSlopes,
-    viewer: Direction,
-    viewer_horizon: HorizonSlopes,
-    blend: np.float32,
-    shares: NodeShares,
-) -> tuple[np.float32, np.float32]:
+    normal: Normals, light: Direction, light_horizon: HorizonSlopes, viewer: Direction, viewer_horizon: HorizonSlopes,
+    blend: np.float32, shares: NodeShares,
+) -> tuple[np.float32, np.float32]:  # fmt: skip
     """Write which nodes are lit, their shares of area and diffuse, and their margins; return the sums of both shares.
 
     The margins say by how much the viewer, and viewer and light, clear the horizon: negative where they do not. A node
@@ -247,16 +243,9 @@ def _sigma(x: np.float32, y: np.float32, z: np.float32, along: np.float32, squar
 
 @fast_kernel
 def scattered(
-    normal: Normals,
-    tangent: Tangents,
-    light: Direction,
-    viewer: Direction,
-    size: np.float32,
-    layer: FlakeLayer,
-    lit: Float32,
-    speculars: Float32,
-    behind: Literal[True] | None,
-) -> np.float32:
+    normal: Normals, tangent: Tangents, light: Direction, viewer: Direction, size: np.float32, layer: FlakeLayer,
+    lit: Float32, speculars: Float32, behind: Literal[True] | None,
+) -> np.float32:  # fmt: skip
     """Add each node's share of the specular component to `speculars`; return the sum.
 
     `size` is 1 / |wi + wo|^2. Light from `behind`, of which `light` is the opposite, -wi, is transmitted, other light

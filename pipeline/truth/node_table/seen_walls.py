@@ -13,9 +13,9 @@ from pipeline.truth.cloth import ClothSide
 from pipeline.truth.geometry.heightfield import BLEND, RADIUS, WARP, WEFT
 from pipeline.truth.node_table import kernels
 from pipeline.truth.node_table.build import ExactNodes
-from pipeline.truth.node_table.displaced import DensityRoom, read_density
 from pipeline.truth.node_table.kernels import Direction, HorizonSlopes, NodeDirections, Normals, Tangents
 from pipeline.truth.node_table.walls import HEIGHTS, WallNodes
+from pipeline.truth.node_table.weights import WeightRoom, read_density
 
 _DOUBT: Final = 0.04  # error of what walls show, relative to it
 _GRAZING = np.float32(1e-5)
@@ -46,7 +46,7 @@ def wall_room(table: ExactNodes) -> WallRoom:
 
 @kernel
 def sum_walls(
-    cloth: ClothSide, table: ExactNodes, towards: NodeDirections, points: int, density: DensityRoom, room: WallRoom,
+    cloth: ClothSide, table: ExactNodes, towards: NodeDirections, points: int, density: WeightRoom, room: WallRoom,
     sums: Float64, squares: Float64,
 ) -> tuple[float, float]:  # fmt: skip
     """Add the shares of all walls to the sums, and their squared errors; return those of the denominator.

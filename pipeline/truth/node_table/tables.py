@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float64, Index, Mask
+from pipeline.compiled.arrays import Index, Mask
 from pipeline.truth import options
 from pipeline.truth.calibration import BEHIND_FACTORS, COARSE_TABLE, FINE_TABLE, FRONT_FACTORS, REFINED
 from pipeline.truth.cloth import ClothSide, Raw, WideQueries
@@ -57,9 +57,8 @@ class NodeTable:
     """
 
     def __init__(
-        self, nodes: Callable[[int], int], azimuths: int, line: Line, stage: int = FINE_TABLE,
-        rays_resolved: float = 0.0,
-    ) -> None:  # fmt: skip
+        self, nodes: Callable[[int], int], azimuths: int, line: Line, stage: int = FINE_TABLE, rays_resolved: float = 0
+    ) -> None:
         self._nodes, self._azimuths, self._line, self._stage = nodes, azimuths, line, stage
         self._rays_resolved = rays_resolved
         # The height field is kept beside its table: an identity is another object's once its own is gone.
@@ -77,7 +76,9 @@ class NodeTable:
         known = (narrow >= options.TABLE_SIGMA) & (columns.curvature == 0.0)
         if cloth.parallax:
             resolved = max(self._rays_resolved, options.RAYS_RESOLVED["rim" if cloth.choices.rims else "left_out"])
-            known &= narrow >= resolved * self.seen_distance(cloth, columns)
+            steepest = max(options.steepness(yarn[BETA], 2.0 * yarn[RADIUS], yarn[BEND]) for yarn in cloth.front.yarn)
+            nodes = self._nodes(different_cells(cloth.front))
+            known &= narrow >= resolved * options.seen_distance(steepest, columns.wo[:, 2], nodes)
         axial = columns.angle == 0.0
         if cloth.shape == GAUSSIAN:
             axial |= columns.sigma == columns.sigma_minor
@@ -86,11 +87,6 @@ class NodeTable:
             blurred = np.sqrt(1.0 - correlation) * np.minimum(x, y) >= options.TABLE_SIGMA
             known &= axial | (blurred & (correlation <= self._line.most) & (cloth.shape == GAUSSIAN))
         return np.asarray(known)
-
-    def seen_distance(self, cloth: ClothSide, columns: WideQueries) -> Float64:
-        """Return the largest distance of neighbouring nodes as the viewers see them, in yarn spacings, (N,)."""
-        steepest = max(options.steepness(yarn[BETA], 2.0 * yarn[RADIUS], yarn[BEND]) for yarn in cloth.front.yarn)
-        return options.seen_distance(steepest, columns.wo[:, 2], self._nodes(different_cells(cloth.front)))
 
     def answer(
         self, cloth: ClothSide, columns: WideQueries, index: Index, relative: float, absolute: float, seed: int

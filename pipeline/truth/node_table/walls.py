@@ -56,12 +56,9 @@ class WallNodes(NamedTuple):
 
 def no_walls() -> WallNodes:
     """Return the walls of a table without any."""
-
-    def none(*rows: int) -> Float32:
-        return np.zeros((*rows, 0), np.float32)
-
-    points = none(0, HEIGHTS), none(0, HEIGHTS)
-    return WallNodes((0,) * 5, none(3), none(), none(2), none(4), none(3), none(), *points, none(0), none(0))
+    points = (0, HEIGHTS, 0)
+    shapes = (3, 0), (0,), (2, 0), (4, 0), (3, 0), (0,), points, points, (0, 0), (0, 0)
+    return WallNodes((0,) * 5, *(np.zeros(shape, np.float32) for shape in shapes))
 
 
 def wall_nodes(

@@ -129,26 +129,16 @@ def _all_parts(patch: rules.QueryPatch, pieces: Float64, across: Float64, along:
 
 @kernel
 def _estimate_errors(
-    cosine: float,
-    parts: Float64,
-    levels: Index,
-    sums: Float64,
-    changes: Float64,
-    earlier: Float64,
-    mean: Float64,
-    error: Float64,
-    badness: Float64,
-) -> tuple[float, float]:
+    cosine: float, parts: Float64, levels: Index, sums: Float64, changes: Float64, earlier: Float64, mean: Float64,
+    error: Float64, badness: Float64,
+) -> tuple[float, float]:  # fmt: skip
     """Write means, errors and each part's squared error; return the worst, and the squared size of the means.
 
     What both rules of a part may have stepped over is added to its change: highlights, and, where `cosine` (the
     viewer's, 0 without shadows) says so, slivers that are seen or lit.
     """
-    area, worst = 0.0, 0.0
-    badness[:] = 0.0
-    for p in range(len(sums)):
-        area += sums[p, AREA_SUM]
-    mean[:], error[:] = 0.0, 0.0
+    area, worst = sums[:, AREA_SUM].sum(), 0.0
+    mean[:], error[:], badness[:] = 0.0, 0.0, 0.0
     if area <= 0.0:
         return 0.0, 0.0
     for c in range(AREA_SUM):

@@ -171,10 +171,8 @@ def _cut(axis: Axis, lean: Lean, low: float, high: float, pieces: Float64) -> in
 @kernel
 def _mass(axis: Axis, lean: Lean, low: float, high: float) -> float:
     """Return the integral of `density`, over heights that of a wider kernel, by Simpson's rule: 4 % off at worst."""
-    wider = Axis(axis.shape, axis.centre + 0.5 * (lean.least + lean.most), axis.sigma, axis.repeat)
-    if lean.most > lean.least:
-        wider = Axis(axis.shape, wider.centre, axis.sigma + 0.25 * (lean.most - lean.least), axis.repeat)
-    middle = 0.5 * (low + high)
+    centre, sigma = axis.centre + 0.5 * (lean.least + lean.most), axis.sigma + 0.25 * (lean.most - lean.least)
+    wider, middle = Axis(axis.shape, centre, sigma, axis.repeat), 0.5 * (low + high)
     return (high - low) / 6.0 * (density(wider, low) + 4.0 * density(wider, middle) + density(wider, high))
 
 

@@ -21,14 +21,9 @@ _GRAZING = np.float32(1e-6)  # least cosine in an optical depth
 
 @inlined_fast_kernel
 def reflection(
-    flakes: np.float32,
-    spread: np.float32,
-    sigma_i: np.float32,
-    sigma_o: np.float32,
-    cos_i: np.float32,
-    cos_o: np.float32,
-    thickness: np.float32,
-) -> np.float32:
+    flakes: np.float32, spread: np.float32, sigma_i: np.float32, sigma_o: np.float32, cos_i: np.float32,
+    cos_o: np.float32, thickness: np.float32,
+) -> np.float32:  # fmt: skip
     """Return f_r cos_i cos_o for unit k_s, in 1/sr; 0 where a cosine, >= 0, is 0.
 
     `flakes` and `spread` are numerator and denominator of a quarter of the flake density at the half vector.
@@ -43,14 +38,9 @@ def reflection(
 
 @inlined_fast_kernel
 def transmission(
-    flakes: np.float32,
-    spread: np.float32,
-    sigma_i: np.float32,
-    sigma_o: np.float32,
-    cos_i: np.float32,
-    cos_o: np.float32,
-    thickness: np.float32,
-) -> np.float32:
+    flakes: np.float32, spread: np.float32, sigma_i: np.float32, sigma_o: np.float32, cos_i: np.float32,
+    cos_o: np.float32, thickness: np.float32,
+) -> np.float32:  # fmt: skip
     """Return f_t cos_i cos_o for unit k_s, in 1/sr; parameters as `reflection`, with the moduli of the cosines."""
     lambda_i, lambda_o = sigma_i / max(cos_i, _GRAZING), sigma_o / max(cos_o, _GRAZING)
     apart = max(thickness * abs(lambda_i - lambda_o), _ALIKE)

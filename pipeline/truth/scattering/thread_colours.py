@@ -23,11 +23,9 @@ from pipeline.truth.cloth import ClothSide, WideQueries, cloth_side, columns_of
 from pipeline.truth.footprint.sequences import derive, owen_pair
 from pipeline.truth.geometry.heightfield import GAP, WARP
 from pipeline.truth.geometry.march import wrap
-from pipeline.truth.monte_carlo import RANDOMISATIONS, place_in, query_directions
+from pipeline.truth.monte_carlo import RANDOMISATIONS, place_in, query_directions, share_at
 from pipeline.truth.options import Limits, TruthOptions
 from pipeline.truth.query import Queries, validate
-from pipeline.truth.scattering.point import point_share, ray_share
-from weaves.colour_order import ThreadColours
 from weaves.fabric import Fabric
 
 
@@ -51,13 +49,11 @@ class ThreadTable(NamedTuple):
 
 def threads_of(fabric: Fabric, transmitted: bool) -> ThreadTable:
     """Return the colours of a fabric's threads; those of the diffuse components for light from one side or both."""
-
-    def stacked(colours: ThreadColours) -> Float64:
-        diffuse = colours.diffuse_transmission if transmitted else colours.diffuse
-        return np.ascontiguousarray(np.stack([colours.specular, diffuse], axis=1))
-
-    warp, weft = fabric.thread_colours()
-    return ThreadTable(stacked(warp), stacked(weft), *fabric.repeat)
+    warp, weft = (
+        np.stack([threads.specular, threads.diffuse_transmission if transmitted else threads.diffuse], axis=1)
+        for threads in fabric.thread_colours()
+    )
+    return ThreadTable(warp, weft, *fabric.repeat)
 
 
 def component_colours(
@@ -114,31 +110,19 @@ def _sample_colours(
 
 @kernel
 def _add_points(
-    cloth: ClothSide,
-    columns: WideQueries,
-    row: int,
-    threads: ThreadTable,
-    randomisation: np.uint64,
-    first: int,
-    last: int,
-    plain: Float64,
-    coloured: Float64,
-    area: Float64,
-) -> None:
+    cloth: ClothSide, columns: WideQueries, row: int, threads: ThreadTable, randomisation: np.uint64, first: int,
+    last: int, plain: Float64, coloured: Float64, area: Float64,
+) -> None:  # fmt: skip
     """Add the points from `first` to `last` of a randomisation to its sums; area[0] is the denominator."""
     directions = query_directions(columns, row)
     picks, ends = cloth.front.top.shape
     for k in range(first, last):
         a, b = owen_pair(randomisation, k)
         x, y, weight = place_in(float(threads.ends), float(threads.picks), columns, row, cloth.shape, a, b)
-        own_x, own_y, front, back = wrap(x, float(ends)), wrap(y, float(picks)), cloth.front, cloth.back
-        if cloth.parallax:
-            family, seen, specular, diffuse, _, moved_x, moved_y = ray_share(
-                front, back, cloth.plane, own_x, own_y, directions, cloth.choices
-            )
-            x, y = wrap(x + moved_x, float(threads.ends)), wrap(y + moved_y, float(threads.picks))
-        else:
-            family, seen, specular, diffuse, _ = point_share(front, back, own_x, own_y, directions, cloth.choices)
+        family, seen, specular, diffuse, _, moved_x, moved_y = share_at(
+            cloth, wrap(x, float(ends)), wrap(y, float(picks)), directions
+        )
+        x, y = wrap(x + moved_x, float(threads.ends)), wrap(y + moved_y, float(threads.picks))
         area[0] += weight * seen
         if family == GAP:
             continue

@@ -40,7 +40,7 @@ def soft_nodes_behind(fabric, queries, rims=True):
 
 def points(fabric, queries, count=256, rims=True):
     options = TruthOptions(walls="rim" if rims else "left_out")
-    return exact_points.sample_points(cloth_side(fabric, options), queries, count, 3, True)
+    return exact_points.sample_points(cloth_side(fabric, options), queries, count, 3, True)[:, :4]
 
 
 def averaged_normals(fabric, queries):

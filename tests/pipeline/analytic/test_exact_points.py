@@ -2,7 +2,7 @@ import itertools
 
 import numpy as np
 
-from pipeline.analytic.exact_points import sample_points, sample_transparency
+from pipeline.analytic.exact_points import sample_points
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
@@ -19,7 +19,7 @@ def test_points_err_by_their_order():
     queries = drawn(fabric, 11, 200, sigma=(0.3, 1.0), max_angle=60.0)
     truth, cloth = truth_of(fabric, queries, relative_error=0.005), cloth_side(fabric, TruthOptions())
     errors = [
-        [[colour_error(sample_points(cloth, queries, n, seed, r2), truth) for n in counts] for seed in range(4)]
+        [[colour_error(sample_points(cloth, queries, n, k, r2)[:, :4], truth) for n in counts] for k in range(4)]
         for r2 in (False, True)
     ]
     independent, r2 = np.sqrt(np.mean(np.square(errors), axis=1))
@@ -33,8 +33,8 @@ def test_transparency_converges_to_the_truth_and_extremes_stay_finite():
     exact = estimate(fabric, looks, fixed(1 << 17), 1).transparency
     cloth = cloth_side(fabric, TruthOptions())
     assert 0.05 < exact[0] < 0.95
-    np.testing.assert_allclose(sample_transparency(cloth, looks, 400_000, 1), exact, rtol=0.02)
-    assert sample_transparency(cloth, looks, 4, 1) != sample_transparency(cloth, looks, 4, 2)
+    np.testing.assert_allclose(sample_points(cloth, looks, 400_000, 1)[:, 4], exact, rtol=0.02)
+    assert sample_points(cloth, looks, 4, 1)[0, 4] != sample_points(cloth, looks, 4, 2)[0, 4]
     for sigma, theta, roughness in itertools.product((1e-4, 1e4), (0.0, 89.9), (0.01, 1.0)):
         cloth = cloth_side(woven("silk_charmeuse", roughness=roughness), TruthOptions())
         for other in (0.0, 89.9):

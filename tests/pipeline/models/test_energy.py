@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.exact_points import sample_points, sample_transparency
+from pipeline.analytic.exact_points import sample_points
 from pipeline.analytic.soft_nodes import nodes
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.models.bounded import Bounded
@@ -89,8 +89,8 @@ def truth(fabric, queries):
 
 def points(fabric, queries):
     cloth = cloth_side(fabric, TruthOptions())
-    through = sample_transparency(cloth, queries, 16, 3, True)
-    return sample_points(cloth, queries, 16, 3, True), float(through.mean())
+    found = sample_points(cloth, queries, 16, 3, True)
+    return found[:, :4], float(found[:, 4].mean())
 
 
 def soft_nodes(fabric, queries):

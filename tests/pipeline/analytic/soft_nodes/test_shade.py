@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.analytic.soft_nodes.answer import sum_queries
+from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, OPEN_DIFFUSE, OPEN_SPECULAR
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, WARP
+from pipeline.truth.query import Queries
 from pipeline.truth.scattering import slab
 from tests.directions import above
 from tests.pipeline.truth.cloths import woven
@@ -44,8 +45,7 @@ def test_fixed_nodes(table, pair):
     cosines = np.maximum((towards * nodes[:3]).sum(axis=0), 0.05)
     whole = np.divide(cosines, nodes[2], out=np.zeros_like(cosines), where=nodes[2] > 0.0)
     table = table._replace(areas=np.broadcast_to(whole, table.areas.shape).copy())
-    wide = tuple(np.array([x], np.float32) for x in (0.3, 0.7, 1e3, 1e3, 0.0))
-    found, _ = sum_queries(table, wide, wi[None], wo[None], np.zeros(1, np.float32))
+    found, _ = query_sums(table, Queries.round([0.3], [0.7], [1e3], wi[None], wo[None]))
     for family in (0, 1):
         blocks = slice(table.starts[family], table.starts[family + 1])
         nodes = table.nodes[blocks].transpose(1, 0, 2).reshape(13, -1).astype(np.float64)

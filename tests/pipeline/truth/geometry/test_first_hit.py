@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, ON_YARN, first_hit, next_hit, sinking
+from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, ON_YARN, first_hit, sinking
 from pipeline.truth.geometry.heightfield import GAP, height_field, surface_at
 from pipeline.truth.geometry.march import ray
 from pipeline.truth.geometry.pieces import reference_plane
@@ -67,7 +67,7 @@ def test_rays_from_yarn_to_yarn_are_those_of_a_march(fabric):
         if family == GAP or abs(w[2]) > 0.999 or w @ (nx, ny, nz) < 0.02:
             continue
         towards = ray(*w, 0.0)
-        hit = next_hit(field, x, y, z, side, towards)
+        hit = first_hit(field, x, y, z, towards, side)
         s = STEP * np.arange(1, 4000)
         altitude = z + s * towards.rise
         within = (altitude > field.lowest) & (altitude < field.highest)

@@ -9,9 +9,9 @@ from pipeline.truth.cloth import cloth_side
 from pipeline.truth.footprint.mixture import FINE_LINE
 from pipeline.truth.node_table.answer import sum_pieces
 from pipeline.truth.node_table.build import tabulate
-from pipeline.truth.node_table.displaced import density_room
 from pipeline.truth.node_table.kernels import no_shares, node_directions
 from pipeline.truth.node_table.seen_walls import sum_walls, wall_room
+from pipeline.truth.node_table.weights import weight_room
 from pipeline.truth.options import TruthOptions
 from tests.directions import unit
 from tests.pipeline.truth.cloths import cylinders, woven
@@ -39,7 +39,7 @@ def test_areas_of_nodes_and_walls_sum_to_the_cosine(cloth):
     """Every ray meets a yarn, a wall or a gap, but one in a hundred: rims turned away, and what the back hides."""
     cloth, table = _table(woven(cloth) if isinstance(cloth, str) else cloth)
     even, sums = no_shares(len(table.evenly))._replace(weight=table.evenly), np.zeros((3, 5))
-    rooms, of_walls = (density_room(table, FINE_LINE), wall_room(table)), []
+    rooms, of_walls = (weight_room(table, FINE_LINE), wall_room(table)), []
     for degrees, azimuth in ((20.0, 10.0), (50.0, 100.0), (70.0, 215.0), (80.0, 300.0)):
         wo = unit(degrees, azimuth)
         towards = node_directions(unit(30.0, 50.0), wo, len(table.slope))
