@@ -29,13 +29,11 @@ from pipeline.models.registry import build_network
 from pipeline.shards.generate import set_name
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
-from pipeline.training.dataset import TARGET, Batches, Order, load_rows
+from pipeline.training.dataset import TARGET, Batches, Order, TrainingRows
 from pipeline.training.options import TrainingOptions
 from pipeline.training.validation import HeldOut
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
-
-ROWS = "rows.npy"
 
 _START_ROWS = 65_536  # rows whose mean the last bias starts at
 _WATCH = 2**40  # a step that no training has: it names the random numbers of the held-out loss
@@ -66,7 +64,7 @@ def train(
     card = _card(options, training, manifest, members)
     identity = fingerprint(card)  # of everything that shapes the weights
     with _reproducible(training.threads, device):
-        rows = load_rows(manifest, manifest_folder, fabrics, folder / f"{identity}-{ROWS}")
+        rows = TrainingRows(manifest, manifest_folder, fabrics, device)
         order = Order(rows.windows, training.batch, training.fabrics, training.seed)
         batches = Batches(rows, order, device)
 
@@ -75,7 +73,7 @@ def train(
         sets = [set_name(rows) for rows in options.extra_rows]
         extra = ([manifest.columns(manifest_folder, name, own) for name in fabrics] for own in sets)
         network = build_network(options, members, extra)
-        network.start_at(torch.from_numpy(rows.spread(_START_ROWS)[:, TARGET].copy()))
+        network.start_at(rows.spread(_START_ROWS)[:, TARGET].cpu().contiguous())
         network.to(device).train()
         groups = network.parameter_groups(training.learning_rate)
         optimiser = torch.optim.AdamW(groups, weight_decay=training.weight_decay, fused=True)
@@ -131,7 +129,6 @@ def train(
     metadata = {"twillight": json.dumps({"model": card["model"], "name": card["name"], "identity": identity})}
     write_model(folder, safetensors.torch.save(weights, metadata=metadata), card)
     (folder / CHECKPOINT).unlink(missing_ok=True)
-    (folder / f"{identity}-{ROWS}").unlink(missing_ok=True)
     progress(1.0)
 
 

@@ -74,14 +74,13 @@ def read(folder: Path) -> None:
     import torch
 
     from pipeline.shards.manifest import Manifest
-    from pipeline.training.dataset import Batches, Order, load_rows
+    from pipeline.training.dataset import Batches, Order, TrainingRows
 
     fabrics = list(Manifest.load(folder).fabrics)  # imports what it needs
     for first, last in ((0, 1), (1, 1001)):
         wall, cpu = time.perf_counter(), time.process_time()
         if first == 0:
-            with tempfile.TemporaryDirectory() as cache:
-                rows = load_rows(Manifest.load(folder), folder, fabrics, Path(cache) / "rows.npy")
+            rows = TrainingRows(Manifest.load(folder), folder, fabrics, torch.device("cpu"))
             rows.spread(2**16)
             batches = Batches(rows, Order(rows.windows, 8192, len(fabrics), 0), torch.device("cpu"))
         for step in range(first, last):
