@@ -49,7 +49,7 @@ _ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
 
 
 class TrainingRows:
-    """The training rows of fabrics, whose order of names numbers them; those that are kept are on a `device`.
+    """The training rows of fabrics, whose order of names numbers them, in batches on a `device`.
 
     `windows` are the numbers of rows that are read together, of each fabric: all of them, if there are no more than
     `MOST_IN_TABLE`. A GPU keeps rows of less than half of its free memory.
@@ -58,7 +58,7 @@ class TrainingRows:
     def __init__(self, manifest: Manifest, folder: Path, fabrics: Sequence[str], device: torch.device) -> None:
         shards = manifest.by_fabric(folder, fabrics, "train").values()
         total = sum(shard.rows for own in shards for shard in own)
-        self._whole = total <= MOST_IN_TABLE
+        self._device, self._whole = device, total <= MOST_IN_TABLE
         groups = min(max(MOST_IN_TABLE // (ROW_GROUP * len(shards)), 1), _MOST_GROUPS)
         rows = total if self._whole else groups * ROW_GROUP
         self._pieces = [_windows(folder, own, rows) for own in shards]
@@ -76,6 +76,15 @@ class TrainingRows:
             first = ends[window] - self.windows[fabric][window]
             taken.append(self._window(fabric, window)[torch.from_numpy(own - first).to(self._kept_on)])
         return torch.stack(taken)
+
+    def batch(self, fabrics: Index, rows: Index) -> Batch:
+        """Return a step's rows, as those of `take`, as tensors on the device."""
+        table = self.take(fabrics, rows).to(self._device)
+        u, v, sigma = table[..., :3].unbind(dim=-1)
+        minor, angle, curvature = table[..., 9:12].unbind(dim=-1)
+        wi, wo, target = table[..., 3:6], table[..., 6:9], table[..., TARGET]
+        fabric = torch.from_numpy(fabrics).to(self._device)
+        return Batch(fabric, u, v, sigma, wi, wo, minor, angle, curvature, target, table[..., -1])
 
     def spread(self, most: int) -> Tensor:
         """Return about so many rows, evenly spaced; of rows in windows the first ones of some fabrics."""
@@ -137,7 +146,8 @@ class Order:
         self.fabrics = min(fabrics, len(self._windows), batch)
         self.each = batch // self.fabrics
         self._seed = seed
-        self._last: dict[int, tuple[tuple[int, ...], Index]] = {}  # purpose and permutation, by fabric
+        # A permutation is kept for the fabric's next visit.
+        self._kept = lru_cache(maxsize=min(len(windows), _MOST_PERMUTATIONS))(self._permutation)
 
     def step(self, step: int) -> tuple[Index, Index]:
         """Return the fabrics (F,) of a step and their rows (F, n), counted within each fabric."""
@@ -158,23 +168,18 @@ class Order:
         slices = np.maximum(counts // self.each, 1)
         epoch, part = divmod(visit, int(slices.sum()))
         if len(counts) == 1:
-            return self._part(part, fabric, counts[0], _EPOCH, epoch, fabric)
+            return self._part(part, counts[0], _EPOCH, epoch, fabric)
         order = self._permutation(len(counts), _EPOCH, epoch, fabric)
         ends = np.cumsum(slices[order])
         turn = int(np.searchsorted(ends, part, side="right"))
         window = int(order[turn])
         part -= int(ends[turn] - slices[window])
         first = int(counts[:window].sum())
-        return first + self._part(part, fabric, counts[window], _EPOCH, epoch, fabric, window)
+        return first + self._part(part, counts[window], _EPOCH, epoch, fabric, window)
 
-    def _part(self, part: int, fabric: int, count: int, *purpose: int) -> Index:
-        """Return a slice of the permutation of a window, which is kept for the fabric's next visit."""
-        if self._last.get(fabric, ((), None))[0] != purpose:
-            self._last.pop(fabric, None)
-            self._last[fabric] = purpose, self._permutation(count, *purpose)
-            if len(self._last) > _MOST_PERMUTATIONS:
-                del self._last[next(iter(self._last))]  # the oldest
-        permutation = self._last[fabric][1]
+    def _part(self, part: int, count: int, *purpose: int) -> Index:
+        """Return a slice of the permutation of a window."""
+        permutation = self._kept(count, *purpose)
         return np.resize(permutation[part * self.each : (part + 1) * self.each], self.each)
 
     def _permutation(self, count: int, *purpose: int) -> Index:
@@ -184,29 +189,13 @@ class Order:
         return np.random.Generator(np.random.Philox(np.random.SeedSequence((self._seed, *purpose))))
 
 
-class Batches:
-    """Batches in an order, as tensors on one device."""
-
-    def __init__(self, rows: TrainingRows, order: Order, device: torch.device) -> None:
-        self.rows, self.order, self.device = rows, order, device
-
-    def step(self, step: int) -> Batch:
-        """Return the batch of a step."""
-        fabrics, rows = self.order.step(step)
-        table = self.rows.take(fabrics, rows).to(self.device)
-        u, v, sigma = table[..., :3].unbind(dim=-1)
-        minor, angle, curvature = table[..., 9:12].unbind(dim=-1)
-        wi, wo, target = table[..., 3:6], table[..., 6:9], table[..., TARGET]
-        fabric = torch.from_numpy(fabrics).to(self.device)
-        return Batch(fabric, u, v, sigma, wi, wo, minor, angle, curvature, target, table[..., -1])
-
-
 class RowStream(IterableDataset[dict[str, Tensor]]):
     """Batches of rows by column, with the number of their fabric in the column `fabric`, for other training loops.
 
     A piece of a file is read at a time, so memory does not grow with the data set. The order of pieces, and of the rows
     within one, is a pure function of the seed and of how often the stream was read before; worker processes count this
-    anew when they start, so a DataLoader that has some needs ``persistent_workers=True``. `Batches` mix fabrics better.
+    anew when they start, so a DataLoader that has some needs ``persistent_workers=True``. `TrainingRows` mix fabrics
+    better.
 
     The pieces come fabric after fabric; this order numbers the fabrics. A batch has at most `rows` rows, >= 1, of one
     piece. With the seed None the order is that of the pieces.

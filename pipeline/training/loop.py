@@ -29,7 +29,7 @@ from pipeline.models.registry import build_network
 from pipeline.shards.generate import set_name
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
-from pipeline.training.dataset import TARGET, Batches, Order, TrainingRows
+from pipeline.training.dataset import TARGET, Order, TrainingRows
 from pipeline.training.options import TrainingOptions
 from pipeline.training.validation import HeldOut
 from weaves.errors import BadInput, nearest
@@ -66,7 +66,6 @@ def train(
     with _reproducible(training.threads, device):
         rows = TrainingRows(manifest, manifest_folder, fabrics, device)
         order = Order(rows.windows, training.batch, training.fabrics, training.seed)
-        batches = Batches(rows, order, device)
 
         # Build the network; its last bias starts at the mean of a spread of targets.
         torch.manual_seed(training.seed)
@@ -92,7 +91,7 @@ def train(
             for group, peak in zip(optimiser.param_groups, peaks, strict=True):
                 group["lr"] = rate_factor(step, training) * peak
             network.schedule(step / training.steps)
-            batch, random = batches.step(step), order.random(step)
+            batch, random = rows.batch(*order.step(step)), order.random(step)
             with network.call("loss"):
                 with torch.autocast(device.type, torch.bfloat16, enabled=mixed(training, device)):
                     loss = learnt(batch, random)

@@ -7,7 +7,7 @@ from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import DatasetRows
 from pipeline.shards.store import ROW_GROUP, read_table
 from pipeline.training import dataset
-from pipeline.training.dataset import COLUMNS, Batches, Order, RowStream, TrainingRows
+from pipeline.training.dataset import COLUMNS, Order, RowStream, TrainingRows
 from pipeline.truth.query import Answers, Queries
 from tests.datasets import write_dataset
 from tests.refusals import refusal
@@ -30,8 +30,8 @@ def test_order_is_a_function_of_seed_and_step():
 def test_batches_hold_the_rows_of_their_fabrics(folder):
     rows = TrainingRows(Manifest.load(folder), folder, NAMES, torch.device("cpu"))
     order = Order(rows.windows, batch=12, fabrics=2, seed=3)
-    batch = Batches(rows, order, torch.device("cpu")).step(5)
     fabrics, numbers = order.step(5)
+    batch = rows.batch(fabrics, numbers)
     np.testing.assert_array_equal(batch.fabric, fabrics)
     for own, fabric, places in zip(batch.u, fabrics, numbers, strict=True):
         queries, _ = Manifest.load(folder).read(folder, NAMES[fabric], "train")
@@ -64,7 +64,7 @@ def test_columns_are_where_batches_look_for_them(tmp_path):
     write_dataset(tmp_path, {"seen": ["denim"]}, [("denim", "train", 0, queries, answers)])
     rows = TrainingRows(Manifest.load(tmp_path), tmp_path, ["denim"], torch.device("cpu"))
     np.testing.assert_array_equal(rows.spread(COLUMNS), np.arange(17)[None])
-    batch = Batches(rows, Order([[1]], batch=1, fabrics=1, seed=0), torch.device("cpu")).step(0)
+    batch = rows.batch(*Order([[1]], batch=1, fabrics=1, seed=0).step(0))
     for name in Queries._fields:
         np.testing.assert_array_equal(getattr(batch, name)[0], getattr(queries, name))
     np.testing.assert_array_equal(batch.target[0], answers.mean)
@@ -85,7 +85,7 @@ def test_the_rows_of_a_slice_are_of_one_window_and_the_oldest_permutations_are_f
             found = np.searchsorted(starts, rows, side="right")
             assert (found == found[:, :1]).all()
             visited.append(int(found[0, 0]))
-        assert len(order._last) == 1
+        assert order._kept.cache_info().currsize == 1
         orders.append(tuple(visited))
     assert len(set(orders)) > 1
 
