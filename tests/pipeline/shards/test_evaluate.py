@@ -59,9 +59,11 @@ class Case:
         pq.write_table(table, self.queries, row_group_size=row_group_size)
         return self
 
-    def run(self, answerer=None, **choices):
+    def run(self, answerer=None, chunk=2048, **choices):
         answerer = answerer or truth_answerer(FABRIC, self.options, SEED)
-        return evaluate_file(FABRIC, self.queries, self.out, answerer, **choices)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(evaluate_module, "CHUNK", chunk)
+            return evaluate_file(FABRIC, self.queries, self.out, answerer, **choices)
 
     def result(self):
         return pq.read_table(self.out)
