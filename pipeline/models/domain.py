@@ -67,9 +67,7 @@ class Domain(Frozen):
     @property
     def kinds(self) -> frozenset[str]:
         """Kinds of queries trained on, of `behind`, `stretch` and `curvature`."""
-        queries = self.queries
-        trained = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
-        return frozenset(kind for kind, there in trained.items() if there)
+        return self.queries.kinds
 
     @property
     def rims(self) -> bool:

@@ -109,7 +109,9 @@ def train(
                 with state.averaged(), network.call("loss"):
                     held_out_loss = float(network.loss(watched, order.random(_WATCH)))
                 state.offer(done, held_out_loss)
-                error, noise = _noted(state, held_out, held_out_loss)
+                error, noise = held_out.error_and_noise(state.weights())
+                figures = {"held_out_loss": held_out_loss, "held_out_mse": error, "held_out_noise": noise}
+                state.curve[-1] |= {name: float(f"{value:.6g}") for name, value in figures.items()}
                 if training.stop_at_noise and error <= 2.0 * noise:
                     break
             if done % training.checkpoint_every == 0 and done < training.steps:
@@ -129,14 +131,6 @@ def train(
     write_model(folder, safetensors.torch.save(weights, metadata=metadata), card)
     (folder / CHECKPOINT).unlink(missing_ok=True)
     progress(1.0)
-
-
-def _noted(state: State, held_out: HeldOut, loss: float) -> tuple[float, float]:
-    """Put the held-out loss on the curve, with the error of the averaged weights and the noise; return these two."""
-    error, noise = held_out.error_and_noise(state.weights())
-    figures = {"held_out_loss": loss, "held_out_mse": error, "held_out_noise": noise}
-    state.curve[-1] |= {name: float(f"{value:.6g}") for name, value in figures.items()}
-    return error, noise
 
 
 def _kept(state: State) -> dict[str, Any]:
