@@ -23,6 +23,9 @@ from pipeline.fingerprint import fingerprint
 from pipeline.patience import Failure, patiently
 from weaves.errors import BadInput, WorkFailed, one_line
 
+Remote = Any
+"""A path of object storage, `upath.UPath`, which type checkers do not know."""
+
 _ADDRESS: Final = re.compile(r"([a-z][a-z0-9+.-]+)://(.*)", re.DOTALL)
 
 _OBJECTS: Final = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oss"}
@@ -85,10 +88,9 @@ def local_copy(path: Path) -> Iterator[Path]:
         yield copy
 
 
-def fetch(path: Path, target: Path) -> None:
+def fetch(path: Remote, target: Path) -> None:
     """Copy a file of object storage to this machine."""
-    remote: Any = path
-    remote.fs.get_file(remote.path, str(target))
+    path.fs.get_file(path.path, str(target))
 
 
 def workspace(out: Path) -> Path:
@@ -110,11 +112,10 @@ class Stored(NamedTuple):
     version: str
 
 
-def listing(folder: Path) -> dict[str, Stored]:
+def listing(folder: Remote) -> dict[str, Stored]:
     """Return all files below a folder of object storage, by path relative to it; FileNotFoundError without bucket."""
-    remote: Any = folder
-    root = remote.path.rstrip("/") + "/"
-    found = remote.fs.find(root, detail=True)
+    root = folder.path.rstrip("/") + "/"
+    found = folder.fs.find(root, detail=True)
     return {
         path.removeprefix(root): Stored(int(about["size"]), fingerprint(sorted(map(str, about.items()))))
         for path, about in found.items()
@@ -122,49 +123,43 @@ def listing(folder: Path) -> dict[str, Stored]:
     }
 
 
-def size_of(path: Path) -> int:
+def size_of(path: Remote) -> int:
     """Return the size of a file in bytes; FileNotFoundError if there is none."""
-    remote: Any = path
-    return path.stat().st_size if is_local(path) else int(remote.fs.info(remote.path)["size"])
+    return int(path.stat().st_size if is_local(path) else path.fs.info(path.path)["size"])
 
 
-def is_file(path: Path) -> bool:
+def is_file(path: Remote) -> bool:
     """Return whether there is such a file; an error of the storage is no answer, and raised."""
-    remote: Any = path
-    return path.is_file() if is_local(path) else remote.fs.exists(remote.path)
+    return bool(path.is_file() if is_local(path) else path.fs.exists(path.path))
 
 
-def fetch_all(root: Path, targets: Mapping[str, Path]) -> None:
+def fetch_all(root: Remote, targets: Mapping[str, Path]) -> None:
     """Copy files of object storage, given by paths relative to `root`, to this machine, many at the same time."""
-    remote: Any = root
     if targets:
-        sources = [(remote / path).path for path in targets]
-        remote.fs.get(sources, [str(target) for target in targets.values()], batch_size=_AT_ONCE)
+        sources = [(root / path).path for path in targets]
+        root.fs.get(sources, [str(target) for target in targets.values()], batch_size=_AT_ONCE)
 
 
-def remove_all(root: Path, paths: Sequence[str]) -> None:
+def remove_all(root: Remote, paths: Sequence[str]) -> None:
     """Remove files of object storage, given by paths relative to `root`, in this order; S3 removes 1000 a request."""
-    remote: Any = root
     for start in range(0, len(paths), _AT_MOST_REMOVED):
-        remote.fs.rm([(remote / path).path for path in paths[start : start + _AT_MOST_REMOVED]])
+        root.fs.rm([(root / path).path for path in paths[start : start + _AT_MOST_REMOVED]])
 
 
-def store(source: Path, path: Path) -> None:
+def store(source: Path, path: Remote) -> None:
     """Copy a file of this machine to object storage, where it appears whole or not at all."""
-    remote: Any = path
-    if remote.protocol in _OBJECTS:
-        remote.fs.put_file(str(source), remote.path)
+    if path.protocol in _OBJECTS:
+        path.fs.put_file(str(source), path.path)
         return
-    remote.parent.mkdir(parents=True, exist_ok=True)
-    temporary = remote.with_name(f".tmp-{remote.name}")
-    remote.fs.put_file(str(source), temporary.path)
-    remote.fs.mv(temporary.path, remote.path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".tmp-{path.name}")
+    path.fs.put_file(str(source), temporary.path)
+    path.fs.mv(temporary.path, path.path)
 
 
-def copy(source: Path, target: Path) -> None:
+def copy(source: Remote, target: Remote) -> None:
     """Copy a file within object storage."""
-    remote: Any = source
-    remote.fs.cp_file(remote.path, cast("Any", target).path)
+    source.fs.cp_file(source.path, target.path)
 
 
 def explained(error: BaseException) -> BadInput | WorkFailed | None:

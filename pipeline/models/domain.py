@@ -32,7 +32,7 @@ from weaves.validation import Frozen
 PHYSICS: Final = ("footprint", "frame", "normaliser", "parallax", "shadows", "walls")
 """Options of the truth that define the learnt quantity; the other options set its accuracy."""
 
-_YARN: Final = ("roughness", "bend", "twist", "relief", "width", "blend")
+YARN_NUMBERS: Final = ("roughness", "bend", "twist", "relief", "width", "blend")
 _SLACK: Final = 0.02  # of a range, that a fabric or a footprint may lie outside
 _ANGLE: Final = 1.0  # degrees by which a direction may be steeper than the steepest trained on
 _AVERAGED: Final = 0.5  # standard deviation of a footprint that sees the average of the repeat, in repeats
@@ -67,9 +67,7 @@ class Domain(Frozen):
     @property
     def kinds(self) -> frozenset[str]:
         """Kinds of queries trained on, of `behind`, `stretch` and `curvature`."""
-        queries = self.queries
-        trained = {"behind": queries.behind > 0, "stretch": queries.stretch > 1, "curvature": queries.curvature[1] > 0}
-        return frozenset(kind for kind, there in trained.items() if there)
+        return self.queries.kinds
 
     @property
     def rims(self) -> bool:
@@ -165,5 +163,5 @@ def _size(queries: Queries) -> Float64:
 
 def _numbers(fabric: Fabric) -> dict[str, list[float]]:
     yarns = (fabric.warp, fabric.weft)
-    numbers = {name: [float(getattr(yarn, name)) for yarn in yarns] for name in _YARN}
+    numbers = {name: [float(getattr(yarn, name)) for yarn in yarns] for name in YARN_NUMBERS}
     return numbers | {"optical_thickness": [float(fabric.optical_thickness)]}

@@ -91,14 +91,21 @@ class Fallback(Around):
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries of any kind, float32 (N, 4)."""
-        outside = self.out_of_domain(fabric, queries)
-        if not outside.any():
-            return self._answers(fabric, queries, seed)
-        return self._rows(fabric, queries, outside, seed)[:, :4]
+        return row_by_row(
+            queries,
+            self.out_of_domain(fabric, queries),
+            lambda part: fallback_answers(fabric, part, seed),
+            lambda part: self._answers(fabric, part, seed),
+        )
 
     def rows(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return components and transparency, (N, 5); the transparency is NaN where the method answers itself."""
-        return self._rows(fabric, queries, self.out_of_domain(fabric, queries), seed)
+
+        def own(part: Queries) -> Float32:
+            return np.pad(self._answers(fabric, part, seed), ((0, 0), (0, 1)), constant_values=np.nan)
+
+        outside = self.out_of_domain(fabric, queries)
+        return row_by_row(queries, outside, lambda part: fallback_rows(fabric, part, seed), own)
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, (N,), by the method or the fallback; no light changes it."""
@@ -136,14 +143,6 @@ class Fallback(Around):
         if self._domain is None:
             return behind
         return behind | self._domain.out_of_domain(fabric, self._nearest(queries))
-
-    def _rows(self, fabric: Fabric, queries: Queries, outside: Mask, seed: int) -> Float32:
-        result = np.full((len(outside), 5), np.nan, np.float32)
-        if outside.any():
-            result[outside] = fallback_rows(fabric, queries.take(outside), seed)
-        if not outside.all():
-            result[~outside, :4] = self._answers(fabric, queries.take(~outside), seed)
-        return result
 
     def _answers(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
         """Answer queries by the method; footprints that see the average are no larger than trained on."""

@@ -231,11 +231,10 @@ def restored(
     """
     networks = {}
     for card, weights in trained:
-        key, repeat = _ANY, (0, 0)
+        key, (ends, picks) = _ANY, (0, 0)
         if options.of_one_material:
             (fabric,) = card["fabrics"]
             key, (ends, picks) = fabric["optics"], fabric["repeat"]
-            repeat = (ends, picks)
-        networks[key] = make(repeat)
+        networks[key] = make((ends, picks))
         networks[key].load_state_dict(weights)
     return networks, domain_of([card for card, _ in trained])

@@ -45,16 +45,16 @@ def module_of(model: str) -> ModuleType:
     return import_module(f"{CLASSES[model].__module__}.model")
 
 
-def model_folder(model: str, where: str, key: str, others: Iterable[str] = ()) -> Path:
+def model_folder(model: str, where: str, key: str, others: Iterable[str]) -> Path:
     """Return the folder of a trained model, with ``model.safetensors`` and ``card.json``; BadInput if it is none.
 
     `where` and `key` are the function or verb and its argument that name the model, `others` names that are allowed
     there too, for messages.
     """
-    folder, names = place(model, key), list(others)
+    folder = place(model, key)
     if not (folder / CARD).is_file():
-        allowed = f" or a name is needed; {nearest(model, names)}" if names else " is needed"
-        raise BadInput(where, key, model, f"the folder of a trained model{allowed}")
+        allowed = f"the folder of a trained model or a name is needed; {nearest(model, others)}"
+        raise BadInput(where, key, model, allowed)
     return folder
 
 

@@ -78,7 +78,29 @@ def read_answers(path: Path, count: int) -> Float32:
             row = int(np.flatnonzero(table[name].is_null().to_numpy())[0])
             raise BadInput(str(path), f"row {row}, column {name}", None, "a number is needed")
     given = {name: table[name].to_numpy() for name in table.column_names}
-    return _in_order(str(path), given.pop(ID), given, count)
+    ids = given.pop(ID)
+
+    def refuse(bad: npt.NDArray[np.bool_], column: str, values: npt.NDArray[Any], allowed: str) -> None:
+        if rows := int(bad.sum()):
+            row = int(bad.argmax())
+            more = f" ({rows - 1:,} more bad rows)" if rows > 1 else ""
+            raise BadInput(str(path), f"row {row}, column {column}", values[row].item(), allowed + more)
+
+    refuse((ids < 0) | (ids >= count), ID, ids, f"is no question: ids are 0 to {count - 1:,}")
+    again = np.ones(len(ids), np.bool_)
+    again[np.unique(ids, return_index=True)[1]] = False
+    refuse(again, ID, ids, "is there more than once")
+    with np.errstate(over="ignore", under="ignore"):
+        single = {name: values.astype(np.float32) for name, values in given.items()}
+    for name, values in single.items():
+        refuse(~(np.isfinite(values) & (values >= 0)), name, given[name], "must be finite and at least 0")
+    if len(ids) < count:
+        first = int(np.setdiff1d(np.arange(count), ids)[0])
+        left = f"{count - len(ids):,} of {count:,} questions have no answer"
+        raise BadInput(str(path), "", f"the id {first} is missing", left)
+    answers = np.empty((count, len(single)), np.float32)
+    answers[ids.astype(np.int64)] = np.stack(list(single.values()), axis=1)
+    return answers
 
 
 def write_answers(path: Path, answers: Float32) -> None:
@@ -134,27 +156,3 @@ def _columns(path: Path, names: Sequence[str]) -> list[str]:
         if Counter(names)[name] > 1:
             raise BadInput(str(path), "column", name, "is there more than once")
     return [ID, *answer]
-
-
-def _in_order(where: str, ids: npt.NDArray[Any], given: dict[str, npt.NDArray[Any]], count: int) -> Float32:
-    def refuse(bad: npt.NDArray[np.bool_], column: str, values: npt.NDArray[Any], allowed: str) -> None:
-        if rows := int(bad.sum()):
-            row = int(bad.argmax())
-            more = f" ({rows - 1:,} more bad rows)" if rows > 1 else ""
-            raise BadInput(where, f"row {row}, column {column}", values[row].item(), allowed + more)
-
-    refuse((ids < 0) | (ids >= count), ID, ids, f"is no question: ids are 0 to {count - 1:,}")
-    again = np.ones(len(ids), np.bool_)
-    again[np.unique(ids, return_index=True)[1]] = False
-    refuse(again, ID, ids, "is there more than once")
-    with np.errstate(over="ignore", under="ignore"):
-        single = {name: values.astype(np.float32) for name, values in given.items()}
-    for name, values in single.items():
-        refuse(~(np.isfinite(values) & (values >= 0)), name, given[name], "must be finite and at least 0")
-    if len(ids) < count:
-        first = int(np.setdiff1d(np.arange(count), ids)[0])
-        left = f"{count - len(ids):,} of {count:,} questions have no answer"
-        raise BadInput(where, "", f"the id {first} is missing", left)
-    answers = np.empty((count, len(single)), np.float32)
-    answers[ids.astype(np.int64)] = np.stack(list(single.values()), axis=1)
-    return answers

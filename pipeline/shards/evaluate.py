@@ -105,7 +105,6 @@ def evaluate_file(
     out: Path,
     answerer: Answerer,
     skip_bad: bool = False,
-    chunk: int = CHUNK,
     threads: int = 1,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Summary:
@@ -153,7 +152,7 @@ def evaluate_file(
                 listing.writerows(query_file.bad_rows(block, summary.rows, bad))
             good = np.ones(len(batch.u), np.bool_)
             good[list(bad)] = False
-            answers = _answers(pool, answerer, batch, good, summary, chunk, lambda rows: progress(rows / total))
+            answers = _answers(pool, answerer, batch, good, summary, lambda rows: progress(rows / total))
             columns = [*block.columns, *_arrays(batch, answers, good, answerer.errors)]
             writer.write_table(pa.table(columns, schema=schema), ROW_GROUP)
         return summary
@@ -170,29 +169,25 @@ def _answers(
     batch: Queries,
     good: Mask,
     summary: Summary,
-    chunk: int,
     progress: Callable[[int], None],
 ) -> Answers:
     """Answer the good rows of a block, in runs of neighbours that are no longer than a chunk."""
     rows, before = len(good), summary.rows
     whole = Answers.opaque(np.zeros((rows, 4), np.float32), np.zeros((rows, 4), np.float32), np.zeros(rows, np.int32))
-    cuts = {0, rows, *range(0, rows, chunk), *(np.flatnonzero(np.diff(good)) + 1).tolist()}
-    runs = [slice(start, stop) for start, stop in pairwise(sorted(cuts))]
+    cuts = {0, rows, *range(0, rows, CHUNK), *(np.flatnonzero(np.diff(good)) + 1).tolist()}
+    runs = [slice(start, stop) for start, stop in pairwise(sorted(cuts)) if good[start]]
     # Kernels are loaded and the fabric is tabulated outside the clock.
     answerer.prepare(batch.take(good))
     begun = time.perf_counter()
-    asked = [run for run in runs if good[run.start]]
-    parts = pool.map(lambda run: answerer.answer(batch.take(run), before + run.start), asked)
-    for run in runs:
-        if good[run.start]:
-            part = next(parts)
-            summary.add(part)
-            for column, values in zip(whole, part, strict=True):
-                column[run] = values
-        else:
-            summary.bad += run.stop - run.start
-        summary.rows += run.stop - run.start
-        progress(summary.rows)
+    parts = pool.map(lambda run: answerer.answer(batch.take(run), before + run.start), runs)
+    for run, part in zip(runs, parts, strict=True):
+        summary.add(part)
+        for column, values in zip(whole, part, strict=True):
+            column[run] = values
+        progress(before + run.stop)
+    summary.rows += rows
+    summary.bad += rows - int(good.sum())
+    progress(summary.rows)
     summary.seconds += time.perf_counter() - begun
     return whole
 

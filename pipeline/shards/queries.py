@@ -56,9 +56,10 @@ class QueryOptions(Frozen):
         return self
 
     @property
-    def plain(self) -> bool:
-        """True if all footprints are round, the cloth is flat, and the light is on the viewer's side."""
-        return self.behind == 0.0 and self.stretch == 1.0 and self.curvature == (0.0, 0.0)
+    def kinds(self) -> frozenset[str]:
+        """Kinds drawn, of `behind`, `stretch` and `curvature`; none: round footprints on flat cloth, lit in front."""
+        drawn = {"behind": self.behind > 0, "stretch": self.stretch > 1, "curvature": self.curvature[1] > 0}
+        return frozenset(kind for kind, there in drawn.items() if there)
 
 
 def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, start: int, count: int) -> Queries:
@@ -72,7 +73,7 @@ def draw_queries(options: QueryOptions, repeat: tuple[int, int], seed: int, star
     sigma = np.exp(low + (high - low) * draws[:, 2]).astype(np.float32)
     wi, wo = (_directions(options, draws[:, first], draws[:, first + 1]) for first in (3, 5))
     queries = Queries.round(u, v, sigma, wi, wo)
-    return queries if options.plain else _shaped(options, queries, seed, start)
+    return _shaped(options, queries, seed, start) if options.kinds else queries
 
 
 def uniform_draws(seed: int, start: int, count: int) -> Float64:

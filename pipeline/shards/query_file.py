@@ -53,17 +53,14 @@ def open_queries(path: Path) -> Iterator[pq.ParquetFile]:
 
 def blocks(path: Path, file: pq.ParquetFile, columns: list[str] | None = None) -> Iterator[pa.Table]:
     """Yield the rows in blocks of `ROW_GROUP`, however the file is cut."""
-
-    def batches() -> Iterator[pa.Table]:
-        rows = file.iter_batches(ROW_GROUP, columns=columns)
-        while True:
-            with readable(path, *_REMEDIES):
-                batch = next(rows, None)
-            if batch is None:
-                return
-            yield pa.Table.from_batches([batch])
-
-    return (block.combine_chunks() for block in regrouped(batches(), ROW_GROUP))
+    batches = (pa.Table.from_batches([batch]) for batch in file.iter_batches(ROW_GROUP, columns=columns))
+    joined = regrouped(batches, ROW_GROUP)
+    while True:
+        with readable(path, *_REMEDIES):
+            block = next(joined, None)
+        if block is None:
+            return
+        yield block.combine_chunks()
 
 
 def check_columns(path: Path, schema: pa.Schema) -> None:
@@ -128,18 +125,14 @@ def bad_rows(block: pa.Table, start: int, found: Faults) -> Iterator[BadRow]:
     named = {name: {c: block[c].to_pylist() for c in axes[name]} for name in {name for name, _, _ in found.values()}}
     for row, (name, _, allowed) in sorted(found.items()):
         values = {column: of[row] for column, of in named[name].items()}
-        yield _bad_row(start + row, name, values, allowed)
-
-
-def _bad_row(row: int, name: str, values: dict[str, float | None], allowed: str) -> BadRow:
-    """Describe the fault of a row of the file, which has these values in the columns of the field `name`."""
-    for column, value in values.items():
-        if value is None:
-            return BadRow(row, column, None, "must not be null")
-    if len(values) > 1:
-        return BadRow(row, f"{name}_x..z", list(values.values()), allowed)
-    value = float(values[name])  # type: ignore[arg-type]  # it is not None
-    with np.errstate(over="ignore", under="ignore"):
-        rounded = np.float32(value)
-    lost = np.isfinite(value) and value != 0 and (rounded == 0 or not np.isfinite(rounded))
-    return BadRow(row, name, value, allowed + (" in single precision" if lost else ""))
+        empty = [column for column, value in values.items() if value is None]
+        if empty:
+            yield BadRow(start + row, empty[0], None, "must not be null")
+        elif len(values) > 1:
+            yield BadRow(start + row, f"{name}_x..z", list(values.values()), allowed)
+        else:
+            value = float(values[name])
+            with np.errstate(over="ignore", under="ignore"):
+                rounded = np.float32(value)
+            lost = np.isfinite(value) and value != 0 and (rounded == 0 or not np.isfinite(rounded))
+            yield BadRow(start + row, name, value, allowed + (" in single precision" if lost else ""))

@@ -77,25 +77,27 @@ class SilhouetteRows(Frozen):
         """Return the largest tangent, over the root of the curvature, at which one of the first rows touches."""
         from pipeline.truth.geometry.opacity import grazing_cosine
 
-        draws = uniform_draws(seed, 0, _TRIED)
-        ends, picks = fabric.weave.repeat
-        curvature = self.largest_curvature * np.square(1.0 - draws[:, 3])
-        touch = grazing_cosine(fabric, draws[:, 0] * ends, draws[:, 1] * picks, 2.0 * np.pi * draws[:, 5], curvature)
+        _, u, v, azimuth, curvature = self._positions(fabric, seed, 0, _TRIED)
+        touch = grazing_cosine(fabric, u, v, azimuth, curvature)
         square = np.square(touch)
         return float(np.sqrt(square / (1.0 - square) / curvature).max())
 
-    def _drawn(self, fabric: Fabric, seed: int, start: int, count: int, steepest: float) -> _Rows:
+    def _positions(self, fabric: Fabric, seed: int, start: int, count: int) -> tuple[Float64, ...]:
+        """Return random numbers (count, 8), and of these centres u and v, azimuths and curvatures, each (count,)."""
         draws = uniform_draws(seed, start, count)
         ends, picks = fabric.weave.repeat
-        low, high = (math.log(bound) for bound in self.sigma)
         curvature = self.largest_curvature * np.square(1.0 - draws[:, 3])  # 1 - a draw is never 0
+        return draws, draws[:, 0] * ends, draws[:, 1] * picks, 2.0 * np.pi * draws[:, 5], curvature
+
+    def _drawn(self, fabric: Fabric, seed: int, start: int, count: int, steepest: float) -> _Rows:
+        draws, u, v, azimuth, curvature = self._positions(fabric, seed, start, count)
+        low, high = (math.log(bound) for bound in self.sigma)
         tangent = _BEYOND * steepest * np.sqrt(curvature) * (1.0 - draws[:, 4])
         cosine = np.where(draws[:, 6] < self.anywhere, 1.0 - draws[:, 4], tangent / np.sqrt(1.0 + np.square(tangent)))
         sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
-        azimuth = 2.0 * np.pi * draws[:, 5]
         columns = {
-            "u": draws[:, 0] * ends,
-            "v": draws[:, 1] * picks,
+            "u": u,
+            "v": v,
             "sigma": np.exp(low + (high - low) * draws[:, 2]),
             "wo_x": sine * np.cos(azimuth),
             "wo_y": sine * np.sin(azimuth),

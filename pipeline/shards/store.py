@@ -99,26 +99,25 @@ def readable(path: Path, missing: tuple[str, str], broken: str) -> Iterator[None
         raise BadInput(str(path), "", f"not a whole Parquet file ({reason})", broken) from error
 
 
-def read_table(path: Path, kind: Kind = "components", names: Sequence[str] = ()) -> pa.Table:
-    """Read a shard, or its columns `names`, verified; BadInput if it is missing, damaged or of another kind."""
+def read_table(
+    path: Path, kind: Kind = "components", names: Sequence[str] = (), groups: slice = slice(None)
+) -> pa.Table:
+    """Read a shard, or its columns `names` of some row groups, verified.
+
+    BadInput if it is missing, damaged or of another kind.
+    """
     schema = pa.schema([SCHEMAS[kind].field(name) for name in names]) if names else SCHEMAS[kind]
     refuse_irregular(path, "a shard")
-    with readable(path, *_REMEDIES), local_copy(path) as file:
+    with readable(path, *_REMEDIES), local_copy(path) as copy:
+        file = pq.ParquetFile(copy, page_checksum_verification=True)
         # Shards are small: threads within one cost more than they save.
-        table = pq.read_table(file, columns=list(names) or None, page_checksum_verification=True, use_threads=False)
+        chosen = range(file.num_row_groups)[groups]
+        table = file.read_row_groups(chosen, columns=list(names) or None, use_threads=False)
     if not table.schema.equals(schema, check_metadata=False):
         odd = sorted(set(table.schema.names) ^ set(schema.names))
         detail = f"columns {', '.join(odd)} differ" if odd else "column types differ"
         raise BadInput(str(path), "schema", detail, f"must be schema version {SCHEMA_VERSION} of {kind}")
     return table
-
-
-def read_groups(path: Path, names: Sequence[str], first: int, groups: int) -> pa.Table:
-    """Read columns of some row groups of a shard, as many as there are from the `first` on; errors as `read_table`."""
-    with readable(path, *_REMEDIES):
-        file = pq.ParquetFile(path, page_checksum_verification=True)
-        last = min(first + groups, file.num_row_groups)
-        return file.read_row_groups(range(first, last), columns=list(names), use_threads=False)
 
 
 def read_about(path: Path) -> dict[str, Any]:

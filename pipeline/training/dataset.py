@@ -1,37 +1,34 @@
 """Training rows and their order.
 
-All training rows of all fabrics lie in one memory-mapped float32 table, fabric after fabric. Which rows a step sees
-is a pure function of (seed, step): fabrics are visited in rounds, each a new permutation of them; visit r of a fabric
-takes the r-th slice of its rows, permuted anew in every epoch. A training that goes on after an interruption
-therefore sees the rows it would have seen.
+All training rows of all fabrics are in memory. Which rows a step sees is a pure function of (seed, step): fabrics are
+visited in rounds, each a new permutation of them; visit r of a fabric takes the r-th slice of its rows, permuted anew
+in every epoch. A training that goes on after an interruption therefore sees the rows it would have seen.
 
     example   3 fabrics, 2 a step: rounds (2 0 1)(0 1 2)... give the steps (2 0), (1 0), (1 2), ...
 
-More than `MOST_IN_TABLE` rows are in no table: they are read from the shards when a step needs them, in windows of a
-few row groups. Every epoch of a fabric visits its windows in a new order, and the rows of each in a new order. Rows are
-independent draws, so that this order is as good as any; neither memory nor the time to the first step grows with them.
+More than `MOST_IN_TABLE` rows are read from the shards when a step needs them, in windows of a few row groups. Every
+epoch of a fabric visits its windows in a new order, and the rows of each in a new order. Rows are independent draws, so
+that this order is as good as any; neither memory nor the time to the first step grows with them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.utils.data import IterableDataset, get_worker_info
 
-from pipeline.atomic import atomic_path
 from pipeline.compiled.arrays import Float32, Index
 from pipeline.models.network import Batch
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import RowPiece
 from pipeline.shards.schema import QUERY_COLUMNS
-from pipeline.shards.store import ROW_GROUP, read_groups, read_table
+from pipeline.shards.store import ROW_GROUP, read_table
 from pipeline.truth.conventions import COMPONENTS, TRANSPARENCY
 from weaves.errors import BadInput
 
@@ -48,57 +45,59 @@ _MOST_GROUPS: Final = 8  # row groups of a window, 131,072 rows or 9 MB; fewer o
 _MOST_PERMUTATIONS: Final = 512  # that are kept
 _STARTS: Final = 64  # fabrics whose first rows the last bias starts at
 
-_READERS: Final = 4  # shards that are read at the same time
-
 _ROUND, _EPOCH, _STEP = 0, 1, 2  # purposes of the random streams
 
 
 class TrainingRows:
-    """A table of rows (rows, COLUMNS), fabric after fabric, `counts` of each, at least 1; it may be memory-mapped."""
+    """The training rows of fabrics, whose order of names numbers them, in batches on a `device`.
 
-    def __init__(self, table: Float32, counts: Sequence[int]) -> None:
-        self.table, self.windows = table, [[count] for count in counts]
-        self._starts = np.concatenate([[0], np.cumsum(counts)])
+    `windows` are the numbers of rows that are read together, of each fabric: all of them, if there are no more than
+    `MOST_IN_TABLE`. A GPU keeps rows of less than half of its free memory.
+    """
 
-    def index(self, fabrics: Index, rows: Index) -> Index:
-        """Return the places in the table of rows (F, n) of fabrics (F,)."""
-        places: Index = rows + self._starts[fabrics][:, None]
-        return places
-
-    def take(self, fabrics: Index, rows: Index) -> Float32:
-        """Return rows (F, n) of fabrics (F,), counted within each fabric, (F, n, COLUMNS)."""
-        return self.table[self.index(fabrics, rows)]
-
-    def spread(self, most: int) -> Float32:
-        """Return about so many rows of all fabrics, evenly spaced."""
-        return self.table[:: max(len(self.table) // most, 1)]
-
-
-class WindowedRows:
-    """Rows that stay in their shards, which are given by fabric; the interface of `TrainingRows`."""
-
-    def __init__(self, folder: Path, shards: Sequence[Sequence[ShardEntry]]) -> None:
-        rows = ROW_GROUP * min(max(MOST_IN_TABLE // (ROW_GROUP * len(shards)), 1), _MOST_GROUPS)
+    def __init__(self, manifest: Manifest, folder: Path, fabrics: Sequence[str], device: torch.device) -> None:
+        shards = manifest.by_fabric(folder, fabrics, "train").values()
+        total = sum(shard.rows for own in shards for shard in own)
+        self._device, self._whole = device, total <= MOST_IN_TABLE
+        groups = min(max(MOST_IN_TABLE // (ROW_GROUP * len(shards)), 1), _MOST_GROUPS)
+        rows = total if self._whole else groups * ROW_GROUP
         self._pieces = [_windows(folder, own, rows) for own in shards]
         self.windows = [[sum(piece.rows for piece in window) for window in own] for own in self._pieces]
-        self._window = lru_cache(maxsize=MOST_IN_TABLE // rows)(self._read)
+        self._window = lru_cache(maxsize=None if self._whole else MOST_IN_TABLE // rows)(self._read)
+        free = torch.cuda.mem_get_info(device)[0] if device.type == "cuda" else 0
+        self._kept_on = device if self._whole and 4 * COLUMNS * total < free // 2 else torch.device("cpu")
 
-    def take(self, fabrics: Index, rows: Index) -> Float32:
+    def take(self, fabrics: Index, rows: Index) -> Tensor:
         """Return rows (F, n) of fabrics (F,), counted within each fabric, (F, n, COLUMNS); of each from one window."""
         taken = []
         for fabric, own in zip(fabrics.tolist(), rows, strict=True):
             ends = np.cumsum(self.windows[fabric])
             window = int(np.searchsorted(ends, own[0], side="right"))
-            taken.append(self._window(fabric, window)[own - (ends[window] - self.windows[fabric][window])])
-        return np.stack(taken)
+            first = ends[window] - self.windows[fabric][window]
+            taken.append(self._window(fabric, window)[torch.from_numpy(own - first).to(self._kept_on)])
+        return torch.stack(taken)
 
-    def spread(self, most: int) -> Float32:
-        """Return at most so many rows: the first ones of some fabrics, evenly spaced among all."""
-        some = self._pieces[:: -(-len(self._pieces) // _STARTS)]
-        return np.concatenate([own[0][0].read(1)[: most // len(some)] for own in some])
+    def batch(self, fabrics: Index, rows: Index) -> Batch:
+        """Return a step's rows, as those of `take`, as tensors on the device."""
+        table = self.take(fabrics, rows).to(self._device)
+        u, v, sigma = table[..., :3].unbind(dim=-1)
+        minor, angle, curvature = table[..., 9:12].unbind(dim=-1)
+        wi, wo, target = table[..., 3:6], table[..., 6:9], table[..., TARGET]
+        fabric = torch.from_numpy(fabrics).to(self._device)
+        return Batch(fabric, u, v, sigma, wi, wo, minor, angle, curvature, target, table[..., -1])
 
-    def _read(self, fabric: int, window: int) -> Float32:
-        return np.concatenate([piece.read() for piece in self._pieces[fabric][window]])
+    def spread(self, most: int) -> Tensor:
+        """Return about so many rows, evenly spaced; of rows in windows the first ones of some fabrics."""
+        if not self._whole:
+            some = self._pieces[:: -(-len(self._pieces) // _STARTS)]
+            return torch.cat([torch.from_numpy(own[0][0].read(1)[: most // len(some)]) for own in some])
+        starts = np.cumsum([0, *(count for (count,) in self.windows)])
+        step = max(int(starts[-1]) // most, 1)
+        return torch.cat([self._window(n, 0)[-start % step :: step] for n, start in enumerate(starts[:-1].tolist())])
+
+    def _read(self, fabric: int, window: int) -> Tensor:
+        parts = [piece.read() for piece in self._pieces[fabric][window]]
+        return torch.from_numpy(np.concatenate(parts)).to(self._kept_on)
 
 
 class _Piece(NamedTuple):
@@ -111,7 +110,9 @@ class _Piece(NamedTuple):
 
     def read(self, groups: int = 0) -> Float32:
         """Return the rows of the first groups, 0: of all."""
-        return _stacked(read_groups(self.path, _NAMES, self.first, groups or -(-self.rows // ROW_GROUP)))
+        last = self.first + (groups or -(-self.rows // ROW_GROUP))
+        table = read_table(self.path, names=_NAMES, groups=slice(self.first, last))
+        return np.stack([column.to_numpy() for column in table.columns], axis=-1)
 
 
 def _windows(folder: Path, shards: Sequence[ShardEntry], least: int) -> list[list[_Piece]]:
@@ -133,34 +134,6 @@ def _windows(folder: Path, shards: Sequence[ShardEntry], least: int) -> list[lis
     return windows
 
 
-def _stacked(table: Any) -> Float32:
-    return np.stack([column.to_numpy() for column in table.columns], axis=-1)
-
-
-def load_rows(manifest: Manifest, folder: Path, fabrics: Sequence[str], cache: Path) -> TrainingRows | WindowedRows:
-    """Return the training rows of fabrics, mapped from `cache`, which is written anew: an older one may be damaged.
-
-    More than `MOST_IN_TABLE` stay in their shards. The order of the fabrics' names numbers them. The caller names the
-    cache, a ``.npy`` file, after what it holds and deletes it in the end.
-    """
-    by_fabric = manifest.by_fabric(folder, fabrics, "train")
-    counts = [sum(part.rows for part in by_fabric[name]) for name in fabrics]
-    if sum(counts) > MOST_IN_TABLE:
-        return WindowedRows(folder, [by_fabric[name] for name in fabrics])
-    with atomic_path(cache, durable=False) as temporary:  # no later process reads it
-        shape = (sum(counts), COLUMNS)
-        table = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
-        parts = [part for name in fabrics for part in by_fabric[name]]
-        starts = np.cumsum([0, *(part.rows for part in parts)])
-
-        def fill(part: ShardEntry, start: int) -> None:
-            table[start : start + part.rows] = _stacked(read_table(folder / part.file, names=_NAMES))
-
-        with ThreadPoolExecutor(_READERS) as pool:  # one shard of each is in memory
-            list(pool.map(fill, parts, starts))
-    return TrainingRows(np.load(cache, mmap_mode="r"), counts)
-
-
 class Order:
     """Which rows each step sees: a pure function of (seed, step).
 
@@ -173,7 +146,8 @@ class Order:
         self.fabrics = min(fabrics, len(self._windows), batch)
         self.each = batch // self.fabrics
         self._seed = seed
-        self._last: dict[int, tuple[tuple[int, ...], Index]] = {}  # purpose and permutation, by fabric
+        # A permutation is kept for the fabric's next visit.
+        self._kept = lru_cache(maxsize=min(len(windows), _MOST_PERMUTATIONS))(self._permutation)
 
     def step(self, step: int) -> tuple[Index, Index]:
         """Return the fabrics (F,) of a step and their rows (F, n), counted within each fabric."""
@@ -194,23 +168,18 @@ class Order:
         slices = np.maximum(counts // self.each, 1)
         epoch, part = divmod(visit, int(slices.sum()))
         if len(counts) == 1:
-            return self._part(part, fabric, counts[0], _EPOCH, epoch, fabric)
+            return self._part(part, counts[0], _EPOCH, epoch, fabric)
         order = self._permutation(len(counts), _EPOCH, epoch, fabric)
         ends = np.cumsum(slices[order])
         turn = int(np.searchsorted(ends, part, side="right"))
         window = int(order[turn])
         part -= int(ends[turn] - slices[window])
         first = int(counts[:window].sum())
-        return first + self._part(part, fabric, counts[window], _EPOCH, epoch, fabric, window)
+        return first + self._part(part, counts[window], _EPOCH, epoch, fabric, window)
 
-    def _part(self, part: int, fabric: int, count: int, *purpose: int) -> Index:
-        """Return a slice of the permutation of a window, which is kept for the fabric's next visit."""
-        if self._last.get(fabric, ((), None))[0] != purpose:
-            self._last.pop(fabric, None)
-            self._last[fabric] = purpose, self._permutation(count, *purpose)
-            if len(self._last) > _MOST_PERMUTATIONS:
-                del self._last[next(iter(self._last))]  # the oldest
-        permutation = self._last[fabric][1]
+    def _part(self, part: int, count: int, *purpose: int) -> Index:
+        """Return a slice of the permutation of a window."""
+        permutation = self._kept(count, *purpose)
         return np.resize(permutation[part * self.each : (part + 1) * self.each], self.each)
 
     def _permutation(self, count: int, *purpose: int) -> Index:
@@ -220,37 +189,13 @@ class Order:
         return np.random.Generator(np.random.Philox(np.random.SeedSequence((self._seed, *purpose))))
 
 
-class Batches:
-    """Batches in an order, as tensors on one device; a GPU holds a table of less than half of its free memory."""
-
-    def __init__(self, rows: TrainingRows | WindowedRows, order: Order, device: torch.device) -> None:
-        self.rows, self.order, self.device = rows, order, device
-        self._resident: tuple[TrainingRows, Tensor] | None = None
-        free = torch.cuda.mem_get_info(device)[0] if device.type == "cuda" else 0
-        if isinstance(rows, TrainingRows) and rows.table.nbytes < free // 2:
-            self._resident = rows, torch.from_numpy(np.array(rows.table)).to(device)
-
-    def step(self, step: int) -> Batch:
-        """Return the batch of a step."""
-        fabrics, rows = self.order.step(step)
-        if self._resident is not None:
-            own, whole = self._resident
-            table = whole[torch.from_numpy(own.index(fabrics, rows)).to(self.device)]
-        else:
-            table = torch.from_numpy(self.rows.take(fabrics, rows)).to(self.device)
-        u, v, sigma = table[..., :3].unbind(dim=-1)
-        minor, angle, curvature = table[..., 9:12].unbind(dim=-1)
-        wi, wo, target = table[..., 3:6], table[..., 6:9], table[..., TARGET]
-        fabric = torch.from_numpy(fabrics).to(self.device)
-        return Batch(fabric, u, v, sigma, wi, wo, minor, angle, curvature, target, table[..., -1])
-
-
 class RowStream(IterableDataset[dict[str, Tensor]]):
     """Batches of rows by column, with the number of their fabric in the column `fabric`, for other training loops.
 
     A piece of a file is read at a time, so memory does not grow with the data set. The order of pieces, and of the rows
     within one, is a pure function of the seed and of how often the stream was read before; worker processes count this
-    anew when they start, so a DataLoader that has some needs ``persistent_workers=True``. `Batches` mix fabrics better.
+    anew when they start, so a DataLoader that has some needs ``persistent_workers=True``. `TrainingRows` mix fabrics
+    better.
 
     The pieces come fabric after fabric; this order numbers the fabrics. A batch has at most `rows` rows, >= 1, of one
     piece. With the seed None the order is that of the pieces.

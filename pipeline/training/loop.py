@@ -29,13 +29,11 @@ from pipeline.models.registry import build_network
 from pipeline.shards.generate import set_name
 from pipeline.shards.manifest import Manifest
 from pipeline.training.checkpoint import CHECKPOINT, State
-from pipeline.training.dataset import TARGET, Batches, Order, load_rows
+from pipeline.training.dataset import TARGET, Order, TrainingRows
 from pipeline.training.options import TrainingOptions
 from pipeline.training.validation import HeldOut
 from weaves.errors import BadInput, nearest
 from weaves.fabric import Fabric
-
-ROWS = "rows.npy"
 
 _START_ROWS = 65_536  # rows whose mean the last bias starts at
 _WATCH = 2**40  # a step that no training has: it names the random numbers of the held-out loss
@@ -66,16 +64,15 @@ def train(
     card = _card(options, training, manifest, members)
     identity = fingerprint(card)  # of everything that shapes the weights
     with _reproducible(training.threads, device):
-        rows = load_rows(manifest, manifest_folder, fabrics, folder / f"{identity}-{ROWS}")
+        rows = TrainingRows(manifest, manifest_folder, fabrics, device)
         order = Order(rows.windows, training.batch, training.fabrics, training.seed)
-        batches = Batches(rows, order, device)
 
         # Build the network; its last bias starts at the mean of a spread of targets.
         torch.manual_seed(training.seed)
         sets = [set_name(rows) for rows in options.extra_rows]
         extra = ([manifest.columns(manifest_folder, name, own) for name in fabrics] for own in sets)
         network = build_network(options, members, extra)
-        network.start_at(torch.from_numpy(rows.spread(_START_ROWS)[:, TARGET].copy()))
+        network.start_at(rows.spread(_START_ROWS)[:, TARGET].cpu().contiguous())
         network.to(device).train()
         groups = network.parameter_groups(training.learning_rate)
         optimiser = torch.optim.AdamW(groups, weight_decay=training.weight_decay, fused=True)
@@ -94,7 +91,7 @@ def train(
             for group, peak in zip(optimiser.param_groups, peaks, strict=True):
                 group["lr"] = rate_factor(step, training) * peak
             network.schedule(step / training.steps)
-            batch, random = batches.step(step), order.random(step)
+            batch, random = rows.batch(*order.step(step)), order.random(step)
             with network.call("loss"):
                 with torch.autocast(device.type, torch.bfloat16, enabled=mixed(training, device)):
                     loss = learnt(batch, random)
@@ -112,7 +109,9 @@ def train(
                 with state.averaged(), network.call("loss"):
                     held_out_loss = float(network.loss(watched, order.random(_WATCH)))
                 state.offer(done, held_out_loss)
-                error, noise = _noted(state, held_out, held_out_loss)
+                error, noise = held_out.error_and_noise(state.weights())
+                figures = {"held_out_loss": held_out_loss, "held_out_mse": error, "held_out_noise": noise}
+                state.curve[-1] |= {name: float(f"{value:.6g}") for name, value in figures.items()}
                 if training.stop_at_noise and error <= 2.0 * noise:
                     break
             if done % training.checkpoint_every == 0 and done < training.steps:
@@ -131,16 +130,7 @@ def train(
     metadata = {"twillight": json.dumps({"model": card["model"], "name": card["name"], "identity": identity})}
     write_model(folder, safetensors.torch.save(weights, metadata=metadata), card)
     (folder / CHECKPOINT).unlink(missing_ok=True)
-    (folder / f"{identity}-{ROWS}").unlink(missing_ok=True)
     progress(1.0)
-
-
-def _noted(state: State, held_out: HeldOut, loss: float) -> tuple[float, float]:
-    """Put the held-out loss on the curve, with the error of the averaged weights and the noise; return these two."""
-    error, noise = held_out.error_and_noise(state.weights())
-    figures = {"held_out_loss": loss, "held_out_mse": error, "held_out_noise": noise}
-    state.curve[-1] |= {name: float(f"{value:.6g}") for name, value in figures.items()}
-    return error, noise
 
 
 def _kept(state: State) -> dict[str, Any]:

@@ -74,18 +74,17 @@ def read(folder: Path) -> None:
     import torch
 
     from pipeline.shards.manifest import Manifest
-    from pipeline.training.dataset import Batches, Order, load_rows
+    from pipeline.training.dataset import Order, TrainingRows
 
     fabrics = list(Manifest.load(folder).fabrics)  # imports what it needs
     for first, last in ((0, 1), (1, 1001)):
         wall, cpu = time.perf_counter(), time.process_time()
         if first == 0:
-            with tempfile.TemporaryDirectory() as cache:
-                rows = load_rows(Manifest.load(folder), folder, fabrics, Path(cache) / "rows.npy")
+            rows = TrainingRows(Manifest.load(folder), folder, fabrics, torch.device("cpu"))
             rows.spread(2**16)
-            batches = Batches(rows, Order(rows.windows, 8192, len(fabrics), 0), torch.device("cpu"))
+            order = Order(rows.windows, 8192, len(fabrics), 0)
         for step in range(first, last):
-            batches.step(step)
+            rows.batch(*order.step(step))
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(f"{last - first} batches: {wall:.1f} ({cpu:.1f}) s, {memory:.0f} MiB", flush=True)

@@ -61,5 +61,5 @@ def _watched(
     most = memory if hard == resource.RLIM_INFINITY else min(memory, hard)  # a limit of the account is never raised
     resource.setrlimit(resource.RLIMIT_DATA, (most, most))
     with Path(state).open("rb+") as file:
-        WATCH.attach(mmap.mmap(file.fileno(), STATE_BYTES))
+        WATCH.shared = mmap.mmap(file.fileno(), STATE_BYTES)
     return function(*arguments, progress)

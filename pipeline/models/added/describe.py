@@ -122,12 +122,6 @@ def _stated(has: Mapping[str, Any], text: str) -> dict[str, Any]:
     kinds, known = has.get("kinds", []), get_args(Kind)
     if isinstance(kinds, str) or not all(kind in known for kind in kinds):
         raise BadInput(ADD, "", text, f"kinds = {brief(kinds)} must be some of {', '.join(known)}")
-    stated = {"name": name, "setting": setting, "stated": str(version), "answers": sorted(kinds)}
-    return stated | _stated_of_network(has, text)
-
-
-def _stated_of_network(has: Mapping[str, Any], text: str) -> dict[str, Any]:
-    """Return whether a method is trained, and on a single fabric; BadInput if it has one of two functions alone."""
     learns, one_fabric = callable(has.get("network")), has.get("of_one_material", False)
     if learns and not callable(has.get("load")):
         raise BadInput(ADD, "", text, "has a function 'network' and lacks 'load', which receives the trained network")
@@ -135,4 +129,5 @@ def _stated_of_network(has: Mapping[str, Any], text: str) -> dict[str, Any]:
         raise BadInput(ADD, "", text, f"of_one_material = {brief(one_fabric)} must be True or False")
     if one_fabric and not learns:
         raise BadInput(ADD, "", text, "has of_one_material = True and lacks a function 'network', which is trained")
-    return {"has_network": learns, "has_one_fabric": one_fabric}
+    stated = {"name": name, "setting": setting, "stated": str(version), "answers": sorted(kinds)}
+    return stated | {"has_network": learns, "has_one_fabric": one_fabric}

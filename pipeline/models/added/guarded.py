@@ -73,19 +73,15 @@ class Watch:
     """Writes the calls that are under way into shared bytes, if there are any."""
 
     def __init__(self) -> None:
-        self._shared: Any = None
+        self.shared: Any = None
         self._running, self._lock = 0, threading.Lock()
-
-    def attach(self, shared: Any) -> None:
-        """Write to these bytes from now on."""
-        self._shared = shared
 
     def mark(self, change: int, name: bytes, function: bytes, limit: float) -> None:
         """Note the begin of a call (`change` = 1) or its end (-1)."""
-        if self._shared is not None:
+        if self.shared is not None:
             with self._lock:
                 self._running += change
-                _STATE.pack_into(self._shared, 0, time.monotonic(), limit, self._running, name, function)
+                _STATE.pack_into(self.shared, 0, time.monotonic(), limit, self._running, name, function)
 
 
 WATCH: Final = Watch()  # the calls of this process

@@ -26,36 +26,34 @@ from pipeline.per_fabric import PerFabric
 from weaves.draft import Matrix
 from weaves.fabric import Fabric
 
-Calls = Callable[[str], AbstractContextManager[None]]
-"""Marks a call of a function, given by its name, and turns its faults into sentences."""
-
 
 class GuardedNetwork(Trainable):
     """A network from outside behind a guard; of its functions ``loss`` is needed, the others have defaults.
 
-    `name` is that of the method in tables, `fabrics` are those that it learns, `call` guards its functions. The
-    training loop guards ``loss``, together with the gradients.
+    `fabrics` are those that it learns, `root` is the method's file, or the folder of its package. The training loop
+    guards ``loss``, together with the gradients.
     """
 
-    def __init__(self, network: nn.Module, name: str, fabrics: Sequence[Fabric], call: Calls) -> None:
+    def __init__(self, network: nn.Module, options: AddedMethod, root: Path, fabrics: Sequence[Fabric]) -> None:
         super().__init__()
-        self.network, self.name, self.fabrics, self._call = network, name, fabrics, call
+        self.network, self.options, self.root, self.fabrics = network, options, root, fabrics
 
     def call(self, function: str) -> AbstractContextManager[None]:
         """Return the guard of a call of one of its functions."""
-        return self._call(function)
+        return faults_of(self.options.name, function, self.options.limit, self.root)
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the loss of a batch; torch's own random numbers depend on seed and step alone, too."""
         torch.manual_seed(int(random.integers(2**63)))
+        name = self.options.name
         loss: object = self.network.loss(batch, random)  # type: ignore[operator]
         if not isinstance(loss, Tensor):
-            raise MethodFailed(self.name, f"loss returned {type(loss).__name__}; a tensor with one number is needed")
+            raise MethodFailed(name, f"loss returned {type(loss).__name__}; a tensor with one number is needed")
         if loss.ndim or not loss.is_floating_point():
             form = f"{str(loss.dtype).removeprefix('torch.')} {tuple(loss.shape)}"
-            raise MethodFailed(self.name, f"loss returned a tensor {form}; one number, shape (), is needed")
+            raise MethodFailed(name, f"loss returned a tensor {form}; one number, shape (), is needed")
         if torch.is_grad_enabled() and not loss.requires_grad:
-            raise MethodFailed(self.name, "loss returned a number that does not depend on the network's parameters")
+            raise MethodFailed(name, "loss returned a number that does not depend on the network's parameters")
         return loss
 
     def start_at(self, target: Tensor) -> None:
@@ -127,11 +125,7 @@ def _about(fabric: Fabric) -> dict[str, Any]:
 def _built(method: Any, options: AddedMethod, root: Path, about: Sequence[Mapping[str, Any]]) -> GuardedNetwork:
     """Return the network of a method for fabrics of these `_about`; MethodFailed if it cannot be trained."""
     fabrics = [_uncoloured(each) for each in about]
-
-    def call(function: str) -> AbstractContextManager[None]:
-        return faults_of(options.name, function, options.limit, root)
-
-    with call("network"):
+    with faults_of(options.name, "network", options.limit, root):
         network = method.network(list(fabrics))
     returned = f"network returned {type(network).__name__}"
     if not isinstance(network, nn.Module):
@@ -140,7 +134,7 @@ def _built(method: Any, options: AddedMethod, root: Path, about: Sequence[Mappin
         raise MethodFailed(options.name, f"{returned}, which lacks the function 'loss'")
     if not any(weight.requires_grad for weight in network.parameters()):
         raise MethodFailed(options.name, f"{returned}, which has nothing to train")
-    return GuardedNetwork(network, options.name, fabrics, call)
+    return GuardedNetwork(network, options, root, fabrics)
 
 
 def _uncoloured(about: Mapping[str, Any]) -> Fabric:

@@ -59,19 +59,16 @@ class CurvedOptions(TextureOptions):
         return self
 
     @property
-    def silhouettes(self) -> SilhouetteRows:
-        """The queries about the silhouette."""
-        return SilhouetteRows(
+    def extra_rows(self) -> tuple[ExtraRows, ...]:  # type: ignore[override]
+        """The queries about the silhouette of the trained fabric."""
+        names = "rows", "points", "sigma", "anywhere", "seed"
+        rows = SilhouetteRows(
             kind="opacity" if self.silhouette == "opacity" else "grazing_cosine",
             largest_curvature=self.largest_curvature,
             footprint=self.footprint,
-            **{name: getattr(self, f"silhouette_{name}") for name in ("rows", "points", "sigma", "anywhere", "seed")},
+            **{name: getattr(self, f"silhouette_{name}") for name in names},
         )
-
-    @property
-    def extra_rows(self) -> tuple[ExtraRows, ...]:  # type: ignore[override]
-        """The queries about the silhouette of the trained fabric."""
-        return (self.silhouettes,)
+        return (rows,)
 
     @property
     def departures(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -43,17 +43,6 @@ def random_pyramid(channels: int, shapes: Sequence[tuple[int, int]]) -> nn.Param
     return nn.ParameterList(nn.Parameter(_FEATURE_SCALE * torch.randn(channels, *shape)) for shape in shapes)
 
 
-def shifted(output: Tensor, u: Tensor, v: Tensor, wo: Tensor, repeat: tuple[int, int]) -> tuple[Tensor, Tensor]:
-    """Shift centres u, v (n,), in repeats, along the view as parallax does.
-
-    The shift is 0.1 output wo.xy / max(wo.z, 0.6), in mean sides of the repeat; `output` (n, 1) is the learnt depth.
-    """
-    shift = DEPTH_SCALE * output * wo[:, :2] / wo[:, 2:].clamp_min(STEEPEST)
-    ends, picks = repeat
-    side = math.sqrt(ends * picks)
-    return u + shift[:, 0] * (side / ends), v + shift[:, 1] * (side / picks)
-
-
 def blurred(texture: Tensor, deviation: float) -> Tensor:
     """Blur a texture (channels, rows, columns) around the repeat, exactly, in the frequency domain.
 
@@ -180,11 +169,19 @@ class TextureNetwork(QueryNetwork):
         return read_pyramid(levels, u, v, sigma, texels, blur)
 
     def moved(self, u: Tensor, v: Tensor, sigma: Tensor, wo: Tensor, seen: Tensor) -> tuple[Tensor, Tensor]:
-        """Return centres u, v shifted by the learnt depth, if there is one; `seen` are its inputs for the viewer."""
+        """Return centres u, v (n,), in repeats, shifted along the view by the learnt depth, as parallax does.
+
+        The shift is 0.1 depth wo.xy / max(wo.z, 0.6), in mean sides of the repeat; `seen` are the perceptron's inputs
+        for the viewer. Without an offset texture nothing is shifted.
+        """
         if self.offset is None or self.depth is None:
             return u, v
         here = self.read([self.depth], u, v, sigma)
-        return shifted(self.offset(torch.cat([here, seen], dim=-1)), u, v, wo, self.repeat)
+        depth = self.offset(torch.cat([here, seen], dim=-1))
+        shift = DEPTH_SCALE * depth * wo[:, :2] / wo[:, 2:].clamp_min(STEEPEST)
+        ends, picks = self.repeat
+        side = math.sqrt(ends * picks)
+        return u + shift[:, 0] * (side / ends), v + shift[:, 1] * (side / picks)
 
     def _parts(self) -> tuple[list[nn.Parameter], list[nn.Parameter]]:
         """Return the parameters of perceptrons and of textures."""

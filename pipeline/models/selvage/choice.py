@@ -91,17 +91,14 @@ def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -
         over = _mean_seconds(*some, seconds, PRICES[middle], chosen[: len(some[0])]) > time
         low, high = (middle, high) if over else (low, middle)
     price = PRICES[low]
-    while _mean_seconds(squares, kinds, seconds, price, chosen) > time and price < np.inf:
+    while _mean_seconds(squares, kinds, seconds, price, chosen) > time:
         price = max(_RAISE * price, PRICES[1])
     return chosen
 
 
 def _mean_seconds(squares: Float32, kinds: Index, seconds: Float64, price: float, chosen: Chosen) -> float:
     """Write the answers at a price; return their mean seconds."""
-    if price == np.inf:
-        chosen[:] = seconds[kinds].argmin(axis=1)
-    else:
-        choose_at(squares, kinds, price * seconds, chosen)
+    choose_at(squares, kinds, price * seconds, chosen)
     return float(seconds[kinds, chosen].mean())
 
 

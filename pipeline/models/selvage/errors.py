@@ -61,62 +61,51 @@ def cases_of(queries: Queries) -> Index:
 
 
 @kernel
-def _write_terms(queries: Queries, n: int, terms: Float32) -> None:
-    """Write the terms of query n, (TERMS,)."""
-    sigma, minor = queries.sigma[n], queries.sigma_minor[n]
-    size = min(max(_HALF * np.log(sigma * minor), _SMALLEST), _LARGEST)
-    length = np.abs(np.log(sigma / minor))
-    viewer = -np.log(max(queries.wo[n, 2], _LEAST_COSINE))
-    light = -np.log(max(abs(queries.wi[n, 2]), _LEAST_COSINE))
-    bend = np.log(_1 + _BENDS * queries.curvature[n])
-    terms[0] = _1
-    terms[1], terms[2], terms[3] = size, size * size, size * size * size
-    terms[4], terms[5], terms[6] = viewer, viewer * viewer, size * viewer
-    terms[7], terms[8], terms[9] = light, light * light, size * light
-    terms[10] = viewer * light
-    terms[11], terms[12] = length, size * length
-    terms[13], terms[14] = bend, size * bend
+def _write_terms(queries: Queries, result: Float32) -> None:
+    """Write the terms of N queries, (N, TERMS)."""
+    for n in range(len(result)):
+        terms = result[n]
+        sigma, minor = queries.sigma[n], queries.sigma_minor[n]
+        size = min(max(_HALF * np.log(sigma * minor), _SMALLEST), _LARGEST)
+        length = np.abs(np.log(sigma / minor))
+        viewer = -np.log(max(queries.wo[n, 2], _LEAST_COSINE))
+        light = -np.log(max(abs(queries.wi[n, 2]), _LEAST_COSINE))
+        bend = np.log(_1 + _BENDS * queries.curvature[n])
+        terms[0] = _1
+        terms[1], terms[2], terms[3] = size, size * size, size * size * size
+        terms[4], terms[5], terms[6] = viewer, viewer * viewer, size * viewer
+        terms[7], terms[8], terms[9] = light, light * light, size * light
+        terms[10] = viewer * light
+        terms[11], terms[12] = length, size * length
+        terms[13], terms[14] = bend, size * bend
 
 
 @kernel
-def _write_logarithms(queries: Queries, cases: Index, coefficients: Float32, terms: Float32, result: Float32) -> None:
+def _write_logarithms(terms: Float32, cases: Index, coefficients: Float32, result: Float32) -> None:
     """Write the logarithms of the mean squared errors of N queries, (N, answers)."""
     for n in range(len(result)):
-        _write_terms(queries, n, terms)
         own, place = coefficients[cases[n]], TERMS
         for end in SIZES:
-            place += int(terms[1] > end)
+            place += int(terms[n, 1] > end)
         for answer in range(len(own)):
             total = own[answer, place]
             for t in range(TERMS):
-                total += own[answer, t] * terms[t]
+                total += own[answer, t] * terms[n, t]
             result[n, answer] = total
 
 
 def squared_errors(queries: Queries, coefficients: Float32) -> Float32:
     """Return the expected squared errors of all answers to N queries, (N, answers), by `coefficients_of` a cloth."""
     result = np.empty((len(queries.u), coefficients.shape[1]), np.float32)
-    terms = np.empty(TERMS, np.float32)
-    _write_logarithms(_contiguous(queries), cases_of(queries), np.ascontiguousarray(coefficients), terms, result)
+    _write_logarithms(terms_of(queries), cases_of(queries), np.ascontiguousarray(coefficients), result)
     return np.exp(result, out=result)
-
-
-def _contiguous(queries: Queries) -> Queries:
-    """Return queries whose columns kernels read, float32 and contiguous."""
-    return Queries(*(np.ascontiguousarray(column, np.float32) for column in queries))
 
 
 def terms_of(queries: Queries) -> Float32:
     """Return the terms of N queries, (N, TERMS)."""
     result = np.empty((len(queries.u), TERMS), np.float32)
-    _write_all_terms(_contiguous(queries), result)
+    _write_terms(Queries(*(np.ascontiguousarray(column, np.float32) for column in queries)), result)
     return result
-
-
-@kernel
-def _write_all_terms(queries: Queries, result: Float32) -> None:
-    for n in range(len(result)):
-        _write_terms(queries, n, result[n])
 
 
 def coefficients_of(fabric: Fabric, behind: bool) -> Float32:

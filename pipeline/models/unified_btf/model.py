@@ -123,11 +123,6 @@ class SetEncoder(nn.Module):
         return functional.relu(functional.linear(mean, self.join.weight * scale, self.join.bias))
 
 
-def decoder(latent: int, hidden: int, outputs: int = 4) -> nn.Sequential:
-    """Return the published decoder: latent and angles to `outputs` numbers."""
-    return perceptron(latent + _DIRECTION_NUMBERS, hidden, _DECODER_LAYERS, outputs)
-
-
 class UnifiedBtfNetwork(EncoderDecoder):
     """Encoder and decoder, with the samples of the fabrics trained on, by index in batches; none for inference."""
 
@@ -138,7 +133,8 @@ class UnifiedBtfNetwork(EncoderDecoder):
     def __init__(self, options: BtfOptions, texels: Sequence[Texels] = ()) -> None:
         super().__init__()
         self.options = options
-        self.encoder, self.decoder = SetEncoder(options), decoder(options.latent, options.hidden)
+        self.encoder = SetEncoder(options)
+        self.decoder = perceptron(options.latent + _DIRECTION_NUMBERS, options.hidden, _DECODER_LAYERS, 4)
         self._held = tuple(texels)  # kept in use, so that validation finds them
         self._texels = list(texels)
 

@@ -19,9 +19,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from pipeline.models.domain import YARN_NUMBERS
 from weaves.draft import Draft, Matrix
 from weaves.fabric import Fabric
-from weaves.yarn import Yarn
 
 
 class Symmetry(NamedTuple):
@@ -86,7 +86,7 @@ def moved(fabric: Fabric, symmetry: Symmetry) -> Fabric:
     if symmetry.exchange:
         matrix, warp, weft = ~matrix.T, weft, warp
     if sum(symmetry) % 2:
-        warp, weft = _other_handed(warp), _other_handed(weft)
+        warp, weft = (yarn.model_copy(update={"twist": -yarn.twist}) for yarn in (warp, weft))
     return _with_draft(fabric.model_copy(update={"warp": warp, "weft": weft}), matrix)
 
 
@@ -109,15 +109,8 @@ def _smallest(fabric: Fabric) -> tuple[bytes, list[float], tuple[int, int]]:
     windows = np.lib.stride_tricks.sliding_window_view(np.tile(matrix, (2, 2)), matrix.shape)[:picks, :ends]
     numbers = np.packbits(windows.reshape(picks * ends, -1), axis=-1)
     index = min(range(picks * ends), key=lambda row: numbers[row].tobytes())
-    return numbers[index].tobytes(), _numbers(fabric.warp) + _numbers(fabric.weft), divmod(index, ends)
-
-
-def _numbers(yarn: Yarn) -> list[float]:
-    return [yarn.roughness, yarn.bend, yarn.twist, yarn.relief, yarn.width, yarn.blend]
-
-
-def _other_handed(yarn: Yarn) -> Yarn:
-    return yarn.model_copy(update={"twist": -yarn.twist})
+    of_yarns = [float(getattr(yarn, name)) for yarn in (fabric.warp, fabric.weft) for name in YARN_NUMBERS]
+    return numbers[index].tobytes(), of_yarns, divmod(index, ends)
 
 
 def _with_draft(fabric: Fabric, matrix: np.typing.NDArray[np.bool_]) -> Fabric:

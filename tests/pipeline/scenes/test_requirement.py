@@ -38,7 +38,7 @@ def test_stretched_footprints_keep_their_ratio_and_area_and_classes_of_size_sum_
     shaped = required(QueryOptions(sigma=(0.5, 0.5), stretch=4.0, behind=0.5, curvature=(0.01, 0.1)))
     assert 3.9 <= shaped.stretch <= 4.0 * 1.26
     assert shaped.sigma == pytest.approx((0.4, 0.625), rel=1e-3)
-    assert shaped.queries(frozenset()).plain
+    assert not shaped.queries(frozenset()).kinds
     assert shaped.queries(frozenset({"behind"})).behind > 0.4
     found = required(QueryOptions(sigma=(0.05, 32.0)))
     assert sum(found.sizes.values()) == pytest.approx(1.0)

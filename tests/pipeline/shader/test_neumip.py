@@ -16,7 +16,7 @@ FABRIC = load_fabric(CLOTH)
 
 @pytest.fixture
 def method(neumip):
-    (method,) = load_model(model_folder(neumip, "test", "model"))
+    (method,) = load_model(model_folder(neumip, "test", "model", []))
     return method
 
 

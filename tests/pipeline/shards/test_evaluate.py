@@ -59,9 +59,11 @@ class Case:
         pq.write_table(table, self.queries, row_group_size=row_group_size)
         return self
 
-    def run(self, answerer=None, **choices):
+    def run(self, answerer=None, chunk=2048, **choices):
         answerer = answerer or truth_answerer(FABRIC, self.options, SEED)
-        return evaluate_file(FABRIC, self.queries, self.out, answerer, **choices)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(evaluate_module, "CHUNK", chunk)
+            return evaluate_file(FABRIC, self.queries, self.out, answerer, **choices)
 
     def result(self):
         return pq.read_table(self.out)
@@ -171,8 +173,8 @@ def test_a_footer_that_claims_other_rows_than_there_are_is_refused(case):
 
 
 def test_only_the_first_of_many_bad_rows_is_described(case, monkeypatch):
-    describe = Mock(wraps=query_file._bad_row)
-    monkeypatch.setattr(query_file, "_bad_row", describe)
+    describe = Mock(wraps=query_file.BadRow)
+    monkeypatch.setattr(query_file, "BadRow", describe)
     columns = query_columns()
     columns["sigma"][:] = -1
     assert f"row 0, column sigma = -1.0: must be greater than 0 ({ROWS - 1} more" in case.write(columns).refused()

@@ -5,15 +5,15 @@ from torch.utils.data import DataLoader
 
 from pipeline.shards.manifest import Manifest, ShardEntry
 from pipeline.shards.pieces import DatasetRows
-from pipeline.shards.store import ROW_GROUP, read_groups, read_table
+from pipeline.shards.store import ROW_GROUP, read_table
 from pipeline.training import dataset
-from pipeline.training.dataset import COLUMNS, Batches, Order, RowStream, TrainingRows, load_rows
+from pipeline.training.dataset import COLUMNS, Order, RowStream, TrainingRows
 from pipeline.truth.query import Answers, Queries
 from tests.datasets import write_dataset
 from tests.refusals import refusal
 
 
-def test_order_is_a_function_of_seed_and_step_and_batches_hold_the_rows_of_their_fabrics():
+def test_order_is_a_function_of_seed_and_step():
     forwards = Order([[100], [50], [70]], batch=32, fabrics=2, seed=7)
     steps = [forwards.step(step) for step in range(40)]
     for step in (39, 0, 17):  # another order of asking, another object
@@ -24,17 +24,17 @@ def test_order_is_a_function_of_seed_and_step_and_batches_hold_the_rows_of_their
     assert sorted(np.bincount(Order([[3]], batch=8, fabrics=1, seed=0).step(0)[1][0])) == [2, 3, 3]
     order = Order([[10], [10]], batch=9, fabrics=8, seed=0)
     assert (order.fabrics, order.each) == (2, 4)
-    # Each row holds its fabric in column 0 and its number within the fabric in column 1.
-    counts = [30, 20, 40]
-    table = np.zeros((90, COLUMNS), np.float32)
-    table[:, 0], table[:, 1] = np.repeat(range(3), counts), np.concatenate([np.arange(count) for count in counts])
-    rows = TrainingRows(table, counts)
+
+
+def test_batches_hold_the_rows_of_their_fabrics(folder):
+    rows = TrainingRows(Manifest.load(folder), folder, NAMES, torch.device("cpu"))
     order = Order(rows.windows, batch=12, fabrics=2, seed=3)
-    batch = Batches(rows, order, torch.device("cpu")).step(5)
     fabrics, numbers = order.step(5)
+    batch = rows.batch(fabrics, numbers)
     np.testing.assert_array_equal(batch.fabric, fabrics)
-    np.testing.assert_array_equal(batch.u, np.repeat(fabrics[:, None], 6, axis=1))
-    np.testing.assert_array_equal(batch.v, numbers)
+    for own, fabric, places in zip(batch.u, fabrics, numbers, strict=True):
+        queries, _ = Manifest.load(folder).read(folder, NAMES[fabric], "train")
+        np.testing.assert_array_equal(own, queries.u[places])
 
 
 @pytest.mark.parametrize("windows", [[48], [16, 32], [16, 16, 16]])
@@ -61,9 +61,9 @@ def test_columns_are_where_batches_look_for_them(tmp_path):
     answers = Answers.opaque(mean, np.zeros((1, 4), np.float32), np.ones(1, np.int32))
     answers = answers._replace(transparency=transparency)
     write_dataset(tmp_path, {"seen": ["denim"]}, [("denim", "train", 0, queries, answers)])
-    rows = load_rows(Manifest.load(tmp_path), tmp_path, ["denim"], tmp_path / "rows.npy")
-    np.testing.assert_array_equal(rows.table, np.arange(17)[None])
-    batch = Batches(rows, Order([[1]], batch=1, fabrics=1, seed=0), torch.device("cpu")).step(0)
+    rows = TrainingRows(Manifest.load(tmp_path), tmp_path, ["denim"], torch.device("cpu"))
+    np.testing.assert_array_equal(rows.spread(COLUMNS), np.arange(17)[None])
+    batch = rows.batch(*Order([[1]], batch=1, fabrics=1, seed=0).step(0))
     for name in Queries._fields:
         np.testing.assert_array_equal(getattr(batch, name)[0], getattr(queries, name))
     np.testing.assert_array_equal(batch.target[0], answers.mean)
@@ -84,27 +84,31 @@ def test_the_rows_of_a_slice_are_of_one_window_and_the_oldest_permutations_are_f
             found = np.searchsorted(starts, rows, side="right")
             assert (found == found[:, :1]).all()
             visited.append(int(found[0, 0]))
-        assert len(order._last) == 1
+        assert order._kept.cache_info().currsize == 1
         orders.append(tuple(visited))
     assert len(set(orders)) > 1
 
 
 def test_rows_that_stay_in_their_shards_are_those_of_the_table(folder, tmp_path, monkeypatch):
     """Every window of every fabric, in both orders of fabrics, as if row groups had a thousand rows."""
-    manifest, orders = Manifest.load(folder), (NAMES, NAMES[::-1])
-    tables = [load_rows(manifest, folder, names, tmp_path / f"{names[0]}.npy") for names in orders]
+    cpu, manifest, orders = torch.device("cpu"), Manifest.load(folder), (NAMES, NAMES[::-1])
+    tables = [TrainingRows(manifest, folder, names, cpu) for names in orders]
+    every, some = tables[0].spread(2 * 4096), tables[0].spread(1000)
+    np.testing.assert_array_equal(some, every[::8])
+    for table in tables:
+        table.spread(1)  # all is read
     monkeypatch.setattr(dataset, "MOST_IN_TABLE", 4096)
     monkeypatch.setattr(dataset, "ROW_GROUP", 1000)
-    monkeypatch.setattr(dataset, "read_groups", groups_of_a_thousand)
+    monkeypatch.setattr(dataset, "read_table", groups_of_a_thousand)
     for names, table in zip(orders, tables, strict=True):
-        windowed = load_rows(manifest, folder, names, tmp_path / "none.npy")
+        windowed = TrainingRows(manifest, folder, names, cpu)
         assert [sum(own) for own in table.windows] == [4096] * 2 and windowed.windows == [[2000, 2096]] * 2
         for fabric in range(2):
             for start, rows in ((0, 2000), (2000, 2096)):
                 own = np.array([fabric]), start + np.random.default_rng(start).permutation(rows)[None]
                 np.testing.assert_array_equal(windowed.take(*own), table.take(*own))
-        some = windowed.spread(600)
-        np.testing.assert_array_equal(some, np.concatenate([table.table[:300], table.table[4096:4396]]))
+        every = table.spread(2 * 4096)
+        np.testing.assert_array_equal(windowed.spread(600), torch.cat([every[:300], every[4096:4396]]))
 
 
 @pytest.mark.parametrize("least", [1, 2, 4, 8])
@@ -123,8 +127,8 @@ def test_windows_are_of_whole_row_groups_and_of_enough_rows(tmp_path, least, mon
     assert read == [(shard.file, group) for shard in shards for group in range(-(-shard.rows // 10))]
 
 
-def groups_of_a_thousand(path, names, first, groups):
-    return read_table(path, names=names).slice(1000 * first, 1000 * groups)
+def groups_of_a_thousand(path, names, groups):
+    return read_table(path, names=names).slice(1000 * groups.start, 1000 * (groups.stop - groups.start))
 
 
 NAMES = ["cotton_twill", "polyester_lining"]
@@ -171,7 +175,7 @@ def test_the_order_is_that_of_the_files_or_of_the_seed_well_shuffled(folder):
 def test_row_groups_of_a_shard_are_slices_of_it(folder, tmp_path):
     path = next(folder.glob("*.parquet"))
     whole = read_table(path, names=["u", "sigma"])
-    assert read_groups(path, ["u", "sigma"], 0, 8).equals(whole) and whole.num_rows < ROW_GROUP
-    assert read_groups(path, ["u", "sigma"], 1, 8).num_rows == 0
+    assert read_table(path, names=["u", "sigma"], groups=slice(0, 8)).equals(whole) and whole.num_rows < ROW_GROUP
+    assert read_table(path, names=["u", "sigma"], groups=slice(1, 9)).num_rows == 0
     (tmp_path / "cut.parquet").write_bytes(path.read_bytes()[:-9])
-    assert "not a whole Parquet file" in refusal(read_groups, tmp_path / "cut.parquet", ["u"], 0, 1)
+    assert "not a whole Parquet file" in refusal(read_table, tmp_path / "cut.parquet")

@@ -121,7 +121,7 @@ def test_silhouettes_are_learnt(options):
     losses = descend(optimiser, 120, lambda _: network._edge_loss(*network.silhouettes.draw(128, random)))
     assert min(losses) > 0 or options.silhouette == "opacity"
     other = CURVED.model_copy(update={"silhouette_seed": 5, "silhouette_points": 256})
-    others = SilhouetteData(other.silhouettes.answer(DENIM, 0, 512), DENIM.weave.repeat)
+    others = SilhouetteData(other.extra_rows[0].answer(DENIM, 0, 512), DENIM.weave.repeat)
     view = View(*(others.get_buffer(name) for name in View._fields))
     target = others.get_buffer("target")[:, 0]
     error = (network.eval().cover(view).detach() - target).square().mean().sqrt()

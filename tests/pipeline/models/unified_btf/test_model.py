@@ -6,9 +6,10 @@ import torch
 
 from pipeline.models.domain import Domain
 from pipeline.models.network import NetworkMethod
+from pipeline.models.networks.layers import perceptron
 from pipeline.models.unified_btf import UnifiedBtfOptions
 from pipeline.models.unified_btf import model as btf
-from pipeline.models.unified_btf.model import UnifiedBtfNetwork, averaged, decoder, restore
+from pipeline.models.unified_btf.model import UnifiedBtfNetwork, averaged, restore
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.shards.store import rows_of
 from tests.pipeline.models.stand_ins import SMALL, batch_of, card_of, descend, untrained
@@ -24,9 +25,9 @@ SHANTUNG = load_fabric("silk_shantung")
 @pytest.mark.parametrize(("latent", "published"), [(32, 38_269), (8, 35_725)])
 def test_decoder_has_the_published_weights(latent, published):
     """With RGB out: Rainer et al. 2020 and 2019. Bytes: levels of 4, 2 and 1 texels a side, and the decoder."""
-    assert sum(weight.numel() for weight in decoder(latent, 106, outputs=3).parameters()) == published
-    weights = sum(weight.numel() for weight in decoder(32, 16).parameters())
-    assert NetworkMethod(UnifiedBtfNetwork(BTF)).bytes_stored(LINING) == 4 * (32 * (16 + 4 + 1) + weights)
+    assert sum(weight.numel() for weight in perceptron(latent + 4, 106, 4, 3).parameters()) == published
+    network = UnifiedBtfNetwork(BTF)
+    assert NetworkMethod(network).bytes_stored(LINING) == 4 * (32 * (16 + 4 + 1) + network.counts()["decoder"])
 
 
 def test_the_pyramid_is_averaged_and_read_and_what_differs_from_place_to_place_is_learnt():
