@@ -4,8 +4,6 @@ Parameters are declared at the function of a verb, whose module is imported when
 Errors and exit codes are in `jobs.exits`.
 """
 
-from __future__ import annotations
-
 import sys
 import tomllib
 from collections.abc import Sequence

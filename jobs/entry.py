@@ -3,8 +3,6 @@
 A part (`--part`) computes on one thread, as workers do: libraries read the number of threads when they are loaded.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 

@@ -4,8 +4,6 @@
 bug: its traceback goes to a file, and the sentence names the file.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import os

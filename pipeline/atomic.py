@@ -1,7 +1,5 @@
 """Files that exist whole or not at all: written under a temporary name, synced, renamed into place."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

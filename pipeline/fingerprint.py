@@ -4,8 +4,6 @@ Two specifications are the same work exactly when their fingerprints agree. Stag
 fingerprinted; the git revision is not.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence

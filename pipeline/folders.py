@@ -8,8 +8,6 @@ New files are made in ``.tmp-LISTING`` in the folder and then renamed into place
 rename a journal beside them names old and new ones, so that a run after a kill knows which files are its own.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

@@ -5,8 +5,6 @@ reached gets `UNREACHED_SECONDS`, because its address may be wrong. The first fa
 most once in a minute.
 """
 
-from __future__ import annotations
-
 import asyncio
 import sys
 import time

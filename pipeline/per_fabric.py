@@ -4,8 +4,6 @@ Fabrics of equal optics share an entry. A known fabric object is found by its id
 longer than a few hundred queries. One thread computes; others wait for its product.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from threading import RLock
 from typing import Generic, TypeVar

@@ -8,8 +8,6 @@ Credentials come from the environment, as each file system of fsspec defines it 
 ``AWS_ENDPOINT_URL``, …). They are no part of an address, of a recipe or of any product.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import tempfile

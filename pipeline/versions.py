@@ -5,8 +5,6 @@ every task whose result depends on them; the git revision is not. They stand apa
 that a plan needs no compiler.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 TRUTH: Final = 9

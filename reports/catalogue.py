@@ -4,8 +4,6 @@ The entry names the table that shows the metric; nothing else is needed for its 
 here.
 """
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Final, Literal, NamedTuple

@@ -19,8 +19,6 @@ colour measure the relative RMSE of .3 (S_warp + S_weft) + .5 (C_warp + C_weft),
 Intervals are 95 % percentile bootstraps over queries [Efron1993Bootstrap] by scipy, with a fixed seed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

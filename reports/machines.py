@@ -4,8 +4,6 @@ Numbers that a machine decides (times, rates, memory: `of_machine` of `reports.c
 machine, whose name is then part of their provenance. Other numbers are kept once where all machines have the same one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Each measurement takes the class of the options that it reads, and no more: what
 shapes its numbers. `BenchOptions` joins them as the keys of a recipe. Nothing heavy is imported here.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Final, Literal, TypeVar
 
 from pydantic import Field

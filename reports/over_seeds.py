@@ -9,8 +9,6 @@ answer the same queries. So their errors share the choice of the queries, and th
 between s / sqrt(n) and s, the mean standard error: s is stated, which is never too small.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence

@@ -4,8 +4,6 @@ A colour order is a palette and two sequences, that of the ends and that of the 
 end (pick) of the draft and repeats on its own: its length need not fit the repeat of the weave.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Final, NamedTuple, Self
 
 import numpy as np

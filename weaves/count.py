@@ -16,8 +16,6 @@ that is inclined along the warp passes between two wefts, ellipses b wide and re
 from the normal: the cut-off angle along the warp. That along the weft is the same of a. Yarns are taken as straight.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, NamedTuple

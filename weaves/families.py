@@ -12,8 +12,6 @@ broken twill turns round halfway through the repeat, a herringbone after a whole
 they turn, which cuts the floats there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import gcd
 from typing import Annotated, Any, Literal

@@ -7,8 +7,6 @@ heights a vertical wall closes the step. At the rim of a gap the wall goes down 
 that passes it leaves, as it does where the height field has no floor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple
 

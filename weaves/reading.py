@@ -4,8 +4,6 @@ Whoever wrote them may have meant harm. So only regular files are opened (no pip
 for ever), and no more than a stated number of bytes is read.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import stat

@@ -16,8 +16,6 @@ curvature k instead of the radius R, everything stays finite and exact as the be
 A weft's frame is the warp's turned by 90°: (x, y) -> (y, -x). Fabric axes: pipeline.truth.conventions.
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@
 names file, dotted key, value and what is allowed.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping, Sequence

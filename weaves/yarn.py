@@ -24,8 +24,6 @@ Summed over viewers, what a repeat reflects of one light is bounded alike; the d
 reciprocal and may exceed 1: it has 2.5 for light at 88 degrees behind a satin bent by 2 degrees.)
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Final, cast
 

@@ -6,8 +6,6 @@ Tartan lies in folds up to the horizon, in low sun under an evening sky. The fol
 and far ones are as large in the picture. Nothing is random: the picture has no noise.
 """
 
-from __future__ import annotations
-
 import math
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

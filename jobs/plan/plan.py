@@ -3,8 +3,6 @@
 Every task is listed after those it needs. Each kind of task defines its own identity.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Final
 

@@ -3,8 +3,6 @@
 The driver of a run and the simulated schedule of a plan hand tasks out by the same rule.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Iterable, Mapping, Sequence

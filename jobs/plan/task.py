@@ -5,8 +5,6 @@ own dump, with the versions of the code at work and without the fields that say 
 work is the same task in another recipe, in another order or on more workers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path

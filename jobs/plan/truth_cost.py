@@ -5,8 +5,6 @@ rows if the cloth has many different cells. The other rows are sampled, and so i
 Rays go on below gaps: points of open cloth take longer.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Final, NamedTuple
 

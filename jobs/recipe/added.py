@@ -5,8 +5,6 @@ A recipe names such a method as it names any other, ``[[models]] model = "its_na
 all methods. A recipe alone never runs code.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path

@@ -4,8 +4,6 @@ The questions are the held-out queries of all measured fabrics, numbered fabric 
 what the form states is shown as stated.
 """
 
-from __future__ import annotations
-
 import textwrap
 from pathlib import Path
 from typing import Annotated, Final, NamedTuple

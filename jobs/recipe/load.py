@@ -1,7 +1,5 @@
 """Loading a recipe: TOML in, a frozen Recipe out; files that it names are found, contradictions are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path

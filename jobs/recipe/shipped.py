@@ -1,7 +1,5 @@
 """The recipes that come with the package."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 RECIPES = Path(__file__).parents[1] / "recipes"

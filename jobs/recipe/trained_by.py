@@ -9,8 +9,6 @@ on yarns like those of all. So "seen" and "unseen" mean the same for it as for t
 measured on the fabrics it was trained on and left out on the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

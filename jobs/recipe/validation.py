@@ -1,7 +1,5 @@
 """Validation across the sections of a recipe: each may be valid by itself and not fit the others."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -4,8 +4,6 @@ The cluster on this machine speaks TLS on the loopback, with a certificate that 
 Only processes of the run hold it, so no other user of the machine can hand it work. Its ports answer nobody else.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import multiprocessing

@@ -5,8 +5,6 @@ at the same time; kernels that groups share are compiled once (`pipeline.compile
 reaches is compiled by the first task that calls it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final, NamedTuple
 

@@ -5,8 +5,6 @@ driver's is refused: each new worker is checked before it counts, and a task tha
 computed there.
 """
 
-from __future__ import annotations
-
 import hashlib
 import platform
 import time

@@ -8,8 +8,6 @@ ones behind a training. A task that measures time starts when nothing else runs,
 (`jobs.run.outcome`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field

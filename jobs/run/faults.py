@@ -1,7 +1,5 @@
 """Faults of a recipe's files: what its plan needs, compared with receipts, manifests and lists of files."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
@@ -210,4 +208,4 @@ def own_files(recipe: Recipe, tasks: Sequence[Task], out: Path) -> Iterator[str]
 
 def is_leftover(name: str) -> bool:
     """Return whether a file is what a stopped task leaves: no reader looks at it, and the next run replaces it."""
-    return name.startswith(".tmp-") or name == "checkpoint.safetensors" or name.endswith("-rows.npy")
+    return name.startswith(".tmp-") or name == "checkpoint.safetensors"

@@ -5,8 +5,6 @@ whole or not at all. A task is done exactly when its receipt and every product, 
 state is kept, so nothing has to be repaired after a kill.
 """
 
-from __future__ import annotations
-
 import glob
 import json
 import math

@@ -1,7 +1,5 @@
 """Keep the manifest of a data set in step with the ledger: at once when a task reads it, else every few seconds."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Ways to show progress: bars on a terminal, lines in a log, JSON objects for programs. All are written to stderr."""
 
-from __future__ import annotations
-
 import json
 import math
 import threading

@@ -1,7 +1,5 @@
 """`twillight evaluate`: options from the command line, a trained model in place of the truth, and a summary."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """`twillight import` makes a fabric of a draft file; `export`, `view` and `gallery` write fabrics for others."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field

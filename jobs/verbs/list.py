@@ -3,8 +3,6 @@
 Only what is printed is read and checked: colours and recipes need libraries that take seconds to start.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Final
 
 from cyclopts import Parameter

@@ -4,8 +4,6 @@ Shards, models and Records are compared with their receipts and linked, or copie
 left out: the next run writes them from what is there then.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Parameters that several verbs have on the command line."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass

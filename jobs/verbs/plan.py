@@ -1,7 +1,5 @@
 """`twillight plan` and `twillight status`: what would run and why, with rows and time; what is done and what failed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, NamedTuple

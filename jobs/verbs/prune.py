@@ -4,8 +4,6 @@ Removed are products with their receipts, manifests, and what stopped tasks left
 reports and the recipes of `twillight require`, are listed apart and kept.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

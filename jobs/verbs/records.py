@@ -1,7 +1,5 @@
 """Records of pages: `twillight compare` and `records merge`, and `results`, which writes the tables of a page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated

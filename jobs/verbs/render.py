@@ -1,7 +1,5 @@
 """`twillight render`: a scene as a picture, a film, or a folder of pictures, by any method."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Iterator, Sequence

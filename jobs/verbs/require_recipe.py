@@ -6,8 +6,6 @@ the option `effort`. A truth that cannot answer the queries of the scene (`node_
 replaced by one that samples, at the error of `SAMPLED`.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -7,8 +7,6 @@ given in frames of point sampling at 2 points, timed in turns with it. The last 
 models in the other scenes of the general recipe: a scene's own model answers for its own domain only.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math

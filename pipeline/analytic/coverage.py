@@ -12,8 +12,6 @@ depth, found by bisection. The path of a ray is the same in both directions, so 
 Gaps count as filled.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Final

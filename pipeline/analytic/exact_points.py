@@ -1,7 +1,5 @@
 """Point sampling with a fixed number of points, independent or of the R2 sequence: it aliases [Jin2022Woven]."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.compiled.arrays import Float32

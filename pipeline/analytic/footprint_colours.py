@@ -7,8 +7,6 @@ by the footprint's mass on its cells, times the share of each cell in which it i
 pipeline.truth.scattering.thread_colours has the exact colours.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Final, NamedTuple

@@ -1,7 +1,5 @@
 """Rules of a piece along one axis: Gauss's with the boxes of its nodes, grids of horizons, quantiles of a Gaussian."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import NamedTuple

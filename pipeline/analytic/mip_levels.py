@@ -4,8 +4,6 @@ Maps are read bilinearly within a level and linearly between levels: texels of w
 of standard deviation h / 2 does, so the level is log2(2 sigma / h_0).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar

@@ -6,8 +6,6 @@ The map is read at the mip level whose texels are as wide as a footprint's devia
 moves as a whole: what its rays see besides, and how it is stretched on a slope, is left out.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

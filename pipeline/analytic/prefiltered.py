@@ -13,8 +13,6 @@ as Toksvig (2005) and LEAN mapping (Olano and Baker 2010) do for glossy normals.
 a footprint is moved to the place that its middle ray sees (parallax_mapping).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

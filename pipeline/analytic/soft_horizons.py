@@ -11,8 +11,6 @@ horizon, and is a line between them. Towards a light it is that of the curvature
 (pipeline.truth.scattering.point.directions_of).
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

@@ -10,8 +10,6 @@ time; weaves.surface is the oracle. Flakes need cosines with the tangent alone: 
 axis, which approximations can spare, and saves a third of the arithmetic.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np

@@ -9,8 +9,6 @@ A row of the Parquet form is one pair of patches of a Klems basis. Its columns a
 patches, labels as in XML) and `value` (1/sr, without the cosine). Pairs that are left out are not known.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 from xml.etree import ElementTree

@@ -8,8 +8,6 @@ rays see rims, which light does not meet. A BSDF file has to be, so each pair is
 straight through is a delta lobe; in a patch it is T / projected solid angle, with T the transparency.
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

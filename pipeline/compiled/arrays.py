@@ -1,7 +1,5 @@
 """The array types of kernels; any shape, contiguous unless a docstring says otherwise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -8,8 +8,6 @@ arithmetic. All constants are typed, because numba computes float32 times a lite
 1 - exp(-x) = (1 - 2^-n) + 2^-n q keeps every digit of a thin layer, where n = 0.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

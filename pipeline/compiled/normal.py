@@ -1,7 +1,5 @@
 """The standard normal distribution: its quantile in double precision, its distribution function in single."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

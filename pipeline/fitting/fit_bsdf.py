@@ -4,8 +4,6 @@ Each of `DRAFTS` has its own best geometry and optics. The draft is the one whos
 laboratories, are least.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

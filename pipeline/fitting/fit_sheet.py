@@ -4,8 +4,6 @@ Gaps are what goes straight through, (1 - a)(1 - b) with the widths a and b: bot
 Colours are those with which the light of all bounces has the reflectances and what is scattered through.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Final

@@ -1,7 +1,5 @@
 """Fabrics that were fitted: numbers with intervals, errors, sentences on what is assumed and what is not known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 

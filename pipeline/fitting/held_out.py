@@ -5,8 +5,6 @@ are formulas in use for light straight through shades, with the openness as thei
 theta to the normal, profile angles those of the direction's projections onto the planes across warp and weft.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

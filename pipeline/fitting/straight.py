@@ -13,8 +13,6 @@ explains (3.84 variances of a patch over the number of patches, 95 %). The noise
 that of measurements.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

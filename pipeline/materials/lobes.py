@@ -16,8 +16,6 @@ A fibre of roughness alpha along x has the GGX distribution of a_x = alpha, a_y 
 proportional to (h_x^2 / alpha^2 + h_y^2 + h_z^2)^-2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache

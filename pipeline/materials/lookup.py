@@ -13,8 +13,6 @@ warp and green for the weft; each component has its share of F. With parallax, e
 height map that its viewer sees (pipeline.analytic.parallax_mapping).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -10,8 +10,6 @@ it; cells that a translation of the cloth carries into one another share their b
 horizon's elevation for evenly spaced azimuths, as in Max's horizon maps (1988).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

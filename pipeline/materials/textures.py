@@ -20,8 +20,6 @@ alpha_across = r^2 sqrt(2 / (1 + (1 - a)^2)), alpha_along = (1 - a) alpha_across
 and s with alpha_along = r^2, alpha_across = r^2 + (1 - r^2) s^2 [Khronos2021GLTF].
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

@@ -10,8 +10,6 @@ view ray as the shading normal's derivatives say (`si.dn_du`, `si.dn_dv`), which
 where they are 0.
 """
 
-from __future__ import annotations
-
 from contextvars import ContextVar
 from functools import reduce
 from operator import or_

@@ -19,8 +19,6 @@ as the shape does along the view ray. That is measured by two more rays, as in `
 of u are a tenth of a yarn spacing by default. A ray that leaves a silhouette again goes on where it leaves the shape.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager

@@ -1,7 +1,5 @@
 """The plugins entered into Mitsuba, for the variant that is set and each that is set later; scenes that wear them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from functools import wraps

@@ -14,8 +14,6 @@ Rows are answered in runs of fixed length, on all cores. A method that draws poi
 from the run's own directions: a picture depends on the seed of its rays alone.
 """
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ of threads, and each is computed by one thread, so no bit of an answer depends o
 has threads of its own, calls the method itself.
 """
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np

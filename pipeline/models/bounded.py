@@ -17,8 +17,6 @@ unseen cloth networks predict the sum of both yarns better than the share of eac
 opposite signs, and a bound that only cuts removes one of the two.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -3,8 +3,6 @@
 Both are compared with these hashes whenever a model is loaded, so that no damaged file is used.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

@@ -12,8 +12,6 @@ turns across a footprint, narrow footprints at low views and irregular drafts, a
 Viewers too low for the truth are tilted up to the lowest one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The interface of a method, which a benchmark measures: it evaluates queries on a fabric; arrays are NumPy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from typing import Protocol, runtime_checkable
 

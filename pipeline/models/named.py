@@ -5,8 +5,6 @@
 most accurate.
 """
 
-from __future__ import annotations
-
 from pipeline.models.card import CARD
 from pipeline.models.catalogue import CLASSES
 from pipeline.models.domain import Domain

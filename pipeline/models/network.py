@@ -5,8 +5,6 @@ fabric to the four components (`PerQuery`). As a separate module it can be compi
 (`pipeline.models.runtimes`) without a new training.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, ClassVar, Final, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable

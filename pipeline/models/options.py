@@ -1,7 +1,5 @@
 """Options that several models have: of all, of networks whose loss is that of components, of textures."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, SerializationInfo, SerializerFunctionWrapHandler, model_serializer, model_validator

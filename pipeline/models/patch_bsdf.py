@@ -11,8 +11,6 @@ probability of its own, and neither `eval` nor `pdf` knows it. On curved cloth a
 leave it again; the coverage is the caller's part (`pipeline.mitsuba.worn`).
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

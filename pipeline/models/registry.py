@@ -6,8 +6,6 @@ functions ``restore(options, trained) -> list of Method`` and ``build(options, f
 the columns of its rows, fabric by fabric.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path

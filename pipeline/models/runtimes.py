@@ -12,8 +12,6 @@ A runtime in single precision (`_EXACT`) must agree with the method itself: both
 a difference above `RUNTIME_TOLERANCE` is refused.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import logging
 import warnings

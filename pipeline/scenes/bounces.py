@@ -6,8 +6,6 @@ all of them. So it is added where components become colours, from a table of the
 through yarns, has a larger table: that of cloth with gaps or with a colour k_dt.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scenes by name: those that come with the package, a Mitsuba XML file, or a TOML file that describes one."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

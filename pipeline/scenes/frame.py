@@ -15,8 +15,6 @@ Radiance of a shape = albedo / pi times the sum over the lights in sight of irra
 the lights and shadows of the cloth itself, without noise. Light that shapes or cloth throw on each other is left out.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import chain
 from typing import Any, Final, NamedTuple

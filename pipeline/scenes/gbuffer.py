@@ -6,8 +6,6 @@ contains the incident cosine (pipeline.truth.conventions), times the light's irr
 places under several lights are M queries, and one light that reaches every place gives M = N.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

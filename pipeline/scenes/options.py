@@ -1,7 +1,5 @@
 """Every choice of the two views, as named options; nothing heavy is imported here."""
 
-from __future__ import annotations
-
 from typing import Final, Literal
 
 from pydantic import Field

@@ -11,8 +11,6 @@ The frame is cut into windows of at most `QUERIES` queries, so that memory does 
 windows nor the chunks of queries depend on the number of threads, so the bytes do not either.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future

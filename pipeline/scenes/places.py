@@ -19,8 +19,6 @@ Such a place is at a silhouette if past it the ray meets no other cloth: cloth b
 silhouette.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """Rays in bulk through a Mitsuba scene, whichever variant is set, and AOVs: what is known of the surface they meet."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 

@@ -8,8 +8,6 @@ u runs along the weft, v along the warp, and the front of the cloth is where the
 left-handed about it, v is counted backwards, so that no cloth is ever a mirror image.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Final

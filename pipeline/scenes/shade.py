@@ -4,8 +4,6 @@ f_P = k_s,warp S_warp + k_s,weft S_weft + k_d,warp C_warp + k_d,weft C_weft alre
 (pipeline.truth.conventions): under a light of irradiance E a pixel's radiance is E f_P.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -4,8 +4,6 @@ Cloth bends and does not stretch: it is a surface that unrolls into the plane, a
 cone, and uv are the flat cloth's own lengths. The sphere alone is stretched.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, Final

@@ -5,8 +5,6 @@ is not there, and waits for ever for a pipe that a scene names as a file. So a s
 its XML (`elements`), and its triangles in PLY and in Mitsuba's own format (`refuse_lost_vertices`).
 """
 
-from __future__ import annotations
-
 import math
 import struct
 import zlib

@@ -6,8 +6,6 @@ again (a slope of .57 of the ray to the cloth would be needed), and the lights t
 Footprints and curvature are those of `pipeline.scenes.frame`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

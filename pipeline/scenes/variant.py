@@ -10,8 +10,6 @@ file before its own folder. Whoever writes a scene could so bring code. Here its
 scene's types must be plugins of that folder (`instantiate`).
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

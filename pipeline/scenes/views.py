@@ -11,8 +11,6 @@ The papers' footprint is round, so sigma = pixel_sigma sqrt|det J| (`geometric_m
 singular value (`major`). Local frame of the directions: x along the weft (dp/du), y along the warp (dp/dv), z = normal.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

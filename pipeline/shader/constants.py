@@ -1,7 +1,5 @@
 """Constants of the shader: those of pipeline.analytic, so that no number is typed twice."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from types import ModuleType

@@ -1,7 +1,5 @@
 """`soft_nodes.json`, or that of another model: an exported folder, for a program that has not seen this package."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any, Final, NamedTuple

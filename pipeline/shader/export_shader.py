@@ -1,7 +1,5 @@
 """A folder with a model of a fabric for renderers: source, tables, descriptor and golden vectors."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Sequence
 from pathlib import Path

@@ -6,8 +6,6 @@ STEADY, as a share of the range of its column, if the last digits of its footpri
 rays turn over curved cloth: their places there are square roots of small numbers, which lose half of their digits.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from functools import partial

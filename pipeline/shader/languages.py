@@ -1,7 +1,5 @@
 """Shading languages: what slangc makes of the source, and where it is found."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

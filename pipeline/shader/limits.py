@@ -1,7 +1,5 @@
 """Limits of the shader: larger cloth is refused."""
 
-from __future__ import annotations
-
 from typing import Final
 
 MOST_NODES: Final = 1024  # most fixed nodes of a table, those that fill up blocks included

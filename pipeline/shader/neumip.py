@@ -5,8 +5,6 @@ row, one row an input. Rows are filled up with zeros to whole elements, and inpu
 shader multiplies vectors.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from functools import partial
 from typing import Final

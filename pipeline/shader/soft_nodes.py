@@ -1,7 +1,5 @@
 """Soft nodes as a shader."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Final
 

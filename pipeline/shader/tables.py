@@ -12,8 +12,6 @@
 `layout.slang` holds the constants and a function that reads the scalars and places.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ a family send alike, each by the mass of the footprint on it:
 by Gauss's rule, which the shader has for its lines of nodes.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

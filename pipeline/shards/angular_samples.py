@@ -9,8 +9,6 @@ measured texture are; the directions are another random set for every fabric, so
 A row is a query with its answer, so the columns are those of the data set's own rows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Literal
 

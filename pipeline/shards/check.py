@@ -1,7 +1,5 @@
 """Check shards against their manifest: hashes, schema, ranges, finite values."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -5,8 +5,6 @@ question and its answer: the four components, or, if one of these is missing, li
 Rows have any order, other columns are ignored.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Sequence

@@ -5,8 +5,6 @@ is cut into row groups or chunks, nor on how many threads answer these. Rows tha
 anything is computed, or, if they are to be skipped, have null answers and are listed beside the result.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import time

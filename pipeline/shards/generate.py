@@ -4,8 +4,6 @@ Extra rows are what a model learns from beside the data set's queries, as its op
 parameters. Models whose options declare equal sets share the shards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal

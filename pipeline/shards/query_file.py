@@ -1,7 +1,5 @@
 """Files of a user's queries: read in blocks of bounded size; each fault is one sentence."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager

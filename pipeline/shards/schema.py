@@ -5,8 +5,6 @@ pipeline.truth.conventions. The file's own metadata repeats the choices that sha
 understood without this package.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 import pyarrow as pa

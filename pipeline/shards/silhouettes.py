@@ -6,8 +6,6 @@ the cosine at which a ray just touches the cloth (`pipeline.truth.geometry.opaci
 alone, so that most queries are drawn there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Final, Literal

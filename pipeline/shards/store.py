@@ -3,8 +3,6 @@
 Also what all files of rows share: how they are written, and that one which cannot be read is one sentence.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Checkpoints of a training, written atomically: tensors and JSON, with a hash over both, never executable content."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator, Mapping

@@ -11,8 +11,6 @@ epoch of a fabric visits its windows in a new order, and the rows of each in a n
 that this order is as good as any; neither memory nor the time to the first step grows with them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path

@@ -7,8 +7,6 @@ state whose loss there is the lowest is shipped; a model whose own error has sun
 more to learn from it and stops. The files say nothing of when and where they were made.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence

@@ -3,8 +3,6 @@
 The learning rate warms up linearly and then falls to zero along half a cosine. Nothing heavy is imported here.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 from pydantic import Field

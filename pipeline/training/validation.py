@@ -4,8 +4,6 @@ A mean squared error against a noisy truth is the model's own plus the noise, th
 are on the card.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Iterator
 from pathlib import Path

@@ -13,8 +13,6 @@ with the reported error e and the norm m of the four components (for the transpa
 missed of which nothing was seen. c limits reported errors: those of answers that have not converged are far too large.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

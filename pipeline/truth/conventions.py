@@ -22,8 +22,6 @@ Local yarn frame
     x across the yarn, y along it, from the float's centre. Warp: the fabric's own x, y. Weft: (x, y) -> (y, -x).
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 COMPONENTS: Final = ("specular_warp", "specular_weft", "diffuse_warp", "diffuse_weft")

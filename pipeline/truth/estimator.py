@@ -12,8 +12,6 @@ Each stage stops at the calibrated standard error, not at the error that it repo
 requested error has one meaning for all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Final

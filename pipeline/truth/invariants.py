@@ -5,8 +5,6 @@ not. A number without statistical error passes if it equals its expected value u
 pass if Student's t of the worst stays below the quantile of `SIGNIFICANCE`, with Sidak's correction for their number.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import product

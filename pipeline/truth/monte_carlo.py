@@ -7,8 +7,6 @@ every randomisation has seen one, at most HIDDEN_PATIENCE times the limit. The e
 points, and faster for the other point sets.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -1,7 +1,5 @@
 """A fabric as a BSDF file for daylight simulation: LBNL WINDOW, Radiance, EnergyPlus."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

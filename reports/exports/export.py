@@ -1,7 +1,5 @@
 """One function that writes a fabric for other programs, and the table of the kinds of files that it knows."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from inspect import signature
 from pathlib import Path

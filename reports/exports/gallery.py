@@ -4,8 +4,6 @@ The site needs no server and no network. `write_fabric` writes the files of one 
 `gallery_page` the page of all, which searches names, weaves, fibres and sources.
 """
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Sequence

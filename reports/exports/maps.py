@@ -1,7 +1,5 @@
 """A folder of texture maps with mip levels as EXR and PNG, their size in `maps.json`, and materials made of them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from importlib.metadata import version

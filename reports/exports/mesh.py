@@ -4,8 +4,6 @@ Lengths are in yarn spacings: x along the weft, y along the warp, z up. Every ve
 or pick as 8-bit sRGB, those of the walls `WALL`.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

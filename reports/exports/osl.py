@@ -4,8 +4,6 @@ The file is `cloth.osl` with the tables of the fabric as parameters. One unit of
 yarns as maps of the fabric show, so that both fit one mesh.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Final
 

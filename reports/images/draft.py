@@ -6,8 +6,6 @@ whatever their colours. Colours of ends are above the threading, those of picks 
 of whole pixels.
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

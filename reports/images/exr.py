@@ -7,8 +7,6 @@ OpenEXR writes non-contiguous arrays silently wrong, so every channel is made co
 A film is one file: frame 0 is the picture itself, the others are layers with channels ``frame_1.R`` and so on.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Collection, Mapping
 from pathlib import Path

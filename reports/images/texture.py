@@ -11,8 +11,6 @@
 Row 0 of an array is the lowest row of the picture.
 """
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any, Final, Literal

@@ -9,8 +9,6 @@ Tone curves of renderings of one's own, `EXPOSURE` 2^exposure times brighter, be
     reinhard    x / (1 + L), L the luminance: nothing is cut but saturated colours [Reinhard2002Tone, equation 3]
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from functools import cache

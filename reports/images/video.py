@@ -1,7 +1,5 @@
 """Films as MP4: H.264 by PyAV, an optional library."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path

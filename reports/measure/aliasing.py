@@ -15,8 +15,6 @@ Noise of the truth adds to both of its terms: the mean squared standard error to
 share sum(w^2 s^2) / (N sum w^2). Both are subtracted.
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ Components are measured as any method's. Of RGB there is the MSE in the fabric's
 be compared with the truth in these colours alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -9,8 +9,6 @@ error of the other too. The difference of squared errors, pixel by pixel, cancel
 the truth: (b - t)^2 - (a - t)^2 = (b - a) (b + a - 2 t), unbiased, for t enters linearly.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

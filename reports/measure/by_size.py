@@ -8,8 +8,6 @@ The error is the relative RMSE of the colour, .3 (S_warp + S_weft) + .5 (C_warp 
 diffuse part: root of the MSE, noise of the truth subtracted, over the mean of the truth; the mean over fabrics.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -12,8 +12,6 @@ All methods evaluate one set of queries on one set of cloths, one of them as lus
 Random methods draw the same points where only the place differs; at another size they land elsewhere.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -3,8 +3,6 @@
 The truth's frames are one OpenEXR: luminance Y and its standard error, one frame below the other.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

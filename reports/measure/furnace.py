@@ -8,8 +8,6 @@ the fabric in its own colours. A method that answers light from behind has a fou
 comes from both sides, with what goes straight through gaps and yarns.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Final

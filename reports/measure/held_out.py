@@ -5,8 +5,6 @@ Each function is independent of the others, so that tasks can run them separatel
 no number depends on earlier work.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -10,8 +10,6 @@ Errors are the relative RMSE of the colour measure (`reports.error`), noise of t
 is the delay until the next answer: the fabric's maps are made and encoded again. Colours are not encoded.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Final, Literal, NamedTuple, Protocol, runtime_checkable
 

@@ -6,8 +6,6 @@ an old process some pages are not handed back, and pages that Python touches aga
 only means that it is small. Memory of a GPU is not part of it.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from pathlib import Path

@@ -4,8 +4,6 @@ A picture is a linear OpenEXR: R, G, B under the light of the view, A = 1 where 
 standard error of each colour beside them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType

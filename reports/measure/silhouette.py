@@ -12,8 +12,6 @@ same queries with curvature 0, covered everywhere, and 0 where the light is behi
 The camera looks along the plane of the normals: all queries have the curvature 1/r, by Euler's k1 cos^2 + k2 sin^2.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import NamedTuple, Protocol, runtime_checkable

@@ -4,8 +4,6 @@ Plots of errors against costs are in `reports.page.front_figures`. A method has 
 Filled marks are fabrics seen in training, open marks unseen ones.
 """
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Files of a page's folder with their hashes: ``files.json``, so that a damaged one is found."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path

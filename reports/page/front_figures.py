@@ -6,8 +6,6 @@ our baseline: 4.1 times lower MSE, which is 2.0 times lower RMSE, at 0.83 times 
 have no place on a logarithmic axis and are left out.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """HTML of a page: one template, its macros and style sheet, and a file for each section that is no list of tables."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final

@@ -5,8 +5,6 @@ there it takes that which covers the least of the curves. A label away from its 
 Equal figures give equal places.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple

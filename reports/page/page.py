@@ -4,8 +4,6 @@ The same input gives the same bytes. Figures are written first, then ``files.jso
 the page last: a page that exists is whole.
 """
 
-from __future__ import annotations
-
 import io
 import itertools
 from collections.abc import Callable, Iterator

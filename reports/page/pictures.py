@@ -6,8 +6,6 @@ crop's middle row of pixels in every frame, the first frame on top. What moves s
 flickers breaks them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -16,8 +16,6 @@ range in 5 of 100 comparisons; of two and two in 22, of one and three in 24, of 
 and one in B have no range: there the test says nothing of other trainings.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from typing import Final, Literal, NamedTuple

@@ -4,8 +4,6 @@ Errors and flicker are the same in every run on one machine. Times are not: in R
 is kept while the new one lies within a quarter of it, so that a fresh run of the same recipe changes no byte.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, Final

@@ -6,8 +6,6 @@ its fastest setting a rival has no answer; beyond its slowest it keeps that sett
 `OWN_CURVE` is compared with its rivals too: what it promises is a lower error at every time.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

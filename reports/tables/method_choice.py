@@ -12,8 +12,6 @@ not in this prediction. If the benchmark rendered the scene (`reports.measure.sc
 replace the prediction.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Numbers and names as the page and the terminal print them; what was not measured is a dash."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Sequence

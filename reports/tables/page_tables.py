@@ -3,8 +3,6 @@
 Columns of metrics are those of the catalogue: an entry there with the name of a table is a column of that table.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, fields

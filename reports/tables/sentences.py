@@ -1,7 +1,5 @@
 """Sentences of a page: the trade, its methods, what sums up a table, limits of the numbers, what was not measured."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Final

@@ -3,8 +3,6 @@
 Words and columns come from `tables.toml`. A paragraph with a ``{value}`` that is not known is left out.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import tomllib

@@ -1,7 +1,5 @@
 """Trade-off of error against time and bytes: methods on the front, and the cheapest within a limit."""
 
-from __future__ import annotations
-
 from typing import Any, Final, Literal
 
 import pandas as pd

@@ -6,8 +6,6 @@ median true errors e_N at N points, c is the geometric mean of e_N sqrt(N), and 
 true error e. "Points saved" is that number over the points used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Final

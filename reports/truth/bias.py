@@ -6,8 +6,6 @@ table answers, with the light in front of the cloth or, its z reversed, behind; 
 errors cancel in the mean.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -12,8 +12,6 @@ by the bootstrap over queries, and is wrong only if this lies outside `RATIOS`; 
 says that it is above `EXCEEDED`. Both at `_LEVEL`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Effort of `auto`: the shares of queries that it answers by tables alone, by refined borders, and by sampling."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Final

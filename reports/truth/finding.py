@@ -6,8 +6,6 @@ NaN or infinite, and if none is negative. The figures listed for single precisio
 for double precision are the same times 2^-29, the ratio of the two arithmetics.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

@@ -11,8 +11,6 @@ random directions,
 in the patch BSDF's linear RGB. The variance by the sampling of the exact colours is subtracted from the loss.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator, Sequence

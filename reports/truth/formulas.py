@@ -5,8 +5,6 @@ textbook's form shows what the other spares us. In 50 digits it is the truth for
 slower run of the same code. Vectors are arrays (3, N).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import mpmath

@@ -4,8 +4,6 @@ The data are shipped (pipeline.fitting.measured). Of the shade each ring of ligh
 of data sheets the transmittance of white yarns by that of charcoal ones, and that of the solar band by the visible one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

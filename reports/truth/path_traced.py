@@ -9,8 +9,6 @@ One point a sample at its limit is not the truth: a ratio of one point has no ma
 (pipeline.models.analytic.point_sampled).
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence

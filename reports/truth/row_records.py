@@ -4,8 +4,6 @@ A measured field is annotated with its metric (`reports.catalogue`), the others 
 NaN has no Record; reading gives it the default of its class.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields

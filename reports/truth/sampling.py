@@ -18,8 +18,6 @@ The probability of the delta lobe and the sides cost the cosines no time. Looks 
 the first frame of every shipped scene, whose lights play no part.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence

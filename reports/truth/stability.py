@@ -5,8 +5,6 @@ Single precision is what answers queries from tables: the loops of `pipeline.tru
 one node at a time, or their formula on arrays. Double precision is `slab` and `heightfield`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from functools import partial

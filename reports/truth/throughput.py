@@ -6,8 +6,6 @@ Every rate is the median over repeats of a call that takes long enough for the c
 writes first: surface and point model by array expressions, visibility from the same table of horizons.
 """
 
-from __future__ import annotations
-
 import resource
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence

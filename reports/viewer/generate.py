@@ -5,8 +5,6 @@ differ in colour (`points_threads.frag.gz`, …). `make viewer-shader` writes th
 second lines name the source that they were made of.
 """
 
-from __future__ import annotations
-
 import gzip
 import hashlib
 import tempfile

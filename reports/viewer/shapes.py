@@ -4,8 +4,6 @@ The world has z up; lengths are in yarn spacings. The sphere has its axis along 
 The drape hangs in folds: arcs of circles, by turns towards the viewer and away, along which no yarn is stretched.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, Literal, NamedTuple
 

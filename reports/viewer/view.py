@@ -6,8 +6,6 @@ Buffers are compressed by gzip and written in base64. A table is of one shape of
 one of their width: the own shape has every level that the shader takes, the others have the usual one.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
 import html

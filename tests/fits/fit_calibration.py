@@ -12,8 +12,6 @@ The factors in use lie between the best triples of this grid on two other sets o
 which were changed since, and why.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -8,8 +8,6 @@ covered. Fabrics are random (seed 77), most with gaps; queries are those of the 
 What was seen is in reports/LOG.md.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

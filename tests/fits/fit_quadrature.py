@@ -14,8 +14,6 @@ over the norm of the estimated one, for queries of three fabrics (seed 18) at 2 
 What was seen is in reports/LOG.md.
 """
 
-from __future__ import annotations
-
 import math
 
 import cyclopts

@@ -13,8 +13,6 @@ Patches that are hidden almost wholly are left out: a limit of visibility decide
 The table in use was fitted so to 34 cloths (reports/LOG.md).
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

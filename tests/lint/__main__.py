@@ -3,8 +3,6 @@
 With `--lower`, limits of budgets become what is reached (`make budgets`).
 """
 
-from __future__ import annotations
-
 import sys
 
 from tests.lint import architecture, budgets, rooms, words

@@ -1,7 +1,5 @@
 """The order of the packages, the place of every heavy library, and the size of rooms and functions."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Sizes of the code that only fall; their limits are in pyproject.toml, `[tool.budgets]`."""
 
-from __future__ import annotations
-
 import ast
 import json
 import re

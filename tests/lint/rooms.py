@@ -1,7 +1,5 @@
 """The picture of the rooms in CONTRIBUTING.md, drawn from the imports: `make rooms` writes it, `make lint` compares."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

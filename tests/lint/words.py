@@ -1,7 +1,5 @@
 """Words of the code: names use the field's terms, and docstrings open with a noun or an imperative."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -9,8 +9,6 @@ processor time, and its peak memory. The workers share the processors with the d
 is mostly theirs.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import resource

@@ -12,8 +12,6 @@ With ``--links 100`` only the reading is measured, of so many shards of 10^6 row
 ``--dataset FOLDER`` that of a data set.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

@@ -4,8 +4,6 @@ Every file is bounded and checked before and after, because the library hangs on
 others, and accepts numbers that are none. Each refusal is one `BadInput`.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import warnings

@@ -3,8 +3,6 @@
 A draft file says nothing of fibres, twist, bend or roughness. Everything that is assumed is a sentence.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from itertools import groupby

@@ -4,8 +4,6 @@ WIF (Weaving Information File, version 1.1) is a text of sections and keys. The 
 some texts and raises bare errors on others, so it is not used.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from configparser import ConfigParser, ParsingError

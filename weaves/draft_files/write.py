@@ -1,7 +1,5 @@
 """Draft files that weaving programs read: a fabric as WIF text, written by dtx-to-wif."""
 
-from __future__ import annotations
-
 import io
 from importlib.metadata import version
 from math import lcm

@@ -6,8 +6,6 @@ after the hash, and that nobody controls, enters too: nobody can draw seeds unti
 such text, because the organiser writes it and knows the seed.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import secrets

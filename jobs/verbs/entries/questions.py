@@ -3,8 +3,6 @@
 The same recipe gives the same bytes.
 """
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 from pathlib import Path

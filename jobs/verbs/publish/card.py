@@ -4,8 +4,6 @@
 the Arrow schema of the rows and the meanings in it.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ A file holds whole fabrics of one role and one split. Research repositories take
 a file if there are many.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from datetime import date

@@ -4,8 +4,6 @@ The folder is written under a temporary name beside its place and renamed when i
 continued by the same command, which keeps finished files of rows. The same data set gives the same bytes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -15,8 +15,6 @@ linear between.
 With light that comes through yarns and gaps, a to d have two ways each and two faces, the sun two sides (`walks`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

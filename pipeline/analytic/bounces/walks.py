@@ -23,8 +23,6 @@ it comes from; walls transmit nothing. A walk that passes the fabric plane in a 
 is that of the sun on either side, and a, b, c, d are families with a way each: colours k_d, then k_dt.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -14,8 +14,6 @@ little more, because few points may miss what the footprint has: without a sampl
 comes from plays no part: shares change the variance, not the density.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -18,8 +18,6 @@ d = S^(1/2) given makes m = S^(1/2) n, and given mirrored in m is the sample:
     pdf = D(h) / (4 sigma(given)) over the whole sphere: reflection and transmission at once
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

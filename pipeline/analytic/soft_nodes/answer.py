@@ -7,8 +7,6 @@ at least `SoftNodeTable.uniform`             fixed ones, which cover the cloth e
 else                                         fixed ones, by the footprint's density where the viewer sees each of them
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

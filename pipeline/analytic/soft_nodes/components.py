@@ -8,8 +8,6 @@ every node, so the diffuse components without shadows integrate to at most 1, an
 specular ones, scattered once, stay far below 1 (weaves.yarn).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -10,8 +10,6 @@ highlight may be narrower than a box: the tangent's change over half a box, alon
 places there, at the points of the Gauss rule (1 / sqrt 3 of half a box). All of it is in the frame of the yarn.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

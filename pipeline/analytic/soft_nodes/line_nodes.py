@@ -5,8 +5,6 @@ weight follow from it in the loop that shades the nodes: stores between two loop
 What a footprint of rays sees is cut out before, so every node is seen; the light has soft horizons as elsewhere.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -10,8 +10,6 @@ a direction; azimuths are even in the diamond angle, which needs no arc tangent.
 different pieces there are, the coarser they are, so that a table stays near a megabyte.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 

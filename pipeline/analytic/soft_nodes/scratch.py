@@ -1,7 +1,5 @@
 """One query as the sums take it, and their scratch memory, made once for all queries of a call."""
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

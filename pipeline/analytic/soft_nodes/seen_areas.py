@@ -9,8 +9,6 @@ Cells of the grids of horizons are summed. Their heights differ by exactly what 
 n_s.wo / n_z = wo_z - wo.grad h, so that steep borders of yarns lose nothing.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Final

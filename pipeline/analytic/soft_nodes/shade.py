@@ -13,8 +13,6 @@ BARE_AREA with nothing hidden; OPEN_DIFFUSE and OPEN_SPECULAR, seen, and lit wit
 crosses the yarn unscattered.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, Literal, NamedTuple
 

@@ -6,8 +6,6 @@ Rays between what is covered and the near end of a piece meet the wall below it:
 surface at this end, which is one node.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

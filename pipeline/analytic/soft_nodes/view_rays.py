@@ -12,8 +12,6 @@ the lowest yarns, and may meet the flank of a yarn then: this is the other root 
 towards the crest. What it clears leaves the cloth.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

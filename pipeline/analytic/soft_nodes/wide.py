@@ -1,7 +1,5 @@
 """Sums of a wide footprint over the fixed nodes of the cloth, weighted by its Gaussian where the viewer sees them."""
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """Measured cloth that comes with the package; README.md beside it has sources and licence."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType

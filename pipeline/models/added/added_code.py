@@ -4,8 +4,6 @@ No recipe holds these fields. They are made from `--add` or from an installed pa
 alone never runs code. Where the code lies and its limits are no part of an identity.
 """
 
-from __future__ import annotations
-
 from pathlib import PurePath
 from typing import Annotated, Any, ClassVar, Final, Literal
 

@@ -1,7 +1,5 @@
 """Work with a method from outside in a process of its own, which ends if a call hangs or the code crashes."""
 
-from __future__ import annotations
-
 import mmap
 import resource
 import tempfile

@@ -1,7 +1,5 @@
 """Description of a method or metric from outside, read from its code in a process of its own."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import re

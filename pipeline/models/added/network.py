@@ -5,8 +5,6 @@ untrained torch module with the function ``loss``, and ``load(network)`` receive
 without colours, which the components do not depend on.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager

@@ -4,8 +4,6 @@ A file stands alone: it can import installed packages and no file beside it, so 
 of several files, or with weights, is a package, of which every file is hashed.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib
 import sys

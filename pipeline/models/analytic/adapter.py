@@ -1,7 +1,5 @@
 """A method that learns nothing: tables of a fabric, made once, and a function that reads them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 

@@ -19,8 +19,6 @@ four components, specular ones in log space, counts of texels and steps. The pap
 `levels = 1` is its network.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 

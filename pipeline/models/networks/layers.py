@@ -5,8 +5,6 @@ squeezes them. The loss is the mean squared error in that space, with one weight
 diffuse pair.
 """
 
-from __future__ import annotations
-
 import itertools
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ is annealed, so that coarse structure is learnt first [Kuznetsov2021NeuMIP]. Tex
 because a short training touches each texel rarely. The offset texture is held fixed after a share of the training.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, ClassVar, Final, cast

@@ -1,7 +1,5 @@
 """`neumip`: a neural texture of one fabric [Kuznetsov2021NeuMIP]; its options."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 from pipeline.models.options import TextureOptions

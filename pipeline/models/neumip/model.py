@@ -12,8 +12,6 @@ authors put out RGB as (e^x - 1) times a mask. So are the counts of texels, quer
 takes 45 minutes of a GPU.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import ClassVar
 

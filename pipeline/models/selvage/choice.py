@@ -15,8 +15,6 @@ they are `USUAL_SECONDS`, so that the choice depends on no machine: ratios count
 a wished time they are measured, once for a cloth in a process.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Lock

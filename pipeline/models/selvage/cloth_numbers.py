@@ -1,7 +1,5 @@
 """Numbers of a cloth that its errors depend on: how far its answers differ from one another on some flat queries."""
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

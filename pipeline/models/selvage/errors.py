@@ -16,8 +16,6 @@ table from random cloths.
 Of curved cloth the fallback has larger errors than the finest nodes, and is never taken.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cache, partial

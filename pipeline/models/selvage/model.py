@@ -8,8 +8,6 @@ Errors are relative to a grey cloth's colour. Those of narrow footprints and low
 of walls is answered by soft nodes alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Wished errors and times: the usual one, their text, their ranges."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

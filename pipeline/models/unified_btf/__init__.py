@@ -1,7 +1,5 @@
 """`unified_btf` [Rainer2020Unified] and its predecessor `btf_autoencoder` [Rainer2019Neural]; their options."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator

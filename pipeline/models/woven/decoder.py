@@ -17,8 +17,6 @@ By its Fourier series, which ends at the bins' own resolution,
     bin b = 1/bins (1 + 2 sum_{m=1}^{bins-1} sinc(m/bins) e^{-2 (pi m deviation)^2} cos(2 pi m (x - (b + 1/2)/bins)))
 """
 
-from __future__ import annotations
-
 import math
 
 import torch

@@ -19,8 +19,6 @@ Maps and parameters are read in pipeline.models.woven.encoder. OWN CHANGE, `one_
 a picture of the repeat, and the decoder sees it from the queried place (pipeline.models.woven.decoder).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

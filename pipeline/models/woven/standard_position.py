@@ -11,8 +11,6 @@ Standard is the position whose draft, read pick by pick, is the smallest binary 
 equals the one with the smallest numbers of its warp, then of its weft.
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

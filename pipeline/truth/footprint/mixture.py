@@ -11,8 +11,6 @@ No wave differs by more than 2 % from that of the ellipse with a `COARSE_LINE`, 
 with a `FINE_LINE`, which is for the truth.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

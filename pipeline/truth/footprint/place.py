@@ -8,8 +8,6 @@ are the same integral. A footprint with two axes at an angle is no product in x 
 wrapped, unless it covers the repeat evenly.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -6,8 +6,6 @@ R2, the additive sequence of the plastic number with a random shift [Roberts2018
 [Sobol1967] with nested uniform (Owen) scrambling by the Laine-Karras hash in Vegdahl's constants [Burley2020Owen].
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

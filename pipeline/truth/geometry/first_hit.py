@@ -8,8 +8,6 @@ the cloth below. On a base that falls away by kappa s^2 / 2 it may rise again an
 the next may rise too; the float that it leaves cannot stop it (`pipeline.truth.geometry.visibility`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ cell after another. A float on top is a piece of a torus seen from outside [Iraw
 sqrt((R + rho)^2 - y^2) with rho = sqrt(r^2 - x^2), is CONCAVE in (x, y): visibility relies on that.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

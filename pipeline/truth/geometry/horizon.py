@@ -4,8 +4,6 @@ The slope of the horizon is the greatest (h(s) - z) / s over everything that a r
 (heightfield), so that the slope rises and then falls. On a base that falls away by kappa s^2 / 2, h is less by that.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from threading import Lock

@@ -1,7 +1,5 @@
 """The endless cloth: positions wrapped into its repeat, and rays that march from cell to cell."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -15,8 +15,6 @@ In the fabric plane a gap is open. A ray that crosses the plane there runs on be
 crosses the plane anywhere else has hit the yarn there.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

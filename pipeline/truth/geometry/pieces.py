@@ -5,8 +5,6 @@ satin of 8 ends has 64 cells a repeat, of which 8 differ: cells that a translati
 orbit, and their pieces, horizons and nodes are those of one of them.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Final, NamedTuple

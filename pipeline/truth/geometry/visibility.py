@@ -9,8 +9,6 @@ float that a ray starts on cannot hide it: its surface is concave and the ray le
 where a narrow yarn lets the one beneath show are not concave: points are tested, then uphill from the highest of them.
 """
 
-from __future__ import annotations
-
 import math
 
 from pipeline.compiled.decorators import inlined_kernel

@@ -7,8 +7,6 @@ neither nodes nor borders show (`refine.UNSEEN`) add a share each; both were fit
 Where the standard error that this gives exceeds the requested one, the nodes that may be most wrong are refined.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

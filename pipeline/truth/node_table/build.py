@@ -6,8 +6,6 @@ evenly spaced, evenly spaced along it. A node holds normal, tangent, and for eac
 Where a highlight is narrower than a node, finer nodes resolve it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

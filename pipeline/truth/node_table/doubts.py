@@ -5,8 +5,6 @@ if they change smoothly: the sum moves by a known amount, and borders along a ro
 margin jumps, the place is unknown. Both count half for either node.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

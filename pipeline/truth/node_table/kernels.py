@@ -4,8 +4,6 @@ The formulas are those of `scattering.point` and `scattering.slab`; the layer is
 those of the nodes of one piece. The loops have no branch and no call left, so that vector units run them.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, Literal, NamedTuple
 

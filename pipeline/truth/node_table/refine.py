@@ -10,8 +10,6 @@ two places that differ; what lies between two that agree is taken to agree, afte
 Within a part that is seen or lit as a whole the point model is smooth and needs one place or two.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

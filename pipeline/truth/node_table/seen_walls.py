@@ -1,7 +1,5 @@
 """Sums of a query over the walls that its view rays meet."""
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -5,8 +5,6 @@ footprints of at least `TABLE_SIGMA`. Rotated Gaussians are mixtures of Gaussian
 without the very thin ones. A Gaussian of view rays must be wider than the distance of nodes as the viewer sees them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import product

@@ -11,8 +11,6 @@ Below that, as in `ray_share`, it goes on for rays that do not clear the back of
 are met by rays that are flatter than their horizon at the back.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple

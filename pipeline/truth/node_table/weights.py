@@ -14,8 +14,6 @@ the cells that differ, once for a query; nodes read it between the points of the
 step^2 / 6 along each axis, by which the footprint is made narrower before.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -13,8 +13,6 @@ as if their errors all had one sign, or none, whichever is more. That is an esti
 the true error in about 97 % of queries.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -11,8 +11,6 @@ A footprint of view rays has its density where the ray to a point of the yarn cr
 height h at p counts as p - (h - z0) wo_xy / wo_z. All that is seen is integrated so; walls are left out.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

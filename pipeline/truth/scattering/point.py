@@ -7,8 +7,6 @@ cloth, with -wi in the diffuse cosines. A gap has A = <wo.n_s> V(wo), returns no
 side hides.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

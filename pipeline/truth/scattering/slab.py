@@ -9,8 +9,6 @@ forms of `sigma` and `density` stay exact near the fibre axis. Lambda = sigma / 
     exp(-T Lambda_i) goes straight through and is no part of f_t.
 """
 
-from __future__ import annotations
-
 import math
 
 from pipeline.compiled.decorators import inlined_kernel

@@ -6,8 +6,6 @@ are those of pipeline.compiled.float32. All constants are typed, because numba c
 float64. Array elements, not arrays, are passed in: the functions are inlined into the caller's loop.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.compiled.decorators import inlined_fast_kernel

@@ -9,8 +9,6 @@ with the numerators N of a component over the threads r. Points of the footprint
 estimator (monte_carlo), placed in the repeat of weave and colours together.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from typing import NamedTuple

@@ -26,8 +26,6 @@ flip_hdr        the same for linear values >= 0 over the exposures between those
 delta_e         CIEDE2000 of L (`weaves.colour.delta_e`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

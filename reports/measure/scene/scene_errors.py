@@ -14,8 +14,6 @@ the quarter of a second that the metric looks back: the first one is taken to ha
 not be used commercially and is therefore no dependency.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from importlib import import_module

@@ -7,8 +7,6 @@ straight through cloth is the truth's for all of them, and so is the coverage at
 that of the cloth's one table.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable

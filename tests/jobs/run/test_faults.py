@@ -80,5 +80,5 @@ def test_products_of_an_earlier_version_are_outdated_and_what_a_stopped_task_lea
     # What no network is part of is not touched by it.
     assert {stage for stage, _ in found} == {"train", "bench", "report"}
     assert len(found) < sum(task.stage != "generate" for task in tasks)
-    assert all(map(is_leftover, (CHECKPOINT, "0123-rows.npy", ".tmp-card.json")))
+    assert all(map(is_leftover, (CHECKPOINT, ".tmp-card.json")))
     assert not any(map(is_leftover, ("model.safetensors", "part-0.parquet", "notes.txt")))
