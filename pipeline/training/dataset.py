@@ -6,7 +6,7 @@ in every epoch. A training that goes on after an interruption therefore sees the
 
     example   3 fabrics, 2 a step: rounds (2 0 1)(0 1 2)... give the steps (2 0), (1 0), (1 2), ...
 
-More than `MOST_IN_TABLE` rows are read from the shards when a step needs them, in windows of a few row groups. Every
+More than `MOST_IN_MEMORY` rows are read from the shards when a step needs them, in windows of a few row groups. Every
 epoch of a fabric visits its windows in a new order, and the rows of each in a new order. Rows are independent draws, so
 that this order is as good as any; neither memory nor the time to the first step grows with them.
 """
@@ -36,7 +36,7 @@ TARGET = slice(12, 16)  # the columns of the components
 
 _NAMES: Final = (*QUERY_COLUMNS, *COMPONENTS, TRANSPARENCY)
 
-MOST_IN_TABLE: Final = 2**23
+MOST_IN_MEMORY: Final = 2**23
 """Most rows that are read before the first step: a table of half a gigabyte, in some 4 s of one core."""
 
 _MOST_GROUPS: Final = 8  # row groups of a window, 131,072 rows or 9 MB; fewer of many fabrics, so that all are kept
@@ -50,18 +50,18 @@ class TrainingRows:
     """The training rows of fabrics, whose order of names numbers them, in batches on a `device`.
 
     `windows` are the numbers of rows that are read together, of each fabric: all of them, if there are no more than
-    `MOST_IN_TABLE`. A GPU keeps rows of less than half of its free memory.
+    `MOST_IN_MEMORY`. A GPU keeps rows of less than half of its free memory.
     """
 
     def __init__(self, manifest: Manifest, folder: Path, fabrics: Sequence[str], device: torch.device) -> None:
         shards = manifest.by_fabric(folder, fabrics, "train").values()
         total = sum(shard.rows for own in shards for shard in own)
-        self._device, self._whole = device, total <= MOST_IN_TABLE
-        groups = min(max(MOST_IN_TABLE // (ROW_GROUP * len(shards)), 1), _MOST_GROUPS)
+        self._device, self._whole = device, total <= MOST_IN_MEMORY
+        groups = min(max(MOST_IN_MEMORY // (ROW_GROUP * len(shards)), 1), _MOST_GROUPS)
         rows = total if self._whole else groups * ROW_GROUP
         self._pieces = [_windows(folder, own, rows) for own in shards]
         self.windows = [[sum(piece.rows for piece in window) for window in own] for own in self._pieces]
-        self._window = lru_cache(maxsize=None if self._whole else MOST_IN_TABLE // rows)(self._read)
+        self._window = lru_cache(maxsize=None if self._whole else MOST_IN_MEMORY // rows)(self._read)
         free = torch.cuda.mem_get_info(device)[0] if device.type == "cuda" else 0
         self._kept_on = device if self._whole and 4 * COLUMNS * total < free // 2 else torch.device("cpu")
 

@@ -97,7 +97,7 @@ def test_rows_that_stay_in_their_shards_are_those_of_the_table(folder, tmp_path,
     np.testing.assert_array_equal(some, every[::8])
     for table in tables:
         table.spread(1)  # all is read
-    monkeypatch.setattr(dataset, "MOST_IN_TABLE", 4096)
+    monkeypatch.setattr(dataset, "MOST_IN_MEMORY", 4096)
     monkeypatch.setattr(dataset, "ROW_GROUP", 1000)
     monkeypatch.setattr(dataset, "read_table", groups_of_a_thousand)
     for names, table in zip(orders, tables, strict=True):

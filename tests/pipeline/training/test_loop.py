@@ -88,7 +88,7 @@ def test_a_killed_training_goes_on_to_the_same_bytes(model, folder, tmp_path, wh
     number of threads is. Rows may stay in their shards. The network from outside reads the random numbers of torch, and
     its code may lie elsewhere when it goes on."""
     if model == "in shards":
-        monkeypatch.setattr(dataset, "MOST_IN_TABLE", 1000)
+        monkeypatch.setattr(dataset, "MOST_IN_MEMORY", 1000)
     whole, resumed, threads = whole(model), tmp_path / "resumed", torch.get_num_threads()
     kill_at(20 / 30, OPTIONS.get(model) or theirs(), SHORT, folder, FABRICS[model], resumed)
     assert read_checkpoint(resumed / CHECKPOINT)[0]["step"] == 16
