@@ -154,9 +154,9 @@ def as_onnx(method: Portable, fabric: Fabric, names: Sequence[str]) -> bytes:
     inputs = [torch.from_numpy(column) for column in part.inputs(queries)]
     constants = [f"constant{place}" for place in range(len(part.constants))]
     model = exported(part.module, [*inputs, *part.constants], len(inputs), [*names, *constants])
-    if not constants:
-        return model
     whole = onnx.load_from_string(model)
+    for node in whole.graph.node:
+        del node.metadata_props[:]  # where its source lies on this machine
     for name, values in zip(constants, part.constants, strict=True):
         (entry,) = (entry for entry in whole.graph.input if entry.name == name)
         whole.graph.input.remove(entry)
