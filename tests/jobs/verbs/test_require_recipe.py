@@ -74,20 +74,19 @@ def test_a_table_that_cannot_answer_makes_way_for_sampling_at_a_stated_error(tmp
 def test_the_training_is_cut_by_the_effort_with_its_average_and_what_is_saved_is_counted(tmp_path):
     recipe = narrowed(tmp_path / "r.toml", effort=0.25)
     assert (recipe.dataset.rows.train, recipe.dataset.rows.population) == (16384, 0)
-    own = recipe.models[0].training
-    general = QUICK.models[0].training
-    assert own.steps == 1750 and (own.batch, own.learning_rate) == (general.batch, general.learning_rate)
+    own, general = recipe.models[0].training, QUICK.models[0].training
+    assert own.steps == general.steps // 4 and (own.batch, own.learning_rate) == (general.batch, general.learning_rate)
     # After a quarter of the steps, the average forgets four times as fast.
     assert own.average**own.steps == pytest.approx(general.average**general.steps, rel=1e-2)
     # No more rows than the general recipe has, whatever the effort.
     assert narrowed(tmp_path / "r.toml", effort=3.0).dataset.rows.train == 65536
     own = narrowed(tmp_path / "r.toml", method="neumip", effort=0.5)
-    assert effort_of(own) == (32768 + 2048 + 4096, 1000 * 512)
+    assert effort_of(own) == (32768 + 2048 + 4096, 700 * 512)
     # By itself neumip learns from the nine named fabrics; the population is drawn for the general recipe all the same.
     rows, learnt = effort_of(alone(QUICK, {"neumip"}))
-    assert (rows, learnt) == (9 * (65536 + 2048 + 4096) + 24 * 16384, 9 * 2000 * 512)
+    assert (rows, learnt) == (9 * (65536 + 2048 + 4096) + 20 * 16384, 9 * 1400 * 512)
     said = savings(tmp_path / "r.toml", QUICK)
-    assert "38,912 rows to generate in place of 1,038,336 (26.7 times fewer)" in said
+    assert "38,912 rows to generate in place of 972,800 (25.0 times fewer)" in said
     assert "512,000 queries to learn from in place of 9,216,000 (18.0 times)" in said
 
 
