@@ -16,7 +16,7 @@ from pipeline.scenes.variant import llvm_works
 from weaves.errors import BadInput
 
 HOW: Final = (
-    "Mitsuba finds no LLVM library of version 16 or newer, so it computes one ray at a time, which is slow: "
+    "Mitsuba finds no LLVM library of version 19 or newer, so it computes one ray at a time, which is slow: "
     "`apt install libllvm19` on Debian, or name the library in DRJIT_LIBLLVM_PATH"
 )
 
