@@ -160,7 +160,7 @@ def _local(workers: int, say: Callable[[str], None]) -> Iterator[Any]:
                         dashboard_address=None,
                         scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
                         memory_limit=0,  # tasks hand over files, not data: there is nothing that dask could spill
-                        silence_logs=logging.CRITICAL,
+                        silence_logs=logging.CRITICAL + 1,  # a report to a client that leaves is critical to dask
                     )
                     client = Client(cluster)  # type: ignore[no-untyped-call]
                 break
