@@ -77,8 +77,7 @@ def _taken_over(
     model, options = known[name], known[name].options
     kind = options.name if options.model == ADDED_MODEL else options.model
     if entry.get("model", kind) != kind:
-        allowed = f"{name} is {kind} in the recipe {trainer.name}"
-        raise BadInput(where, f"{key}.model", entry["model"], allowed)
+        raise BadInput(where, f"{key}.model", entry["model"], f"{name} is {kind} in the recipe {trainer.name}")
     for more in entry.keys() - set(_KEYS):
         raise BadInput(where, f"{key}.{more}", entry[more], f"leave it out: the recipe {trainer.name} says it")
     if not model.options.learns:

@@ -72,8 +72,7 @@ def require(
     options = _options(set_)
     names = [model.options.name for model in general.models]
     if method and method not in names:
-        allowed = f"{general.name} has no such method; {nearest(method, names)}"
-        raise BadInput("require", "--method", method, allowed)
+        raise BadInput("require", "--method", method, f"{general.name} has no such method; {nearest(method, names)}")
     described = load_scene(scene)
     if run:
         work(recipe, STAGES, out, ON, add)

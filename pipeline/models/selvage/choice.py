@@ -88,8 +88,10 @@ def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -
         middle = (low + high) // 2
         over = _mean_seconds(*some, seconds, PRICES[middle], chosen[: len(some[0])]) > time
         low, high = (middle, high) if over else (low, middle)
-    price = PRICES[low]
+    price = float(PRICES[low])
     while _mean_seconds(squares, kinds, seconds, price, chosen) > time:
+        if price == np.inf:  # an error that no price outweighs
+            return np.asarray(seconds[kinds].argmin(axis=1), np.uint8)
         price = max(_RAISE * price, PRICES[1])
     return chosen
 
