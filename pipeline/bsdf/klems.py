@@ -47,8 +47,7 @@ class Basis(NamedTuple):
     @property
     def projected_solid_angle(self) -> Float64:
         """Integral of the cosine over each patch, (P,), sr: pi (sin^2 high - sin^2 low) / count."""
-        square = np.sin(np.radians(self.bounds)) ** 2
-        return np.asarray(np.pi * np.diff(square) / self.counts)[self.ring]
+        return np.asarray(np.pi * np.diff(np.sin(np.radians(self.bounds)) ** 2) / self.counts)[self.ring]
 
     @property
     def opposite(self) -> Index:
@@ -126,8 +125,7 @@ class Scattering(NamedTuple):
 
     def direct(self, band: str) -> Float64:
         """Return the share of light that keeps its patch in transmission, (2, P), what is scattered there included."""
-        straight = np.diagonal(self.bands[band][1], axis1=1, axis2=2)
-        return np.asarray(straight * self.basis.projected_solid_angle)
+        return np.asarray(np.diagonal(self.bands[band][1], axis1=1, axis2=2) * self.basis.projected_solid_angle)
 
     def reciprocity(self, band: str) -> Float64:
         """Return the mean difference of exchanged pairs over their mean, of reflection front, back and transmission."""

@@ -71,8 +71,7 @@ def straight_share(fabric: Fabric, rays: GapRays, patches: int) -> Float64:
     y = (cell // ends + (rays.places[:, 1] - 0.5) * (1.0 - fabric.weft.width)) % picks
     passed = np.empty(len(x), np.bool_)
     _pass(front, back, x, y, rays.directions, passed)
-    share = passed.reshape(patches, -1).mean(axis=1)
-    return np.asarray((1.0 - fabric.warp.width) * (1.0 - fabric.weft.width) * share)
+    return np.asarray((1.0 - fabric.warp.width) * (1.0 - fabric.weft.width) * passed.reshape(patches, -1).mean(axis=1))
 
 
 @kernel

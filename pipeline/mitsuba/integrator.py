@@ -238,8 +238,7 @@ class _Path:
         emitted = mi.DirectionSample3f(scene, si, place)
         sampled = active & ~delta if not self._scalar else active and not delta
         other = scene.pdf_emitter_direction(place, emitted, sampled) if dr.any(sampled) else mi.Float(0.0)
-        weight = dr.select(delta, 1.0, _heuristic(pdf, other))
-        return weight * emitter.eval(si, active)
+        return dr.select(delta, 1.0, _heuristic(pdf, other)) * emitter.eval(si, active)
 
     def _lit(self, si: Any, numbers: Any, active: Any) -> Any:
         """Return the light of emitters that are sampled, weighted against `_emitted`."""

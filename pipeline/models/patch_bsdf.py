@@ -145,8 +145,7 @@ class PatchBSDF:
     def eval(self, queries: Queries, seed: int = 0) -> Float64:
         """Return f_P of each query in linear RGB, (N, 3), 1/sr, with the incident cosine inside."""
         components = self.method.predict(self.fabric, queries, seed)
-        colours = self.method.colours(self.fabric, queries, seed)
-        return shade(self.fabric, components, queries, self.bounces, colours)
+        return shade(self.fabric, components, queries, self.bounces, self.method.colours(self.fabric, queries, seed))
 
     def eval_pdf(self, queries: Queries, lobes: Lobes | None = None, seed: int = 0) -> tuple[Float64, Float32]:
         """Return `eval` and `pdf` of each query."""

@@ -7,7 +7,7 @@ no number depends on earlier work.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from itertools import count, cycle, islice
 from pathlib import Path
@@ -114,7 +114,7 @@ def measure_timing(
     last, with every reading as `samples` and the queries a fabric as `note` (`reports.measure.timing.affordable`).
     """
     sample = [(cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))) for cloth, queries, _ in fabrics]
-    _prepare(methods, [cloth for cloth, _ in sample])
+    _prepare(methods, sample, truth)
     entries, records, edits = [], [], count(1)
     for index, method in enumerate(methods):
         progress(0.3 * index / len(methods))
@@ -156,13 +156,17 @@ def _times(
     return records
 
 
-def _prepare(methods: Sequence[Method], fabrics: Sequence[Fabric]) -> None:
-    """Prepare every fabric for every method, on all cores but for code from outside: only the clock needs them idle."""
+def _prepare(methods: Sequence[Method], sample: Sequence[tuple[Fabric, Queries]], truth: TruthOptions) -> None:
+    """Prepare every fabric for every method, and the truth's tables, on all cores: only the clock needs them idle.
+
+    Code from outside has one thread.
+    """
     with ThreadPoolExecutor(cores()) as ours, ThreadPoolExecutor(1) as theirs:
-        started = [
+        started: list[Future[object]] = [ours.submit(estimate, *queries, truth, 0) for queries in sample]
+        started += [
             (theirs if isinstance(method, Guarded) else ours).submit(method.prepare, cloth)
             for method in methods
-            for cloth in fabrics
+            for cloth, _ in sample
             if method.covers(cloth)
         ]
         for future in started:

@@ -1,7 +1,7 @@
 """Pictures of the views, by the truth and by methods, and the errors of methods.
 
-A picture is a linear OpenEXR: R, G, B under the light of the view, A = 1 where there is cloth; the truth's holds the
-standard error of each colour beside them.
+A picture is a linear OpenEXR: R, G, B under the light of the view, A = 1 where there is cloth. The truth's holds the
+standard error of each colour too, and the light of later bounces, which pictures of methods take from it.
 """
 
 from collections.abc import Mapping
@@ -15,9 +15,10 @@ import numpy.typing as npt
 from pipeline.compiled.arrays import Mask
 from pipeline.fingerprint import fingerprint
 from pipeline.models.method import Method
+from pipeline.scenes.bounces import later_bounces
 from pipeline.scenes.gbuffer import GBuffer
 from pipeline.scenes.options import View
-from pipeline.scenes.shade import compose, shade
+from pipeline.scenes.shade import coloured, colours_of, compose
 from pipeline.scenes.views import view
 from pipeline.truth.estimator import estimate
 from pipeline.truth.scattering.thread_colours import component_colours
@@ -28,6 +29,7 @@ from reports.record import TRUTH, Record
 from weaves.fabric import Fabric
 
 ERROR: Final = ("error.R", "error.G", "error.B")  # channels of its standard error
+_LATER = ("later.R", "later.G", "later.B")  # of the bounces after the first
 
 
 def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Path) -> None:
@@ -38,8 +40,10 @@ def render_truth(fabric: Fabric, scene: View, options: PictureOptions, path: Pat
     answers = estimate(fabric, queries, options.truth, seed)
     colours = component_colours(fabric, queries, options.truth, seed).mean
     noise = compose(gbuffer, colour_noise(answers, colours))
-    picture = compose(gbuffer, shade(fabric, answers.mean, queries, colours=colours))
-    write_picture(path, picture, gbuffer.mask, {**_about(fabric, scene, gbuffer), "method": TRUTH}, noise)
+    later = compose(gbuffer, later_bounces(fabric, queries, colours).sum(axis=1))
+    picture = compose(gbuffer, coloured(answers.mean, colours)) + later
+    about = {**_about(fabric, scene, gbuffer), "method": TRUTH}
+    write_picture(path, picture, gbuffer.mask, about, noise, later=later)
 
 
 def render_method(
@@ -53,10 +57,10 @@ def render_method(
     seed = int(fingerprint(["picture", fabric.name, scene, options.seed]), 16)
     method.prepare(fabric)
     queries = gbuffer.queries(fabric.repeat)
-    picture = compose(gbuffer, shade(fabric, method.predict(fabric, queries, seed), queries))
+    reference, components = read_exr(truth), method.predict(fabric, queries, seed)
+    picture = compose(gbuffer, coloured(components, colours_of(fabric, queries))) + reference.stack(*_LATER)
     about = {**_about(fabric, scene, gbuffer), "method": method.name, "setting": method.setting}
     write_picture(path, picture, gbuffer.mask, about)
-    reference = read_exr(truth)
     lit = gbuffer.lit
     error = squared_error(picture[lit], reference.stack(*RGB)[lit], reference.stack(*ERROR)[lit], resamples=0)
     return Record(method=method.name, setting=method.setting, fabric=fabric.name, scene=scene).of_error(error)
@@ -69,16 +73,17 @@ def write_picture(
     about: Mapping[str, str | float],
     noise: npt.NDArray[np.floating] | None = None,
     layers: Mapping[str, npt.ArrayLike] = MappingProxyType({}),
+    later: npt.NDArray[np.floating] | None = None,
 ) -> None:
-    """Write a picture (H, W, 3) as an OpenEXR: A = 1 where `mask` is, with the standard error if known.
+    """Write a picture (H, W, 3) as an OpenEXR: A = 1 where `mask` is.
 
-    Further `layers`, planes by name, are stored as float16.
+    Beside it are the standard error and the light of later bounces if given, and further `layers`, planes by name,
+    which are stored as float16.
     """
-    channels: dict[str, npt.ArrayLike] = {name: picture[..., i] for i, name in enumerate(RGB)}
-    channels["A"] = mask.astype(np.float32)
-    if noise is not None:
-        channels |= {name: noise[..., i] for i, name in enumerate(ERROR)}
-    write_exr(path, channels | dict(layers), dict(about), half=layers)
+    channels: dict[str, npt.ArrayLike] = {"A": mask.astype(np.float32), **layers}
+    for names, values in ((RGB, picture), (ERROR, noise), (_LATER, later)):
+        channels |= {} if values is None else {name: values[..., i] for i, name in enumerate(names)}
+    write_exr(path, channels, dict(about), half=layers)
 
 
 def _about(fabric: Fabric, scene: View, gbuffer: GBuffer) -> dict[str, str | float]:

@@ -105,19 +105,18 @@ def time_side_by_side(
 def affordable(contender: Contender, longest: float = LONGEST, fewest: int = FEWEST) -> Contender:
     """Return the contender with as many of its queries as one call answers in `longest` seconds, on one thread.
 
-    Queries a fabric are doubled from `fewest` on while a call with twice as many is made in time: their number is a
-    power of 2 times that, or all there are, and so the same in two runs unless a method is near the limit. At most
-    `fewest` queries a fabric take longer.
+    Queries a fabric are doubled from `fewest` on while a call takes at most half of that: their number is a power of 2
+    times that, or all there are, and so the same in two runs unless a method is near the limit. At most `fewest`
+    queries a fabric take longer.
     """
     set_threads(1)
     most = max(len(queries.u) for _, queries in contender.queries)
     rows = fewest
     _answer(contender.first(rows))  # warms up
-    while rows < most:
-        more = contender.first(2 * rows)
-        # The fastest of three: the first call of a size takes new memory, and another program may interrupt one.
-        if 1e-3 * min(milliseconds(partial(_answer, more)) for _ in range(3)) > longest:
-            break
+    # One of three is fast enough: the first call of a size takes new memory, and another program may interrupt one.
+    while rows < most and any(
+        1e-3 * milliseconds(partial(_answer, contender.first(rows))) <= 0.5 * longest for _ in range(3)
+    ):
         rows *= 2
     return contender.first(rows)
 

@@ -160,8 +160,7 @@ class UnifiedBtfNetwork(EncoderDecoder):
 
     def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
         """Compute a fabric's samples and encode them, by one forward pass; return the levels of its pyramid."""
-        texels = texels_of(fabric, self.options)
-        return tuple(level.contiguous() for level in averaged(self.encode(texels)))
+        return tuple(level.contiguous() for level in averaged(self.encode(texels_of(fabric, self.options))))
 
     def components(self, *inputs: Tensor) -> Tensor:
         """Return components (n, 4) from the columns of queries and the levels of a pyramid."""

@@ -136,5 +136,4 @@ class Decoder(nn.Module):
             for layer in spatial:
                 x = activate(layer(x))
             x = activate(angular(torch.cat([x, directions], dim=-1)))
-        x = activate(self.narrow(self.mix(x)))
-        return activate(self.last(x))
+        return activate(self.last(activate(self.narrow(self.mix(x)))))

@@ -79,8 +79,7 @@ class WovenNetwork(EncoderDecoder):
 
     def components(self, *inputs: Tensor) -> Tensor:
         """Return components (n, 4) from the columns of queries, and the latent and placement of a fabric."""
-        output = self.outputs(*inputs)
-        return to_components(Placement(*inputs[6:]).swap(output[..., :4])[0], self.options.log_k)
+        return to_components(Placement(*inputs[6:]).swap(self.outputs(*inputs)[..., :4])[0], self.options.log_k)
 
     def outputs(self, *inputs: Tensor) -> Tensor:
         """Return the outputs of the decoder, (1, n, 4 or 5), from the inputs of `components`."""

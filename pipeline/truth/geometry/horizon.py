@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.compiled.arrays import Float32, Float64, Mask
+from pipeline.compiled.arrays import Float32, Float64, Mask, nbytes
 from pipeline.compiled.decorators import allocating_kernel, kernel
 from pipeline.truth.geometry import heightfield, march
 from pipeline.truth.geometry.heightfield import GAP, OFFSET, TOP, UNDER, WARP, HeightField
@@ -24,8 +24,8 @@ _FLATTEST = 1.5e-3  # slopes below, beyond 89.9 degrees, are treated as equal
 _STEEPEST = 1e4
 _FARTHEST = 1e4  # yarn spacings
 
-# Tables of every level and kind need the same horizons, which take most of their time; 3 to 5 MB each.
-_KEPT: Final = 32
+# Tables of every level and kind need the same horizons, which take most of their time; up to 5 MB each.
+_KEPT: Final = 256 << 20  # bytes
 _LAST: Final[dict[bytes, Float32]] = {}
 _KEEPING: Final = Lock()
 
@@ -145,7 +145,7 @@ def horizons(
     """Return the horizon's slope of each point seen from above at (x, y), for evenly spaced azimuths from 0.
 
     Points in gaps lie at z = 0; with `own_plane`, a point's tangent plane hides too. The base has the `curvature` in
-    all azimuths. Shape (azimuths, points). The last `_KEPT` results are kept and shared: nobody may write to them.
+    all azimuths. Shape (azimuths, points). The last results, of `_KEPT` bytes, are shared: nobody may write to them.
     """
     arrays = (field.top, field.floats, field.crown, field.yarn, x, y)
     scalars = (*(part.shape for part in arrays), field.highest, field.lowest, azimuths, own_plane, curvature)
@@ -155,7 +155,7 @@ def horizons(
         slopes = _horizons(field, x, y, azimuths, own_plane, curvature)
         with _KEEPING:
             _LAST[asked] = slopes
-            while len(_LAST) > _KEPT:
+            while nbytes(_LAST.values()) > _KEPT:
                 _LAST.pop(next(iter(_LAST)))
     return slopes
 

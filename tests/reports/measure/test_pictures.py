@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from pipeline.fingerprint import fingerprint
+from pipeline.scenes.shade import compose, shade
 from pipeline.scenes.views import view
 from reports.images.exr import RGB, read_exr
 from reports.measure.pictures import ERROR, render_method, render_truth
@@ -28,9 +30,12 @@ def test_truth_is_lit_where_the_view_is_and_pictures_repeat_to_the_byte(truth, o
 
 def test_mse_is_that_of_the_pictures(truth, options, points, tmp_path):
     """Oracle: the mean square of the difference of the two files over lit pixels, less the noise in the truth's."""
-    records = render_method(points[0], load_fabric("denim"), "sphere", options, truth, tmp_path / "points.exr")
-    lit = view("sphere", *options.sphere_size, options=options.view).lit
+    denim, gbuffer = load_fabric("denim"), view("sphere", *options.sphere_size, options=options.view)
+    records, lit = render_method(points[0], denim, "sphere", options, truth, tmp_path / "points.exr"), gbuffer.lit
     shown, reference = read_exr(tmp_path / "points.exr"), read_exr(truth)
+    queries, seed = gbuffer.queries(denim.repeat), int(fingerprint(["picture", "denim", "sphere", options.seed]), 16)
+    own = compose(gbuffer, shade(denim, points[0].predict(denim, queries, seed), queries))
+    np.testing.assert_allclose(shown.stack(*RGB), own, rtol=1e-6)
     measured = np.square(shown.stack(*RGB)[lit].astype(np.float64) - reference.stack(*RGB)[lit]).mean()
     noise = np.square(reference.stack(*ERROR)[lit].astype(np.float64)).mean()
     found = {record.metric: record.value for record in records}
