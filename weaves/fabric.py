@@ -136,7 +136,9 @@ class Fabric(Frozen):
 
     def to_toml(self) -> str:
         """Return a file that `load_fabric` reads back as an equal fabric."""
-        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+        text = tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+        # Colours and runs of threads, lists that end with a number, take one line.
+        return re.sub(r"\[\n +([^\[\]]*[0-9]),\n *\]", lambda m: "[" + re.sub(r"\n +", " ", m[1]) + "]", text)
 
 
 def preset_names() -> list[str]:

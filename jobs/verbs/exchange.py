@@ -61,7 +61,7 @@ def import_draft(
     *,
     out: Annotated[Local, Parameter(help="Fabric file to write, ending in .toml.")],
     like: Annotated[str, Parameter(help="Fabric whose yarns give what a draft does not state.")] = "cotton_twill",
-    name: Annotated[str | None, Parameter(help="Name of the fabric; default: that of the draft file.")] = None,
+    name: Annotated[str | None, Parameter(help="Name of the fabric; default: that of the written file.")] = None,
     ends: Annotated[str, Parameter(help="Part of the draft, first and last end, such as 1-96; default: all.")] = "",
     picks: Annotated[str, Parameter(help="Part of the draft, first and last pick; default: all.")] = "",
     warp: Annotated[YarnFlags, Parameter(name="--warp")] = YarnFlags(),
@@ -77,7 +77,7 @@ def import_draft(
     file = read_draft(draft)
     file = cut_out(file, _part(ends, "--ends", file.ends), _part(picks, "--picks", file.picks))
     yarns = load_fabric(like)
-    own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", draft.stem).strip("_")[:60] or "draft"
+    own = name if name is not None else re.sub(r"[^A-Za-z0-9_-]+", "_", out.stem).strip("_")[:60] or "draft"
     drafted = fabric_of(file, yarns, own, str(draft), {"warp": given(warp), "weft": given(weft)})
     atomic_write(out, drafted.fabric.to_toml().encode())
     program = f", written by {file.program}" if file.program else ""

@@ -12,13 +12,13 @@ from weaves.mesh import repeat_mesh
 
 
 def test_a_draft_becomes_a_fabric_that_other_verbs_load_with_numbers_of_single_yarns_replaced(twillight, tmp_path):
-    (tmp_path / "Scarf #2.wif").write_text(wif(WARP_COLORS=numbered([1, 2] * 4)), encoding="utf-8")
-    code, text, complaint = twillight("import", "Scarf #2.wif", "--out", "deep/scarf.toml", "--like", "denim")
+    (tmp_path / "draft.wif").write_text(wif(WARP_COLORS=numbered([1, 2] * 4)), encoding="utf-8")
+    code, text, complaint = twillight("import", "draft.wif", "--out", "deep/Scarf #2.toml", "--like", "denim")
     assert (code, complaint) == (0, "")
     assert "it repeats after 4 ends and 4 picks" in text and "Assumed:" in text and "bend 12° and 38°" in text
-    fabric = load_fabric(tmp_path / "deep" / "scarf.toml")
+    fabric = load_fabric(tmp_path / "deep" / "Scarf #2.toml")
     assert fabric.name == "Scarf_2" and fabric.warp.bend == load_fabric("denim").warp.bend
-    code, text, _ = twillight("show", "deep/scarf.toml")
+    code, text, _ = twillight("show", "deep/Scarf #2.toml")
     assert code == 0 and "4 ends × 4 picks" in text
     (tmp_path / "a.wif").write_text(wif(), encoding="utf-8")
     options = ["--warp.bend", "7", "--weft.width", "0.6", "--weft.roughness", "0.2", "--name", "own"]
