@@ -1,7 +1,6 @@
 """Catalogue of the metrics: an entry of `catalogue.toml` each. A new metric is an entry and a measuring function.
 
-The entry names the table that shows the metric; nothing else is needed for its column there. Nothing heavy is imported
-here.
+The entry names the table that shows the metric; its column needs nothing else. Nothing heavy is imported here.
 """
 
 import tomllib

@@ -1,8 +1,7 @@
 """Yarns: twisted bundles of fibres, the same for all warps of a fabric, and for all wefts.
 
 Geometry after [Irawan2012Woven]: a float is a piece of torus, `bend` its largest inclination, `twist` the angle of the
-fibres to the yarn's axis. Optics after [Wang2022SpongeCake]: fibre-like microflakes of roughness alpha over a diffuse
-base.
+fibres to the yarn's axis. Optics after [Wang2022SpongeCake]: fibre-like microflakes of roughness alpha, a diffuse base.
 
 No yarn makes light. In even light of radiance 1 from everywhere, a viewer of a point of a yarn sees
 

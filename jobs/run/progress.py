@@ -37,8 +37,7 @@ class Board:
     """The tasks of a run as they begin, advance and end, in numbers; a context manager that ends what is shown.
 
     Work is measured by what each task is expected to cost, in seconds on one core; the estimate learns how long tasks
-    take. `show` receives each event with the numbers after it, from the driver's thread and from that of its dask
-    client.
+    take. `show` receives each event with the numbers after it, from threads of the driver and of its dask client.
     """
 
     def __init__(self, tasks: Sequence[Task], estimate: Estimate, show: Callable[[Event, Board], None]) -> None:

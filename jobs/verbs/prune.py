@@ -44,8 +44,7 @@ def prune(
 ) -> None:
     """List the files that no recipe needs, or remove them.
 
-    BadInput if no recipe is named, one cannot be used, or the folder holds no products; WorkFailed if a run is at work
-    in the folder.
+    BadInput if no recipe is named, one cannot be used, or the folder holds no products; WorkFailed if a run uses it.
     """
     ledger = Ledger(out)
     if not recipes:

@@ -50,8 +50,7 @@ def compare(
 ) -> None:
     """Print the differences of B from A.
 
-    BadInput if one has no Records or no machine, the machines differ without `other_machine`, or no measurement is
-    shared.
+    BadInput if one has no Records or no machine, the machines differ without `other_machine`, or nothing is shared.
     """
     from reports.tables.compare import LEVEL, NO_DIFFERENCE, difference_tables, refuse_other_machine
     from reports.tables.compare import compare as differences

@@ -63,8 +63,7 @@ def render(
 ) -> None:
     """Render a scene and print where the picture is.
 
-    BadInput if a value, the scene, a fabric, the method or the path cannot be used; WorkFailed if the memory does not
-    suffice.
+    BadInput if a value, the scene, a fabric, the method or the path cannot be used; WorkFailed if memory is short.
     """
     if samples not in (squares := [side**2 for side in range(1, MOST_SAMPLES + 1)]):
         raise BadInput(_WHERE, "--samples", samples, f"must be one of {', '.join(map(str, squares))}")

@@ -83,8 +83,7 @@ def run(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT, on: On = ON) 
 def work(recipe_name: str, stages: Sequence[Stage], out: Path, on: WorkerFlags, add: Sequence[str] = ()) -> None:
     """Run the unfinished tasks of some stages of a recipe and print a summary; `add`: methods from outside.
 
-    BadInput if the recipe, the folder or the scheduler cannot be used; WorkFailed if any task failed, when the others
-    are done.
+    BadInput if the recipe, the folder or the scheduler cannot be used; WorkFailed, at the end, if any task failed.
     """
     recipe = load_recipe(recipe_name, add)
     tasks = plan(recipe)

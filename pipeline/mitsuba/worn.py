@@ -96,8 +96,7 @@ def footprints_of(jacobian: Float64) -> Footprints:
     major = np.sqrt(0.5 * (xx + yy) + apart)
     area = np.abs(j[:, 0, 0] * j[:, 1, 1] - j[:, 0, 1] * j[:, 1, 0])
     minor = area / np.maximum(major, 1e-150)
-    angle = 0.5 * np.arctan2(xy, 0.5 * (xx - yy))
-    return _cut(PIXEL * major), _cut(PIXEL * minor), angle.astype(np.float32)
+    return _cut(PIXEL * major), _cut(PIXEL * minor), (0.5 * np.arctan2(xy, 0.5 * (xx - yy))).astype(np.float32)
 
 
 def _round_footprints(sigma: Float64) -> Footprints:

@@ -116,8 +116,7 @@ def load(scene: Scene, options: SceneOptions | None = None) -> Loaded:
             dressed.setdefault(key, []).append(shape)
             refuse_mesh(mi, shape, where, "a fabric", curved=options.curvature != "none")
     if not worn:
-        allowed = f'a shape must wear a fabric: a bsdf with an id such as "{PREFIX}denim"'
-        raise BadInput(where, "", "no fabric", allowed)
+        raise BadInput(where, "", "no fabric", f'a shape needs a bsdf with an id such as "{PREFIX}denim"')
     for key in scene.cloths:
         if key not in worn:
             raise BadInput(where, f"cloths.{key}", key, f"no shape has the bsdf {PREFIX + key!r}; {nearest(key, worn)}")

@@ -355,8 +355,7 @@ def over_fabrics(values: npt.ArrayLike) -> tuple[float, float, float]:
     the interval of a single fabric is NaN too.
 
     Student's t interval of the mean of the logarithms: exp(m ± t_{.975, n-1} s / sqrt(n)), with n fabrics, and mean m
-    and standard deviation s of the logarithms. It holds if the fabrics are drawn at random and the logarithms are
-    normal.
+    and standard deviation s of the logarithms. It holds for fabrics drawn at random and normal logarithms.
     """
     figures = np.asarray(values, np.float64)
     if not len(figures) or not ((figures > 0) & np.isfinite(figures)).all():

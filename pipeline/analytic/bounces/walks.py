@@ -24,12 +24,14 @@ is that of the sun on either side, and a, b, c, d are families with a way each: 
 """
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import inlined_kernel, kernel
+from pipeline.cores import cores
 from pipeline.truth.footprint.sequences import derive, uniform
 from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, first_hit
 from pipeline.truth.geometry.heightfield import BLEND, GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
@@ -41,6 +43,7 @@ _FEWEST: Final = 16  # points of the smallest piece; fewer of a cloth with so ma
 _OFF: Final = 1e-9  # distance from a wall at which walks go on: beyond its rounding, on the open side
 _IN_GAP: Final = 64  # points of a gap
 _OF_CELL: Final = 4  # walks from a cell, at least
+_PARTS: Final = 4  # of the walks, whose sums are added in their order: no bit depends on the number of threads
 _LONGEST: Final = 4  # yarns at which a walk counts the sun's light, from its third on
 # Root of x^5 = x + 1: its inverse powers are the steps of the additive sequence in four dimensions [Roberts2018R2].
 _FOUR: Final = 1.16730397826141868
@@ -137,19 +140,26 @@ def transport(
     """
     o, i, ways = len(viewers), len(lights), 1 if back is None else 2
     places, events = 2 * ways, 2 * ways * ways
-    sums = Transport(
-        np.zeros(o),
-        np.zeros((o, places, places, places)),
-        np.zeros((o, places, places, ways * i), np.float32),
-        np.zeros((o, ways, ways * i), np.float32),
-        np.zeros((o, ways)),
-        np.zeros(((places + 1) * events, places)),
-        np.zeros(((places + 1) * events, i + 1)),
-    )
-    faces = field, field if back is None else back
+    faces, starts = (field, field if back is None else back), starting_points(field, count)
+    ends = np.linspace(0, len(starts.x), _PARTS + 1).astype(np.int64)
+
+    def part(index: int) -> Transport:
+        own = Transport(
+            np.zeros(o),
+            np.zeros((o, places, places, places)),
+            np.zeros((o, places, places, ways * i), np.float32),
+            np.zeros((o, ways, ways * i), np.float32),
+            np.zeros((o, ways)),
+            np.zeros(((places + 1) * events, places)),
+            np.zeros(((places + 1) * events, i + 1)),
+        )
+        job = _Job(*faces, ways, lights, np.empty(i, np.float32), own)
+        _walk(job, starts, ends[index], ends[index + 1], viewers, np.empty(o, np.float32))
+        return own
+
+    with ThreadPoolExecutor(min(cores(), _PARTS)) as pool:
+        sums = Transport(*(np.sum(s, axis=0) for s in zip(*pool.map(part, range(_PARTS)), strict=True)))
     _see_gaps(*faces, *_gap_points(field, count), viewers, sums.seen)
-    job = _Job(*faces, ways, lights, np.empty(i, np.float32), sums)
-    _walk(job, starting_points(field, count), viewers, np.empty(o, np.float32))
     return sums
 
 
@@ -190,11 +200,11 @@ def _see_gaps(
 
 
 @kernel
-def _walk(job: _Job, start: Start, viewers: Float64, area: Float32) -> None:
-    """Add walks to the sums; `area` is scratch."""
+def _walk(job: _Job, start: Start, begin: int, end: int, viewers: Float64, area: Float32) -> None:
+    """Add the walks of some starts to the sums; `area` is scratch."""
     front, ways, light, sums, count = job.front, job.ways, job.light, job.sums, len(job.lights)
     events = 2 * ways * ways
-    for p in range(len(start.x)):
+    for p in range(begin, end):
         x, y = start.x[p], start.y[p]
         family, side, z, nx, ny, nz, _, _, _ = surface_at(front, x, y, int(x), int(y))
         if family == GAP or nz <= 0.0:
@@ -210,12 +220,12 @@ def _walk(job: _Job, start: Start, viewers: Float64, area: Float32) -> None:
             if not met:
                 continue
             for way_of_b in range(ways):
-                b, begin = 2 * way_of_b + second.family, (second.face ^ way_of_b) * count
+                b, lit = 2 * way_of_b + second.family, (second.face ^ way_of_b) * count
                 _count(job, second, way_of_b)
                 for k in range(len(viewers)):
                     if area[k] > 0.0:
                         for i in range(count):
-                            sums.second[k, a, b, begin + i] += area[k] * light[i]
+                            sums.second[k, a, b, lit + i] += area[k] * light[i]
                 met, third = _next(job, second, way_of_b, *_numbers(key, 0))
                 if not met:
                     continue
@@ -223,12 +233,12 @@ def _walk(job: _Job, start: Start, viewers: Float64, area: Float32) -> None:
                 for k in range(len(viewers)):
                     sums.reached[k, a, b, at] += area[k]
                 for way in range(ways):
-                    begin = (third.face ^ way) * count
+                    lit = (third.face ^ way) * count
                     _count(job, third, way)
                     for k in range(len(viewers)):
                         if area[k] > 0.0:
                             for i in range(count):
-                                sums.third[k, way_of_a, begin + i] += area[k] * light[i]
+                                sums.third[k, way_of_a, lit + i] += area[k] * light[i]
                     kind = b * events + 2 * ways * way + at
                     if _go_on(job, third, way, kind, key, start.area[p]):
                         for k in range(len(viewers)):

@@ -59,8 +59,7 @@ class SilhouetteData(nn.Module):
     """Queries about the silhouette and their answers; no part of a trained model.
 
     `columns` are rows of kind `opacity` or `grazing_cosine` (`pipeline.shards.silhouettes`), `repeat` is ends and
-    picks. Targets (n, 2) are opacity and 0, or mean and variance of the grazing cosine, in units of sqrt(kappa) and
-    kappa.
+    picks. Targets (n, 2) are opacity and 0, or mean and variance of the grazing cosine, over sqrt(kappa) and kappa.
     """
 
     def __init__(self, columns: Mapping[str, npt.NDArray[Any]], repeat: tuple[int, int]) -> None:

@@ -1,8 +1,7 @@
 """Layers that several networks share, the space they learn in, and their loss [Chen2024Woven].
 
 Networks put out (g(S_warp), g(S_weft), C_warp, C_weft) with g(x) = ln(k x + 1): highlights span decades, and g
-squeezes them. The loss is the mean squared error in that space, with one weight for the specular pair and one for the
-diffuse pair.
+squeezes them. The loss is the mean squared error there, with a weight of each pair, specular and diffuse.
 """
 
 import itertools
