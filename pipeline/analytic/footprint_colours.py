@@ -91,8 +91,7 @@ def _from_above(fabric: Fabric, queries: Queries) -> Float64:
     wide = [np.ascontiguousarray(queries[k], np.float64) for k in (0, 1, 2, 5, 6)]
     means = _mean_colours(*_threads(fabric), *wide).reshape(-1, 2, 3, 3)
     through = (queries.wi[:, 2] * queries.wo[:, 2] < 0.0)[:, None, None]
-    diffuse = np.where(through, means[:, :, 2], means[:, :, 1])
-    return np.concatenate([means[:, :, 0], diffuse], axis=1)
+    return np.concatenate([means[:, :, 0], np.where(through, means[:, :, 2], means[:, :, 1])], axis=1)
 
 
 @lru_cache(maxsize=16)

@@ -180,8 +180,7 @@ def _dense(where: str, node: list[Any], rank: int, level: int) -> Float64:
         grid = np.array(node).reshape((own,) * rank)
         for axis in range(rank):
             grid = np.repeat(grid, max(side // own, 1), axis)
-        blocks = grid.reshape((side, len(grid) // side) * rank)
-        return np.asarray(blocks.mean(axis=tuple(range(1, 2 * rank, 2))))
+        return np.asarray(grid.reshape((side, len(grid) // side) * rank).mean(axis=tuple(range(1, 2 * rank, 2))))
     if len(node) != 2**rank or not all(isinstance(part, list) for part in node):
         raise BadInput(where, "branches of a tree", len(node), f"{2**rank} branches or values alone are needed")
     parts = [_dense(where, part, rank, max(level - 1, 0)) for part in node]

@@ -46,8 +46,7 @@ def fit_sheet(sheet: DataSheet, name: str) -> list[Fitted]:
 
     def shares(colours: Float64) -> Float64:
         """Return reflectances and scattered transmittances of both faces, (2, 2)."""
-        values = unit @ colours + scatterer.bounced(colours)
-        return np.asarray(values.reshape(2, 2, -1) @ size)
+        return np.asarray((unit @ colours + scatterer.bounced(colours)).reshape(2, 2, -1) @ size)
 
     gap, fits = (1.0 - widths[0]) * (1.0 - widths[1]), []
     keys = ["openness", *(f"{yarn}.{key}" for key in ("diffuse", "diffuse_transmission") for yarn in ("warp", "weft"))]

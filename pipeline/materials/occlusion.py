@@ -67,8 +67,7 @@ def _horizon_map(field: HeightField, back: HeightField, grid: int, azimuths: int
     gap = np.repeat(gaps, grid * grid)
     sines = horizon_sines(field, back, np.concatenate(xs), np.concatenate(ys), gap, azimuths)
     sines = sines.reshape(azimuths, len(xs), grid * grid)
-    horizon = np.ascontiguousarray(sines.transpose(1, 0, 2), np.float32).ravel()
-    return _HorizonMap(blocks.ravel(), horizon, grid)
+    return _HorizonMap(blocks.ravel(), np.ascontiguousarray(sines.transpose(1, 0, 2), np.float32).ravel(), grid)
 
 
 def _slot_of(piece: CellPiece) -> int:

@@ -143,8 +143,7 @@ def _flakes(normal: Float64, fibres: Float64) -> tuple[Float64, Float64, Float64
     tangent = np.where(leading < 0.0, -tangent, tangent)
     upright = 1.0 - entry_of(normal, normal)
     along = np.sqrt(np.clip((1.0 - middle - apart) / upright, 1e-4, 1.0))
-    across = np.sqrt(np.clip((1.0 - middle + apart) / upright, 1e-4, 1.0))
-    return tangent, along, across
+    return tangent, along, np.sqrt(np.clip((1.0 - middle + apart) / upright, 1e-4, 1.0))
 
 
 def _sheen(fabric: Fabric, share: Reflectance) -> Float64:

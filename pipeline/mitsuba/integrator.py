@@ -251,8 +251,7 @@ class _Path:
         wo = si.to_local(towards.d)
         self._evaluate(wo, wanted, power, towards)
         value, pdf = bsdf.eval_pdf(self._context, si, wo, wanted)
-        weight = dr.select(towards.delta, 1.0, _heuristic(towards.pdf, pdf))
-        return dr.select(wanted, weight * value * power, 0.0)
+        return dr.select(wanted, dr.select(towards.delta, 1.0, _heuristic(towards.pdf, pdf)) * value * power, 0.0)
 
     def _evaluate(self, *values: Any) -> None:
         if not self._scalar:

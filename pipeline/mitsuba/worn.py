@@ -241,8 +241,7 @@ def _turned(direction: Float64, turn: Float64) -> Float64:
 def _lit(hits: RayHits, light: Float64) -> Mask:
     """Return which lights are on one side of both normals, and not in the plane, (N,)."""
     facing = np.einsum("ni,ni->n", hits.outward, light) * np.where(hits.outward[:, 2] < 0.0, -1.0, 1.0)
-    known = hits.outward.any(axis=1)
-    return np.asarray((np.abs(light[:, 2]) > _FLAT) & (~known | (light[:, 2] * facing > 0.0)))
+    return np.asarray((np.abs(light[:, 2]) > _FLAT) & (~hits.outward.any(axis=1) | (light[:, 2] * facing > 0.0)))
 
 
 def _seed(place: Float32, drawn: Float32 | Float64) -> int:

@@ -106,8 +106,7 @@ class Domain(Frozen):
     def _averaged(self, fabric: Fabric, queries: Queries) -> Mask:
         """Return which footprints are larger than those trained on and see the average of the repeat, (N,)."""
         size, high = _size(queries), self.queries.sigma[1]
-        narrow = high * queries.sigma_minor / size
-        return np.asarray((size > high) & (narrow >= _AVERAGED * max(fabric.weave.repeat)))
+        return np.asarray((size > high) & (high * queries.sigma_minor / size >= _AVERAGED * max(fabric.weave.repeat)))
 
     def refuse(self, queries: Queries, model: str) -> None:
         """Refuse queries of a kind that the model never saw: a BadInput that names the first row and column."""

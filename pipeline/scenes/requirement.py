@@ -116,7 +116,6 @@ def _range(values: npt.NDArray[np.floating]) -> tuple[float, float]:
 
 def _steepest(directions: Float32, margin: float) -> float:
     """Return the largest angle to the normal on either side, in degrees, with its margin."""
-    angles = np.degrees(np.arccos(np.clip(np.abs(directions[:, 2].astype(np.float64)), 0.0, 1.0)))
-    largest = _range(angles)[1]
+    largest = _range(np.degrees(np.arccos(np.clip(np.abs(directions[:, 2].astype(np.float64)), 0.0, 1.0))))[1]
     room = max(1.0, (margin - 1.0) * (90.0 - largest))
     return min(largest + room, _STEEPEST)

@@ -240,8 +240,7 @@ def developed(curve: Float64) -> tuple[Float64, Float64]:
 
     The curve must be finely sampled; tangents are central differences.
     """
-    steps = np.linalg.norm(np.diff(curve, axis=0), axis=-1)
-    length = np.concatenate([[0.0], np.cumsum(steps)])
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=-1))])
     tangent = np.gradient(curve, axis=0)
     return length, tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
 

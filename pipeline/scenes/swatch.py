@@ -63,8 +63,7 @@ class Swatch(NamedTuple):
         for towards, power in LIGHTS:
             way = unit(np.array(towards))
             # Behind the cloth the board is seen without the cloth's shadow.
-            free = shown | ~_met(ground, np.broadcast_to(way, ground.shape))[1]
-            light += free * power * way[2]
+            light += (shown | ~_met(ground, np.broadcast_to(way, ground.shape))[1]) * power * way[2]
         backdrop[board] = (BOARD / math.pi * light[board])[:, None]
         pixels = np.flatnonzero(shown)
         position = eye + distance[pixels, None] * ray[pixels]

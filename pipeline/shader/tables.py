@@ -78,8 +78,7 @@ class ClothTables(NamedTuple):
     """The four buffers of a cloth.
 
     `scalars` and `back_scalars` are values of the table of type int, then of type float, in the order in which the
-    buffers begin with them: of the front, then of the back, if the tables know it. `places` has the arrays of each
-    buffer.
+    buffers begin with them: of the front, then of the back, if known. `places` has the arrays of each buffer.
     """
 
     integers: npt.NDArray[np.int32]

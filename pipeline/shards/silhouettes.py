@@ -76,8 +76,7 @@ class SilhouetteRows(Frozen):
         from pipeline.truth.geometry.opacity import grazing_cosine
 
         _, u, v, azimuth, curvature = self._positions(fabric, seed, 0, _TRIED)
-        touch = grazing_cosine(fabric, u, v, azimuth, curvature)
-        square = np.square(touch)
+        square = np.square(grazing_cosine(fabric, u, v, azimuth, curvature))
         return float(np.sqrt(square / (1.0 - square) / curvature).max())
 
     def _positions(self, fabric: Fabric, seed: int, start: int, count: int) -> tuple[Float64, ...]:

@@ -109,8 +109,7 @@ def read_table(
     with readable(path, *_REMEDIES), local_copy(path) as copy:
         file = pq.ParquetFile(copy, page_checksum_verification=True)
         # Shards are small: threads within one cost more than they save.
-        chosen = range(file.num_row_groups)[groups]
-        table = file.read_row_groups(chosen, columns=list(names) or None, use_threads=False)
+        table = file.read_row_groups(range(file.num_row_groups)[groups], columns=list(names) or None, use_threads=False)
     if not table.schema.equals(schema, check_metadata=False):
         odd = sorted(set(table.schema.names) ^ set(schema.names))
         detail = f"columns {', '.join(odd)} differ" if odd else "column types differ"

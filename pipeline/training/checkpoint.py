@@ -119,8 +119,7 @@ class State:
             if name.startswith("optimiser/"):
                 _, parameter, entry = name.split("/")
                 moments.setdefault(int(parameter), {})[entry] = tensor
-        groups = self.optimiser.state_dict()["param_groups"]
-        self.optimiser.load_state_dict({"state": moments, "param_groups": groups})
+        self.optimiser.load_state_dict({"state": moments, "param_groups": self.optimiser.state_dict()["param_groups"]})
         with torch.no_grad():
             for index, average in enumerate(self._average):
                 average.copy_(tensors[f"average/{index}"])

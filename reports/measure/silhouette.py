@@ -3,8 +3,7 @@
 An orthographic camera looks at right angles at a cylinder of radius r; its picture is the strip along one edge, from
 `depth` inside the boundary's outline to the outline. A pixel at the distance d from the axis sees the boundary under
 the cosine sqrt(1 - (d/r)^2), with the curvature 1/r. Its coverage is the share of view rays that do not leave the cloth
-again [Kuznetsov2022Curved]. Its light is coverage times patch BSDF times pi, as under a directional light of irradiance
-pi.
+again [Kuznetsov2022Curved]. Its light is pi times coverage times patch BSDF, as under a sun of irradiance pi.
 
 A method without `coverage` knows no curved cloth. It is evaluated as a flat material is on a curved surface: the
 same queries with curvature 0, covered everywhere, and 0 where the light is behind the tangent plane.

@@ -118,34 +118,17 @@ def tabulate(
     with `curved` cloth that is curved towards the viewer. `level` is one of DETAILS. With `rims` view rays that meet a
     wall see the rim above it.
     """
-    detail, model = DETAILS[level], cloth_side(fabric, TruthOptions())
-    front, (picks, ends) = model.front, model.front.top.shape
+    detail, model, layout = DETAILS[level], cloth_side(fabric, TruthOptions()), _lay_out(fabric, by_thread, level, rims)
+    front, located, numbered, (picks, ends) = model.front, layout.located, layout.numbered, model.front.top.shape
+    stop = layout.evenly.size
+    grid, grid_falls, behind_grid = _horizon_grids(fabric, layout.size, behind, curved)
 
-    located = _locate(front)
-    size = next((n for n in _GRIDS if len(located.samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
-    grid, grid_falls, behind_grid = _horizon_grids(fabric, size, behind, curved)
-
-    # The nodes of every group, each kind in whole blocks.
-    groups = gather(located.pieces, detail, by_thread)
-    starts, first_nodes, stop = [], [], 0
-    kinds = (ends, picks) if by_thread else (1, 1)
-    for kind in (*((WARP, end) for end in range(kinds[0])), *((WEFT, pick) for pick in range(kinds[1])), (GAP, 0)):
-        starts.append(stop // BLOCK_NODES)
-        for group in groups:
-            if (group.piece.family, group.thread) == kind:
-                first_nodes.append(stop)
-                stop += group.nodes
-        stop += -stop % BLOCK_NODES
-    starts.append(stop // BLOCK_NODES)
-    nodes = np.tile(FLAT[:, None], stop)
-    evenly, mean, variance = np.zeros(stop), np.zeros((AZIMUTHS, stop)), np.ones((AZIMUTHS, stop))
+    nodes, mean, variance = np.tile(FLAT[:, None], stop), np.zeros((AZIMUTHS, stop)), np.ones((AZIMUTHS, stop))
     behind_mean, behind_variance = (part[:, : stop if behind else 0].copy() for part in (mean, variance))
     falls = np.zeros((len(grid_falls), AZIMUTHS, stop))
-    numbered = list(zip(groups, first_nodes, strict=True))
     for group, start in numbered:
         indices, (across, along) = _node_indices(group, start), group.rules
         nodes[:, indices] = piece_rows(front.yarn, group.piece, across, along)
-        evenly[indices] = np.outer(along.weights, across.weights).ravel() * len(group.cells) / (ends * picks)
         mean[:, indices], variance[:, indices] = _soft_horizons(group, grid)
         for of_nodes, of_grid in zip(falls, grid_falls, strict=True):
             of_nodes[:, indices], _ = _soft_horizons(group, of_grid)
@@ -153,22 +136,21 @@ def tabulate(
             behind_mean[:, indices], behind_variance[:, indices] = _soft_horizons(group, behind_grid)
     behind_mean, behind_sharpness = _ramps(behind_mean, behind_variance)
     cell_groups: list[list[int]] = [[] for _ in range(ends * picks)]
-    for index, group in enumerate(groups):
+    for index, (group, _) in enumerate(numbered):
         for end, pick in group.cells:
             cell_groups[pick * ends + end].append(index)
 
     spots = _spots(front, numbered, stop)
     shown = spots[:, 3][spots[:, 2] > 0.0]
-    areas, walls = _areas(front, located.samples, grid, numbered, evenly, starts[-2] * BLOCK_NODES, rims)
     return SoftNodeTable(
         repeat=np.array([ends, picks], np.int64),
         yarn=np.ascontiguousarray(front.yarn, np.float32),
         thickness=np.float32(front.thickness),
         uniform=EVEN * (max(ends, picks) if by_thread else longest_period(front)),
-        starts=np.array(starts, np.int64),
-        kinds=np.array(kinds, np.int64),
+        starts=np.array(layout.starts, np.int64),
+        kinds=np.array((ends, picks) if by_thread else (1, 1), np.int64),
         nodes=np.ascontiguousarray(_in_blocks(nodes).transpose(1, 0, 2)),
-        evenly=_in_blocks(evenly),
+        evenly=layout.evenly,
         mean=_in_blocks(mean),
         sharpness=_in_blocks(_sharpness(variance)),
         groups=np.array([(k, group.lines, group.piece.family) for group, k in numbered], np.uint32),
@@ -186,8 +168,8 @@ def tabulate(
         heights=front.yarn, highest=front.highest, lowest=front.lowest, plane=model.plane,
         spots=spots,
         shown=np.array([shown.min(), shown.max()], np.float32),
-        areas=_in_blocks(areas),
-        end_walls=_in_blocks(walls[: AZIMUTHS if behind and rims else 0]).astype(np.uint8),
+        areas=layout.areas,
+        end_walls=layout.end_walls[: AZIMUTHS if behind and rims else 0],
         view_lines=detail.lines, spacing=detail.spacing, rims=rims,
     )  # fmt: skip
 
@@ -287,6 +269,45 @@ def _locate(front: HeightField) -> _Located:
             found.pieces.append(((end, pick), piece, blocks[key]))
         found.starts.append(len(found.pieces))
     return found
+
+
+class _Layout(NamedTuple):
+    """The nodes of all groups, each kind in whole blocks, and what a viewer sees of them."""
+
+    located: _Located
+    size: int  # of grids
+    numbered: list[tuple[PieceGroup, int]]  # groups, each with its first node
+    starts: list[int]  # as in SoftNodeTable
+    evenly: Float32
+    areas: Float32
+    end_walls: npt.NDArray[np.uint8]
+    """As in SoftNodeTable, the walls for any table."""
+
+
+@lru_cache(maxsize=4)  # tables of light from behind and of curved cloth have the same
+def _lay_out(fabric: Fabric, by_thread: bool, level: int, rims: bool) -> _Layout:
+    front = cloth_side(fabric, TruthOptions()).front
+    located, (picks, ends) = _locate(front), front.top.shape
+    size = next((n for n in _GRIDS if len(located.samples) * AZIMUTHS * n * n <= _GRID_BYTES), _GRIDS[-1])
+    groups, numbered, starts, stop = gather(located.pieces, DETAILS[level], by_thread), [], [], 0
+    kinds = (ends, picks) if by_thread else (1, 1)
+    for kind in (*((WARP, end) for end in range(kinds[0])), *((WEFT, pick) for pick in range(kinds[1])), (GAP, 0)):
+        starts.append(stop // BLOCK_NODES)
+        for group in groups:
+            if (group.piece.family, group.thread) == kind:
+                numbered.append((group, stop))
+                stop += group.nodes
+        stop += -stop % BLOCK_NODES
+    starts.append(stop // BLOCK_NODES)
+    evenly = np.zeros(stop)
+    for group, start in numbered:
+        across, along = group.rules
+        shares = np.outer(along.weights, across.weights) * len(group.cells) / (ends * picks)
+        evenly[_node_indices(group, start)] = shares.ravel()
+    grid, _, _ = _horizon_grids(fabric, size, False, False)
+    areas, walls = _areas(front, located.samples, grid, numbered, evenly, starts[-2] * BLOCK_NODES, rims)
+    of_blocks = (_in_blocks(evenly), _in_blocks(areas), _in_blocks(walls).astype(np.uint8))
+    return _Layout(located, size, numbered, starts, *of_blocks)
 
 
 def _piece_columns(located: _Located) -> dict[str, Any]:

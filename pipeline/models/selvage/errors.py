@@ -134,8 +134,7 @@ def _side(fabric: Fabric, behind: bool) -> Float32:
         for answer, row in enumerate(rows[case]):
             result[case, answer, :TERMS] = expand(row, numbers)
     known = ~np.isnan(colours[:, -1])
-    factors = size_factors(queries.take(known), colours[known], result)
-    result[int(behind) :: 2, :-1, TERMS:] = np.log(factors)
+    result[int(behind) :: 2, :-1, TERMS:] = np.log(size_factors(queries.take(known), colours[known], result))
     return result
 
 

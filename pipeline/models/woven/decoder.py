@@ -58,8 +58,7 @@ def periodic_blob(x: Tensor, deviation: Tensor | float, bins: int) -> Tensor:
 
 def encoded_size(sigma: Tensor, smallest: float, largest: float) -> Tensor:
     """Map footprints, in repeats, to [0, 1]: the logarithm between `smallest` and `largest`, clamped to it."""
-    span = math.log2(largest / smallest)
-    return (torch.log2(sigma / smallest) / span).clamp(0.0, 1.0)
+    return (torch.log2(sigma / smallest) / math.log2(largest / smallest)).clamp(0.0, 1.0)
 
 
 def encode_patch(
