@@ -104,7 +104,7 @@ def bounded(fabric, queries):
     """Return the most that the bound lets through."""
     bright = FakeMethod(lambda asked: np.full((len(asked.u), 4), 1e3, np.float32))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nodes, "_GRID_BYTES", 1 << 17)  # as in `methods.soft_table`
+        patch.setattr(nodes, "_GRID_BYTES", 1 << 17)  # half of those of tests/conftest.py
         method = Bounded(bright)
         return method.predict(fabric, queries), float(method.transparency(fabric, queries.take(slice(1)))[0])
 

@@ -9,6 +9,7 @@ from pipeline.truth.options import EstimatorName
 from tests.pipeline.truth.cloths import LOPSIDED, agree, answering, drawn, images_agree, moved_far, reversed_axes, woven
 
 ALL = get_args(EstimatorName)
+pytestmark = pytest.mark.usefixtures("coarse_truth")
 
 
 def asked(estimator, fabric=LOPSIDED, **options):

@@ -12,6 +12,8 @@ from reports.measure.latents import SHARES, between, measure_edits, measure_path
 from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import Fabric, load_fabric
 
+pytestmark = pytest.mark.usefixtures("coarse_truth")
+
 TRUTH = TruthOptions(estimator="node_table")
 ASKED = QueryOptions(sigma=(0.3, 1.0), max_angle=60.0)
 
