@@ -53,9 +53,12 @@ def _small_tables():
 @pytest.fixture(scope="module")
 def coarse_truth():
     """Give tables of the truth a quarter of their directions, for tests in which its accuracy plays no part."""
-    from tests.pipeline.truth.cloths import coarse_tables
+    from pipeline.truth.node_table.tables import COARSE, FINE
 
-    with coarse_tables():
+    with pytest.MonkeyPatch.context() as patch:
+        for table in (FINE, COARSE):
+            patch.setattr(table, "_azimuths", 32)
+            patch.setattr(table, "_tables", {})
         yield
 
 

@@ -21,7 +21,6 @@ from hypothesis import strategies as st
 
 from jobs.cli import main
 from jobs.recipe.load import load_recipe
-from jobs.run import cluster
 from pipeline.folders import own_files
 from pipeline.models.added.describe import describe
 from pipeline.scenes.catalogue import load_scene
@@ -275,7 +274,7 @@ def test_single_bad_values_are_refused(subject, place, capsys):
 
 @pytest.mark.parametrize("verb", sorted({command.partition(" ")[0] for command, _ in COMMANDS}))
 def test_a_command_that_cannot_be_used_is_refused(verb, place, capsys, monkeypatch):
-    monkeypatch.setattr(cluster, "_SECONDS", 0.2)  # for a scheduler that is not there
+    monkeypatch.setattr("jobs.run.cluster._SECONDS", 0.2)  # for a scheduler that is not there
     wrong = []
     for command, words in COMMANDS:
         if command.partition(" ")[0] == verb:

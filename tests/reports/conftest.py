@@ -11,7 +11,6 @@ from reports.measure.held_out import HeldOutFabric
 from reports.options import BenchOptions
 from reports.record import Record
 from tests.pipeline.models.stand_ins import FakeMethod
-from tests.pipeline.truth.cloths import coarse_tables
 from weaves.fabric import load_fabric
 
 COARSE = TruthOptions(relative_error=0.2, min_count=256, max_count=256)
@@ -52,10 +51,9 @@ def oracle():
 def dataset():
     """Held-out rows of two fabrics: [denim, twill_4_4]."""
     truth, rows = TruthOptions(relative_error=0.05, max_count=1024), []
-    with coarse_tables():
-        for fabric in map(load_fabric, ("denim", "twill_4_4")):
-            queries = draw_queries(QueryOptions(), fabric.repeat, 1, 0, 400)
-            rows.append(HeldOutFabric(fabric, queries, estimate(fabric, queries, truth, 1)))
+    for fabric in map(load_fabric, ("denim", "twill_4_4")):
+        queries = draw_queries(QueryOptions(), fabric.repeat, 1, 0, 400)
+        rows.append(HeldOutFabric(fabric, queries, estimate(fabric, queries, truth, 1)))
     return rows
 
 

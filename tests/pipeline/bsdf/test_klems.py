@@ -15,7 +15,6 @@ from pipeline.scenes.shade import shade
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
-from tests.pipeline.truth.cloths import coarse_tables
 from weaves.colour import LUMINANCE
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
@@ -55,9 +54,8 @@ def test_a_lambertian_layer_has_its_shares_and_is_reciprocal():
 
 
 @pytest.fixture(scope="module")
-def voile():
-    with coarse_tables():
-        return fabric_bsdf(load_fabric("voile"), basis=QUARTER, points=1)
+def voile(coarse_truth):
+    return fabric_bsdf(load_fabric("voile"), basis=QUARTER, points=1)
 
 
 @pytest.mark.slow

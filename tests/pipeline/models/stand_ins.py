@@ -12,7 +12,6 @@ from pipeline.models.neumip import NeumipOptions
 from pipeline.models.registry import build_network
 from pipeline.models.unified_btf import BtfAutoencoderOptions, UnifiedBtfOptions
 from pipeline.models.woven import WovenOptions
-from tests.pipeline.truth.cloths import coarse_tables
 
 _BTF = {"texels_per_yarn": 2, "samples": 8, "fewest_samples": 4, "encoder_hidden": 16, "weights": 8, "hidden": 16}
 
@@ -28,8 +27,7 @@ SMALL = {
 
 def untrained(options, *fabrics):
     """Return an untrained network for these fabrics, with the extra rows that it learns from."""
-    with coarse_tables():
-        extra = [[rows.answer(fabric, 0, rows.count(fabric)) for fabric in fabrics] for rows in options.extra_rows]
+    extra = [[rows.answer(fabric, 0, rows.count(fabric)) for fabric in fabrics] for rows in options.extra_rows]
     return build_network(options, fabrics, extra)
 
 

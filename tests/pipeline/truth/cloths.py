@@ -1,13 +1,10 @@
 """Cloths and queries of many tests: woven ones, one without symmetries, one whose answers are known."""
 
 import math
-from contextlib import contextmanager
 
 import numpy as np
-import pytest
 
 from pipeline.shards.queries import QueryOptions, draw_queries
-from pipeline.truth.node_table.tables import COARSE, FINE
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from weaves.draft import Draft, Matrix
@@ -61,16 +58,6 @@ def fixed(count, estimator="owen", **options):
     """Return options that spend this number of points on each query."""
     limits = {"relative_error": 1e-9, "absolute_error": 0.0, "min_count": count, "max_count": count}
     return answering(estimator, **limits | options)
-
-
-@contextmanager
-def coarse_tables():
-    """As the fixture `coarse_truth`, for fixtures of other scopes."""
-    with pytest.MonkeyPatch.context() as patch:
-        for table in (FINE, COARSE):
-            patch.setattr(table, "_azimuths", 32)
-            patch.setattr(table, "_tables", {})
-        yield
 
 
 LOPSIDED = woven("denim", ("#.#", "##.", ".##"), {"width": 0.8, "twist": 20.0}, {"bend": 35.0, "relief": 1.2})
