@@ -37,8 +37,7 @@ QUICK = "not slow and not faults and not external"
 
 @pytest.fixture(scope="session", autouse=True)
 def _small_tables():
-    """Make small tables of light between yarns, whose accuracy is tested with tables of their own, and grids of
-    horizons of a quarter of the usual size, as exact in all that is compared: the usual ones take seconds."""
+    """Make small tables of light between yarns, and small grids of horizons: the usual ones take seconds."""
     from pipeline.analytic.bounces.table import bounce_table
     from pipeline.analytic.soft_nodes import nodes
     from pipeline.scenes import bounces

@@ -5,11 +5,10 @@ from pipeline.materials.lobes import even_sky, reflectance
 from pipeline.models.analytic.map_material import MapMaterialOptions
 from pipeline.models.registry import load_methods
 from pipeline.truth.query import Queries
-from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
-@pytest.mark.parametrize("name", ["cotton_twill", slow("gauze")])
+@pytest.mark.parametrize("name", ["cotton_twill", pytest.param("gauze", marks=pytest.mark.slow)])
 def test_highlights_have_the_energy_of_the_truth(name):
     """An even sky seen from above: some is lost where the maps' normals turn away from the light.
 
