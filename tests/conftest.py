@@ -18,6 +18,8 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / "pipeline" / "compiled" / "_
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.load_profile("fixed")
 
+gc.disable()  # until all tests are collected: their modules stay, and looking through them took a fifth of that time
+
 STARTED = {"cpp", "programs", "webgl", "llvm", "switch"}
 """Fixtures that start a compiler, a browser or a server: what uses one is `external`."""
 
@@ -34,14 +36,28 @@ QUICK = "not slow and not faults and not external"
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _few_walks():
-    """Make small tables of light between yarns: the usual ones take seconds. Tests of their accuracy make their own."""
+def _small_tables():
+    """Make small tables of light between yarns, and small grids of horizons: the usual ones take seconds."""
     from pipeline.analytic.bounces.table import bounce_table
+    from pipeline.analytic.soft_nodes import nodes
     from pipeline.scenes import bounces
 
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nodes, "_GRID_BYTES", 1 << 18)
         for name, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
             patch.setattr(bounces, name, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
+        yield
+
+
+@pytest.fixture(scope="module")
+def coarse_truth():
+    """Give tables of the truth a quarter of their directions, for tests in which its accuracy plays no part."""
+    from pipeline.truth.node_table.tables import COARSE, FINE
+
+    with pytest.MonkeyPatch.context() as patch:
+        for table in (FINE, COARSE):
+            patch.setattr(table, "_azimuths", 32)
+            patch.setattr(table, "_tables", {})
         yield
 
 
@@ -70,7 +86,9 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish(session):
     """Note the number of tests when the whole lane is collected; tests/test_lint.py compares it with its budget."""
+    gc.freeze()
     gc.set_threshold(20_000)  # a tenth of the time went into looking through modules and tests for garbage
+    gc.enable()
     config = session.config
     if config.args_source is config.ArgsSource.TESTPATHS and config.option.markexpr == QUICK:
         config.cache.set("budgets/tests", len(session.items))

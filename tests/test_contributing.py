@@ -107,8 +107,7 @@ def followed(section, folder):
 def changed(text, diff, name):
     """Apply lines of a diff: `+` takes the place of the `-` before it, or follows the line before it.
 
-    A part of a line may stand for it, if it is not a whole line.
-    """
+    A part of a line may stand for it, if it is not a whole line."""
     for old, new in re.findall(r"^([- ].*)\n((?:\+.*\n?)*)", diff, re.M):
         assert new, f"{name}: {old!r} changes nothing: a line with + is needed after it"
         whole = re.compile(f"^{re.escape(old[1:])}$", re.M)

@@ -16,7 +16,7 @@ from cyclopts import Parameter
 
 from jobs.terminal import Terminal, print_lines, print_table, progress
 from jobs.verbs.parameters import FabricName, Local
-from pipeline.atomic import atomic_write
+from pipeline.atomic import atomic_write, refuse_unwritable
 from pipeline.cores import cores
 from pipeline.truth.options import TABLE_CELLS
 from reports.images import tiles
@@ -100,10 +100,10 @@ def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
     from pipeline.scenes import bounces, picture
     from pipeline.scenes.swatch import Swatch
 
+    refuse_unwritable(path := folder / f"{fabric.name}-swatch.png")
     period = max(*fabric.weave.repeat, *(len(colours.diffuse) for colours in fabric.thread_colours()))
     swatch = Swatch(min(max(_LEAST_YARNS, 1.5 * period), _MOST_YARNS), size)
-    path, codes = folder / f"{fabric.name}-swatch.png", np.zeros((size[1], size[0], 3), np.uint8)
-    parts = picture.windows(size, _QUERIES_OF_PIXEL)
+    parts, codes = picture.windows(size, _QUERIES_OF_PIXEL), np.zeros((size[1], size[0], 3), np.uint8)
     with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
         method = method_of(fabric)
         method.prepare(fabric)

@@ -14,7 +14,7 @@ from tests.jobs.small_recipes import write_smallest
 PLOT = png(np.zeros((1, 1, 4), np.uint8))
 
 
-def test_a_recipe_becomes_a_page(tmp_path, here, capsys, monkeypatch):
+def test_a_recipe_becomes_a_page(tmp_path, here, coarse_truth, capsys, monkeypatch):
     """Its plots are made and not drawn, which takes half of the time; `tests/reports/page` draws each of them."""
     made = []
     monkeypatch.setattr(page, "render", lambda plot, *data: made.append(plot(*data)) or PLOT)

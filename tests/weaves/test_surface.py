@@ -38,8 +38,7 @@ def random_points(fabric, count=4000, seed=1):
 def test_a_plain_float_by_hand():
     """L = 1, u_max = 30°: R = 1, r = 1/2, so the crown is 1 + 1/2 - cos 30° high; the fibres lie at psi to the yarn.
 
-    Off the axis sin v = x/r, sin u = y/(R + r cos v): at x = .25, y = .3.
-    """
+    Off the axis sin v = x/r, sin u = y/(R + r cos v): at x = .25, y = .3."""
     fabric = cloth({"family": "plain"}, {"bend": 30, "twist": 20}, {"bend": 30, "twist": 20})
     sine, cosine = np.sin(np.radians(20)), np.cos(np.radians(20))
     seen = surface_at(fabric, [0.5, 1.5], [0.5, 0.5])

@@ -3,27 +3,18 @@
 from functools import lru_cache
 
 import numpy as np
-import pytest
 
 from pipeline.analytic import exact_points, prefiltered
 from pipeline.analytic.soft_nodes import components, nodes
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.options import TruthOptions
 
-
-@lru_cache(maxsize=64)
-def soft_table(fabric, level=2, behind=False, rims=True):
-    """Return a table with grids of a quarter of the usual size: as exact in all that is compared here, and cheaper."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nodes, "_GRID_BYTES", 1 << 18)
-        return nodes.tabulate(fabric, level=level, behind=behind, rims=rims)
-
-
+soft_table = lru_cache(maxsize=64)(nodes.tabulate)
 _maps = lru_cache(maxsize=32)(prefiltered.tabulate)
 
 
 def soft_nodes(fabric, queries, level=2, rims=True):
-    return components.read_queries(soft_table(fabric, level, rims=rims), queries).components
+    return components.read_queries(soft_table(fabric, level=level, rims=rims), queries).components
 
 
 def unshadowed(fabric, queries):

@@ -28,7 +28,7 @@ def test_from_behind_colours_are_means_over_what_is_seen_from_above(minor):
     fabric = coloured("gauze", **STRIPES)
     asked = queries(3, np.random.default_rng(1), minor, behind=True)
     found = footprint_colours(fabric, asked)
-    count = 1200 if minor is None else 600
+    count = 1200 if minor is None else 300
     step = (np.arange(count) + 0.5) / count * 9.0 - 4.5
     for row in range(3):
         size, turn = float(asked.sigma[row]), float(asked.angle[row])
@@ -128,7 +128,7 @@ def test_neither_a_move_nor_the_footprint_changes_the_mean_and_light_from_behind
     assert np.abs(near - own).max() > 0.1
     # Masses are integrals: over a lattice of centres, every size of footprint has the mean of the threads.
     fabric = coloured("twill_4_4", ends=[["red", 3], ["blue", 1]], picks=[["red", 1], ["blue", 5]])
-    u, v = np.mgrid[0 : fabric.repeat[0] : 0.25, 0 : fabric.repeat[1] : 0.25].reshape(2, -1)
+    u, v = np.mgrid[0 : fabric.repeat[0] : 0.5, 0 : fabric.repeat[1] : 0.5].reshape(2, -1)
     wi, wo = np.tile([0.6, 0.0, 0.8], (u.size, 1)), np.tile([0.0, 0.0, 1.0], (u.size, 1))
     wide = footprint_colours(fabric, Queries.round([0.0], [0.0], [1e3], wi[:1], wo[:1]))
     for size in (2.0, 7.0, 40.0):

@@ -54,7 +54,7 @@ def test_a_lambertian_layer_has_its_shares_and_is_reciprocal():
 
 
 @pytest.fixture(scope="module")
-def voile():
+def voile(coarse_truth):
     return fabric_bsdf(load_fabric("voile"), basis=QUARTER, points=1)
 
 

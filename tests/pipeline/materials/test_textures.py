@@ -30,7 +30,7 @@ def diffuse_albedo(fabric, side, sky=1.0):
     wi = np.stack([sine * np.cos(turn), sine * np.sin(turn), sky * z], axis=-1)
     none, size = np.zeros(len(wi)), np.full(len(wi), 2.0 * max(fabric.repeat))
     queries = Queries.round(none, none, size, wi, np.tile([0.0, 0.0, 1.0], (len(wi), 1)))
-    options = TruthOptions(estimator="mc", relative_error=0.02, max_count=16384)
+    options = TruthOptions(estimator="mc", relative_error=0.04)
     mean = estimate(fabric, queries, options, seed=11).mean
     colours = component_colours(fabric, queries, options, seed=12).mean
     return np.pi * (mean[:, 2:, None] * colours[:, 2:] / z[:, None, None]).sum(axis=1).mean(axis=0)
@@ -64,7 +64,7 @@ def test_the_mean_transmitted_colour_the_fibres_direction_and_roughness_are_thos
     assert maps.alpha_across.min() > 0.9
 
 
-@pytest.mark.parametrize(("name", "size", "halvings"), [("denim", 256, 4), ("satin_8", 256, 4), ("gauze", 512, 5)])
+@pytest.mark.parametrize(("name", "size", "halvings"), [("denim", 256, 4), slow("satin_8", 256, 4), ("gauze", 512, 5)])
 def test_roughness_of_mip_levels_holds_the_variance_below_a_texel(name, size, halvings):
     """The squared projected area of flakes, alpha^2 + (1 - alpha^2) |w x t|^2, averaged over points of a texel."""
     fabric = load_fabric(name)

@@ -128,7 +128,7 @@ def test_a_rim_covers_what_the_method_says_and_lets_the_rest_pass():
 
 def test_samples_at_a_rim_have_the_density_and_the_weight_of_their_lobe():
     """The density integrates to what does not go straight on; each weight is its value over its density."""
-    cloth, wi = worn_of("denim"), sphere(96, 192)
+    cloth, wi = worn_of("denim"), sphere(64, 128)
     many = at_a_rim(len(wi), 20.0)
     straight = 1.0 - cloth.pdf(many, wi).mean() * 4.0 * math.pi
     covered = cloth.coverage(many)[0]

@@ -13,7 +13,6 @@ import pytest
 from scipy import stats
 
 from pipeline.analytic.exact_points import sample_points
-from pipeline.analytic.soft_nodes import nodes
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.models.bounded import Bounded
 from pipeline.models.patch_bsdf import PatchBSDF
@@ -103,10 +102,8 @@ def soft_nodes(fabric, queries):
 def bounded(fabric, queries):
     """Return the most that the bound lets through."""
     bright = FakeMethod(lambda asked: np.full((len(asked.u), 4), 1e3, np.float32))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nodes, "_GRID_BYTES", 1 << 17)  # as in `methods.soft_table`
-        method = Bounded(bright)
-        return method.predict(fabric, queries), float(method.transparency(fabric, queries.take(slice(1)))[0])
+    method = Bounded(bright)
+    return method.predict(fabric, queries), float(method.transparency(fabric, queries.take(slice(1)))[0])
 
 
 def _by_rows(queries, *parts):

@@ -9,7 +9,7 @@ from pipeline.scenes.swatch import Swatch
 from pipeline.truth.query import faults
 
 OPTIONS = SceneOptions(variant="scalar_rgb", environment_directions=4, largest_sigma=1e6)
-WIDTH = 64
+WIDTH = 48
 
 
 @pytest.fixture(scope="module", params=SHIPPED)

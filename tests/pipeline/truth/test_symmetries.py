@@ -9,6 +9,7 @@ from pipeline.truth.options import EstimatorName
 from tests.pipeline.truth.cloths import LOPSIDED, agree, answering, drawn, images_agree, moved_far, reversed_axes, woven
 
 ALL = get_args(EstimatorName)
+pytestmark = pytest.mark.usefixtures("coarse_truth")
 
 
 def asked(estimator, fabric=LOPSIDED, **options):
@@ -70,8 +71,7 @@ def test_the_back_of_a_plain_weave_turned_over_is_its_front(estimator):
 def test_light_and_viewer_change_places_under_the_projected_normaliser(estimator):
     """f_P |wo.n_s| = f_P' |wi.n_s|, specular parts, which contain the incident cosine; the visible one breaks it.
 
-    In the fabric plane: other rays cross a footprint towards the light than towards the viewer.
-    """
+    In the fabric plane: other rays cross a footprint towards the light than towards the viewer."""
     queries = asked(estimator)
     back = queries._replace(wi=queries.wo, wo=queries.wi)
     for normaliser, reciprocal in (("projected", True), ("visible", False)):

@@ -27,7 +27,7 @@ TWILL = load_fabric("denim")
 class Scaled(FakeMethod):
     """A coarse truth times a factor, but for what `spoil` does to it."""
 
-    truth = TruthOptions(estimator="quadrature", parallax=False, relative_error=0.1)
+    truth = TruthOptions(estimator="owen", parallax=False, min_count=32, max_count=32)
 
     def __init__(self, factor=1.0, setting="", spoil=lambda answers, queries: answers):
         self.factor, self.setting, self.spoil = factor, setting, spoil

@@ -69,8 +69,7 @@ def test_the_brightest_method_returns_at_most_what_arrives_and_soft_nodes_no_mor
     """A network gone wrong answers a thousand times too much: what is left are the soft nodes without shadows.
 
     At most 1 but for the error of 256 directions. Diffuse: exactly bounded. Specular, scattered once: far below. All
-    that comes from both sides, in legal colours: at most 1.
-    """
+    that comes from both sides, in legal colours: at most 1."""
     fabric = load_fabric(name)
     bright = FakeMethod(lambda queries: np.full((len(queries.u), 4), 1e3, np.float32))
     found = {r.metric: r.value for r in measure_furnace(Bounded(bright), fabric)}

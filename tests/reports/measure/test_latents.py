@@ -12,6 +12,8 @@ from reports.measure.latents import SHARES, between, measure_edits, measure_path
 from tests.pipeline.models.stand_ins import FakeMethod
 from weaves.fabric import Fabric, load_fabric
 
+pytestmark = pytest.mark.usefixtures("coarse_truth")
+
 TRUTH = TruthOptions(estimator="node_table")
 ASKED = QueryOptions(sigma=(0.3, 1.0), max_angle=60.0)
 
@@ -62,8 +64,7 @@ def test_pairs_differ_in_one_thing_and_between_are_the_numbers_in_between():
 def test_the_truth_has_no_error_where_it_is_the_truth(measured):
     """Encoded anew the truth is exact everywhere; blended at both ends of yarns, and everywhere between drafts.
 
-    Answers are no linear function of roughness and bend: the blend of answers errs most in the middle.
-    """
+    Answers are no linear function of roughness and bend: the blend of answers errs most in the middle."""
     curves = {(record.metric, record.note): record for record in measured}
     assert len(curves) == len(measured) == 3 and ("reencode_error", "draft of denim") not in curves
     anew, blended = (dict(curves[metric, "yarns of satin_8"].curve) for metric in ("reencode_error", "path_error"))

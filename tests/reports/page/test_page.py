@@ -73,8 +73,7 @@ def test_the_same_records_give_the_same_bytes(folder, page_input, tmp_path):
 def test_the_headline_and_the_front(folder, page):
     """Made up: woven errs 1/9 of one point, 2 points 1/2: 4.5 times lower; it costs 3600 ns to their 830.
 
-    Errors are the root of 2e-3 or 1.5e-3 over k, so that 64 points err half a percent.
-    """
+    Errors are the root of 2e-3 or 1.5e-3 over k, so that 64 points err half a percent."""
     for sentence in (
         "Woven reaches 4.5× lower MSE than point sampling at 2 points on the 2 seen fabrics and 4.5× lower MSE on one "
         "unseen fabric, at 4.3× its time; the paper reports 4.1× at 0.83× without our changes, on its own scene and "
@@ -147,8 +146,7 @@ def test_a_page_of_nothing_claims_nothing(bare, tmp_path):
 def test_several_trainings_have_a_mean_and_a_range(bare, three_trainings, page, sizes):
     """MSE of 1, 2 and 3 parts of that of k = 9 on denim and basket, whose mean is 1.5e-3 / 9; 2 points have 7.5e-4.
 
-    Tables of more rows than `OPEN_ROWS` are closed, and what learns nothing has no headline.
-    """
+    Tables of more rows than `OPEN_ROWS` are closed, and what learns nothing has no headline."""
     many = [
         record.model_copy(update={"setting": f"k = {100 + index}"})
         for record in three_trainings

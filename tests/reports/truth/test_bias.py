@@ -10,8 +10,7 @@ from reports.truth.bias import LIMIT, RECORDS, SIDES, Bias, bias_of, measure
 def test_a_known_bias_lies_within_its_errors():
     """2,000 data sets of 400 rows that are .5 % too bright: z of their biases is standard normal.
 
-    Its mean square then has standard deviation sqrt(2 / 2000) = .032; four of them are allowed.
-    """
+    Its mean square then has standard deviation sqrt(2 / 2000) = .032; four of them are allowed."""
     random = np.random.default_rng(3)
     z = []
     for _ in range(2000):

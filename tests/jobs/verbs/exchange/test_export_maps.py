@@ -114,8 +114,7 @@ def test_packed_maps_hold_the_single_ones(folder):
 def test_the_document_is_valid_and_its_thin_walled_material_sends_light_back_and_through(folder):
     """OpenPBR 1.1.2: base and subsurface share the light by its weight; of the latter (1 + g) / 2 goes through.
 
-    In MaterialX 1.39.5 the node is that of 1.1.1, which takes the subsurface colour twice: docs/blender.md says so.
-    """
+    In MaterialX 1.39.5 the node is that of 1.1.1, which takes the subsurface colour twice: docs/blender.md says so."""
     library, document = MaterialX.createDocument(), MaterialX.createDocument()
     MaterialX.loadLibraries(MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath(), library)
     assert library.getNodeDef("ND_open_pbr_surface_surfaceshader").getVersionString() == "1.1.1"

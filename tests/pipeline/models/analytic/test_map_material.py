@@ -8,12 +8,11 @@ from pipeline.truth.query import Queries
 from weaves.fabric import load_fabric
 
 
-@pytest.mark.parametrize("name", ["cotton_twill", "gauze"])
+@pytest.mark.parametrize("name", ["cotton_twill", pytest.param("gauze", marks=pytest.mark.slow)])
 def test_highlights_have_the_energy_of_the_truth(name):
     """An even sky seen from above: some is lost where the maps' normals turn away from the light.
 
-    Directions are drawn in proportion to the cosine, which is inside.
-    """
+    Directions are drawn in proportion to the cosine, which is inside."""
     cloth, (method,) = load_fabric(name), load_methods(MapMaterialOptions(size=256, sheen=False))
     wi, none = even_sky(4096), np.zeros(4096)
     queries = Queries.round(none, none, none + 16.0, wi, np.tile([0.0, 0.0, 1.0], (4096, 1)))

@@ -163,8 +163,7 @@ def rays_and_plane(name):
 def test_tables_are_read_where_view_rays_end(name, fabric, most, ratio):
     """The error against the truth of view rays is below `most`, that of the fabric plane `ratio` times as large.
 
-    The tables know no walls: rays that meet one are left out.
-    """
+    The tables know no walls: rays that meet one are left out."""
     queries = _queries(fabric, 100, 4)
     truth = estimate(fabric, queries, RAYS.model_copy(update={"walls": "left_out"}), 1)
     rays, plane = rays_and_plane(name)

@@ -21,7 +21,7 @@ STEP = 0.002
 def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
     field = height_field(fabric)
     random = np.random.default_rng(int(degrees))
-    x, y = random.random((2, 600)) * np.array(fabric.weave.repeat)[:, None]
+    x, y = random.random((2, 300)) * np.array(fabric.weave.repeat)[:, None]
     theta, azimuth = math.radians(degrees), random.uniform(0.0, 2.0 * math.pi)
     viewer = ray(math.sin(theta) * math.cos(azimuth), math.sin(theta) * math.sin(azimuth), math.cos(theta), curvature)
     towards, _, _ = sinking(viewer, field.highest, field.highest)
@@ -29,7 +29,7 @@ def test_first_hits_are_those_of_a_march(fabric, degrees, curvature):
     what = np.array([hit.what for hit in hits])
     distance = np.array([hit.distance if hit.what != MISSED else NEVER for hit in hits])
     line = towards.dx, towards.dy, towards.rise, towards.bend
-    late = marched(fabric, x, y, np.full(600, field.highest), line, STEP, field.lowest) - distance
+    late = marched(fabric, x, y, np.full(300, field.highest), line, STEP, field.lowest) - distance
     # A march steps over slivers of yarn, and finds the rest up to a step too late.
     assert ((late < -1e-6) | (late > STEP + 1e-6)).mean() < 0.01
     assert (what == ON_YARN).mean() > 0.3
@@ -58,7 +58,7 @@ def test_rays_from_yarn_to_yarn_are_those_of_a_march(fabric):
     field, random = height_field(fabric), np.random.default_rng(3)
     ends, picks = fabric.weave.repeat
     wrong, met, rising = 0, 0, 0
-    for _ in range(400):
+    for _ in range(200):
         x, y = random.random() * ends, random.random() * picks
         family, side, z, nx, ny, nz, _, _, _ = surface_at(field, x, y, int(x), int(y))
         w = random.normal(size=3)
@@ -76,7 +76,7 @@ def test_rays_from_yarn_to_yarn_are_those_of_a_march(fabric):
         distance = hit.distance if hit.what != MISSED else NEVER
         wrong += not -1e-6 <= first - distance <= STEP + 1e-6
         met, rising = met + (hit.what != MISSED), rising + (hit.what != MISSED and w[2] > 0.0)
-    assert wrong <= 4 and met > 30 and rising > 10
+    assert wrong <= 2 and met > 15 and rising > 5
 
 
 @pytest.mark.parametrize("fabric", [LOPSIDED, woven("voile"), woven("satin_8")], ids=["narrow", "open", "closed"])

@@ -20,6 +20,7 @@ from tests.pipeline.models.stand_ins import FakeMethod
 from tests.refusals import refusal
 
 pytest.importorskip("mitsuba")
+pytestmark = pytest.mark.usefixtures("coarse_truth")
 
 COARSE = TruthOptions(relative_error=0.1, min_count=64, max_count=128)
 FEW = {"frames": 3, "options": SceneOptions(environment_directions=4, bounces=1)}
