@@ -75,7 +75,7 @@ def render(
     dressed = _dressed(load_scene(scene), fabric)
     start = time.monotonic()
     count = _frames(frames, dressed, out)
-    loaded, answerer = _loaded(dressed, options, method)
+    loaded, answerer = _loaded(dressed, options, method, out)
     film = _Film(loaded, answerer, chosen_size or loaded.camera.size, round(samples**0.5), tone, exposure, count)
     film.make(out, method)
     width, height = film.size
@@ -83,12 +83,13 @@ def render(
     print_lines(f"{out}: {width} x {height}, {duration(time.monotonic() - start)}{share}")
 
 
-def _loaded(scene: Scene, options: SceneOptions, method: str) -> tuple[Loaded, PictureMethod]:
+def _loaded(scene: Scene, options: SceneOptions, method: str, out: Path) -> tuple[Loaded, PictureMethod]:
     # Torch, which help need not wait for.
     from pipeline.models.fallback import Fallback
     from pipeline.models.named import TRUTH, named_method
 
     answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, _WHERE, "--method")
+    refuse_unwritable(out if out.suffix else out / "frame")
     loaded = load(scene, options)
     if isinstance(answerer, Fallback):
         for _, fabric in loaded.cloths.values():
@@ -152,7 +153,6 @@ class _Film:
         width, height = self.size
         if out.suffix == ".mp4" and (width % 2 or height % 2):
             raise BadInput(_WHERE, "--size", f"{width}x{height}", "both sides of a film must be even")
-        refuse_unwritable(out if out.suffix else out / "frame")
         self._pool = ThreadPoolExecutor(cores())
         try:
             with progress("rendering") as self._advance:
