@@ -34,8 +34,7 @@ def asked(*names, options=OPTIONS):
 )
 def test_shares(model, fabrics, share):
     """Light from behind, 30 %; sizes below .0439 of log-uniform ones between .02 and 20, 11.4 %; or all."""
-    found = fallback_share(MODELS[model], QUICK, asked(*fabrics))
-    assert found == pytest.approx(share, abs=0.03)
+    assert fallback_share(MODELS[model], QUICK, asked(*fabrics)) == pytest.approx(share, abs=0.03)
 
 
 def test_it_is_what_the_model_itself_will_leave():

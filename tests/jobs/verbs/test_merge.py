@@ -70,8 +70,7 @@ def test_other_bytes_of_one_task_and_manifests_of_unlike_data_sets_are_refused(p
     path = tmp_path / "other" / task.products[0]
     path.write_bytes(b"made with another version that was not told apart")
     made_up.finish(task, Ledger(tmp_path / "other"))
-    told = parts.refused("a", "other", "--out", "c")
-    assert f"{path.name} of generate {task.title} has other bytes in each" in told
+    assert f"{path.name} of generate {task.title} has other bytes in each" in parts.refused("a", "other", "--out", "c")
     assert not list((tmp_path / "c").glob("datasets/*/*"))
     for name in ("one", "two"):
         made_up.finished("wide.toml", tmp_path / name)

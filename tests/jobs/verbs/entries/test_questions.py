@@ -59,8 +59,7 @@ def test_a_folder_has_all_that_is_known_of_the_fabrics_a_form_to_be_filled_in_an
     for about in listed["fabrics"]:
         fabric = load_fabric(folder / "fabrics" / f"{about['name']}.toml")
         assert fabric.weave.rows() == about["drawdown"] and [*fabric.weave.repeat] == about["repeat"]
-        drafted = read_draft(folder / "fabrics" / f"{about['name']}.wif")
-        assert len(drafted.ends.colours) % fabric.weave.repeat[0] == 0
+        assert len(read_draft(folder / "fabrics" / f"{about['name']}.wif").ends.colours) % fabric.weave.repeat[0] == 0
         height = read_exr(folder / "fabrics" / f"{about['name']}.exr").channels["height"][::-1]
         assert height.shape == tuple(16 * n for n in fabric.weave.repeat[::-1])
         place = surface_at(fabric, np.array([2.5 / 16]), np.array([17.5 / 16]))

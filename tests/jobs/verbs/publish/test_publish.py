@@ -164,8 +164,7 @@ def test_the_recipe_generates_the_same_rows(more, tmp_path):
     assert publish(folder, tmp_path / "shelf") == 0
     unseen = {path.name.partition("-")[0] for path in (tmp_path / "shelf" / "data" / "unseen").iterdir()}
     assert unseen == {"test_only", *(("one_cloth_train", "one_cloth_validation") if more else ())}
-    again = DataSet(load_recipe(tmp_path / "shelf" / "recipe.toml"))
-    assert again.fingerprint == Manifest.load(folder).fingerprint
+    assert DataSet(load_recipe(tmp_path / "shelf" / "recipe.toml")).fingerprint == Manifest.load(folder).fingerprint
 
 
 def test_many_fabrics_share_files_which_duckdb_reads(published, dataset, tmp_path, monkeypatch):
