@@ -37,16 +37,17 @@ QUICK = "not slow and not faults and not external"
 
 @pytest.fixture(scope="session", autouse=True)
 def _small_tables():
-    """Make small tables of light between yarns, and small grids of horizons: the usual ones take seconds."""
+    """Make small tables of light between yarns, and small grids of horizons; return the bytes of usual grids."""
     from pipeline.analytic.bounces.table import bounce_table
     from pipeline.analytic.soft_nodes import nodes
     from pipeline.scenes import bounces
 
     with pytest.MonkeyPatch.context() as patch:
+        usual = nodes._GRID_BYTES
         patch.setattr(nodes, "_GRID_BYTES", 1 << 18)
         for name, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
             patch.setattr(bounces, name, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
-        yield
+        yield usual
 
 
 @pytest.fixture(scope="module")

@@ -137,7 +137,7 @@ class Fabric(Frozen):
     def to_toml(self) -> str:
         """Return a file that `load_fabric` reads back as an equal fabric."""
         text = tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
-        # Colours and runs of threads, lists that end with a number, take one line.
+        # A list that ends with a number takes one line: colours, runs of threads.
         return re.sub(r"\[\n +([^\[\]]*[0-9]),\n *\]", lambda m: "[" + re.sub(r"\n +", " ", m[1]) + "]", text)
 
 

@@ -89,8 +89,8 @@ def _loaded(scene: Scene, options: SceneOptions, method: str, out: Path) -> tupl
     from pipeline.models.named import TRUTH, named_method
 
     answerer = TruthAnswers(ShotOptions().truth) if method == TRUTH else named_method(method, _WHERE, "--method")
-    refuse_unwritable(out if out.suffix else out / "frame")
     loaded = load(scene, options)
+    refuse_unwritable(out if out.suffix else out / "frame")
     if isinstance(answerer, Fallback):
         for _, fabric in loaded.cloths.values():
             if not answerer.covers(fabric):

@@ -15,7 +15,7 @@ of the surface past the place, in the plane of ray and normal, as long as the ra
 a yarn spacing if that is shorter. It is kappa = dn.dp / dp.dp from each of `_PROBES` places to the next, exact on a
 cylinder; it is sought where a view ray may leave the boundary again.
 
-Such a place is at a silhouette if past it the ray meets no other cloth: none is seen behind cloth.
+Such a place is at a silhouette if past it the ray meets no other cloth, which could not be shown there.
 """
 
 import math

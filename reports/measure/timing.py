@@ -105,9 +105,9 @@ def time_side_by_side(
 def affordable(contender: Contender, longest: float = LONGEST, fewest: int = FEWEST) -> Contender:
     """Return the contender with as many of its queries as one call answers in `longest` seconds, on one thread.
 
-    Queries a fabric are doubled from `fewest` on while a call takes at most half of that: their number is a power of 2
-    times that, or all there are, and so the same in two runs unless a method is near the limit. At most `fewest`
-    queries a fabric take longer.
+    Queries a fabric are doubled from `fewest` on while a call takes at most half of `longest`. Their number is `fewest`
+    times a power of 2, or all there are, and so the same in two runs unless a method is near the limit. At most
+    `fewest` queries a fabric take longer.
     """
     set_threads(1)
     most = max(len(queries.u) for _, queries in contender.queries)

@@ -94,7 +94,7 @@ def filmstrip(films: Mapping[str, npt.NDArray[np.floating]]) -> bytes:
     """Return frames side by side as PNG bytes, without words.
 
     `films` hold frames (F, H, W, 3), linear RGB of the truth and of methods, all of one size, in the order of the
-    strip's rows. Of the first `SHOWN` frames the rectangle is shown in which most changes (`liveliest`).
+    strip's rows. The first `SHOWN` are shown, in the rectangle in which most changes over all of them (`liveliest`).
     """
     crop = liveliest(films)
     strips = [_strip(frames[:SHOWN], crop) for frames in films.values()]

@@ -96,8 +96,7 @@ def card(about: About) -> str:
         parts = [part for part in about.parts if (part.role, part.split) == (role, split)]
         fabrics = sum(len(part.fabrics) for part in parts)
         rows = sum(part.rows for part in parts)
-        place = f"`{stem(role, split)}-*.parquet`"
-        files.append((role, split, f"{fabrics:,}", f"{rows:,}", place, _ROLES[role]))
+        files.append((role, split, f"{fabrics:,}", f"{rows:,}", f"`{stem(role, split)}-*.parquet`", _ROLES[role]))
     named = ", ".join(f"`{name}`" for name in manifest.names("seen", "unseen"))
     populations = [(role, len(manifest.names(role))) for role in POPULATIONS]
     random = "".join(f"; `{role}.toml` has {count:,} random ones" for role, count in populations if count)

@@ -25,6 +25,7 @@ is that of the sun on either side, and a, b, c, d are families with a way each: 
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from functools import reduce
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -141,7 +142,7 @@ def transport(
     o, i, ways = len(viewers), len(lights), 1 if back is None else 2
     places, events = 2 * ways, 2 * ways * ways
     faces, starts = (field, field if back is None else back), starting_points(field, count)
-    ends = np.linspace(0, len(starts.x), _PARTS + 1).astype(np.int64)
+    borders = np.linspace(0, len(starts.x), _PARTS + 1).astype(np.int64)
 
     def part(index: int) -> Transport:
         own = Transport(
@@ -154,11 +155,11 @@ def transport(
             np.zeros(((places + 1) * events, i + 1)),
         )
         job = _Job(*faces, ways, lights, np.empty(i, np.float32), own)
-        _walk(job, starts, ends[index], ends[index + 1], viewers, np.empty(o, np.float32))
+        _walk(job, starts, borders[index], borders[index + 1], viewers, np.empty(o, np.float32))
         return own
 
     with ThreadPoolExecutor(min(cores(), _PARTS)) as pool:
-        sums = Transport(*(np.sum(s, axis=0) for s in zip(*pool.map(part, range(_PARTS)), strict=True)))
+        sums = Transport(*(reduce(np.add, s) for s in zip(*pool.map(part, range(_PARTS)), strict=True)))
     _see_gaps(*faces, *_gap_points(field, count), viewers, sums.seen)
     return sums
 

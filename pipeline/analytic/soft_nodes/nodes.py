@@ -169,7 +169,7 @@ def tabulate(
         spots=spots,
         shown=np.array([shown.min(), shown.max()], np.float32),
         areas=layout.areas,
-        end_walls=layout.end_walls[: AZIMUTHS if behind and rims else 0],
+        end_walls=layout.end_walls if behind and rims else layout.end_walls[:0].copy(),
         view_lines=detail.lines, spacing=detail.spacing, rims=rims,
     )  # fmt: skip
 
@@ -281,7 +281,7 @@ class _Layout(NamedTuple):
     evenly: Float32
     areas: Float32
     end_walls: npt.NDArray[np.uint8]
-    """As in SoftNodeTable, the walls for any table."""
+    """As in SoftNodeTable; the walls also where the table has none."""
 
 
 @lru_cache(maxsize=4)  # tables of light from behind and of curved cloth have the same

@@ -63,7 +63,7 @@ def read_pyramid(
     """Read a pyramid at footprints: (n, channels).
 
     Levels (channels, rows, columns) come finest first, with `texels_per_yarn` along one yarn spacing in the finest. u
-    and v (n,) are in repeats, sigma (n,) in yarn spacings; `blur` is its standard deviation, in finest texels.
+    and v (n,) are in repeats, sigma (n,) in yarn spacings; `blur` is a standard deviation in finest texels.
     """
     level = torch.log2(sigma / (0.5 / texels_per_yarn)).clamp(0.0, len(levels) - 1.0)
     below = level.floor().clamp_max(max(len(levels) - 2, 0))

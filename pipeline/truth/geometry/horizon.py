@@ -24,7 +24,7 @@ _FLATTEST = 1.5e-3  # slopes below, beyond 89.9 degrees, are treated as equal
 _STEEPEST = 1e4
 _FARTHEST = 1e4  # yarn spacings
 
-# Tables of every level and kind need the same horizons, which take most of their time; up to 5 MB each.
+# Tables of every level and kind need the same horizons, which take most of their time; most have 3 to 8 MB.
 _KEPT: Final = 256 << 20  # bytes
 _LAST: Final[dict[bytes, Float32]] = {}
 _KEEPING: Final = Lock()
@@ -155,7 +155,7 @@ def horizons(
         slopes = _horizons(field, x, y, azimuths, own_plane, curvature)
         with _KEEPING:
             _LAST[asked] = slopes
-            while nbytes(_LAST.values()) > _KEPT:
+            while len(_LAST) > 1 and nbytes(_LAST.values()) > _KEPT:
                 _LAST.pop(next(iter(_LAST)))
     return slopes
 

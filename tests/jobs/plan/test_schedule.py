@@ -88,5 +88,4 @@ def test_a_kind_takes_what_its_tasks_took_others_what_their_stage_took_and_one_w
 def test_a_task_under_way_is_judged_by_its_share_when_that_is_sure(elapsed, share, left):
     """One that takes longer than estimated goes on; a first share, which includes its start, says little."""
     a = costly("a", 100.0)
-    began = {a.id: (time.monotonic() - elapsed, share)}
-    assert Estimate().seconds_left([a], began, 1) == pytest.approx(left, rel=0.01)
+    assert Estimate().seconds_left([a], {a.id: (time.monotonic() - elapsed, share)}, 1) == pytest.approx(left, rel=0.01)

@@ -154,8 +154,7 @@ def test_models_taught_elsewhere_need_test_rows_alone_and_may_come_by_way_of_a_t
     asks()
     middle = files.recipe.replace('name = "tiny"', 'name = "middle"').replace("[bench]", f"{OTHER}\n[bench]")
     entry = '\n[[models]]\nname = "curved"\nrecipe = "middle.toml"\n'
-    recipe = asks(middle, entry, "middle")
-    assert recipe.trained_by["curved"].name == "bent"
+    assert asks(middle, entry, "middle").trained_by["curved"].name == "bent"
 
 
 def test_ways_to_run_are_this_recipes_to_say(asks, files):

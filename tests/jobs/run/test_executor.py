@@ -32,8 +32,7 @@ def flip(path):
 
 def test_manifests_hear_of_each_task_and_are_whole_before_a_task_that_needs_others(tmp_path, here, plan):
     heard = fake.Heard()
-    summary = fake.run(plan[:4], tmp_path, manifests=[heard])
-    assert titles(summary.ran) == ["shard 0", "shard 1", "shard 2", "net"]
+    assert titles(fake.run(plan[:4], tmp_path, manifests=[heard]).ran) == ["shard 0", "shard 1", "shard 2", "net"]
     assert heard == ["saved", *titles(plan[:3]), "saved", "net", "saved"]
     again = fake.run(plan, tmp_path)
     assert titles(again.before) == titles(plan[:4]) and titles(again.ran) == ["error"]

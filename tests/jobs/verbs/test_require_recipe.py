@@ -80,8 +80,7 @@ def test_the_training_is_cut_by_the_effort_with_its_average_and_what_is_saved_is
     assert own.average**own.steps == pytest.approx(general.average**general.steps, rel=1e-2)
     # No more rows than the general recipe has, whatever the effort.
     assert narrowed(tmp_path / "r.toml", effort=3.0).dataset.rows.train == 65536
-    own = narrowed(tmp_path / "r.toml", method="neumip", effort=0.5)
-    assert effort_of(own) == (32768 + 2048 + 4096, 700 * 512)
+    assert effort_of(narrowed(tmp_path / "r.toml", method="neumip", effort=0.5)) == (32768 + 2048 + 4096, 700 * 512)
     # By itself neumip learns from the nine named fabrics; the population is drawn for the general recipe all the same.
     assert effort_of(alone(QUICK, {"neumip"})) == (9 * (65536 + 2048 + 4096) + 20 * 16384, 9 * 1400 * 512)
     said = savings(tmp_path / "r.toml", QUICK)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from pipeline.analytic.soft_nodes import nodes
 from pipeline.analytic.soft_nodes.nodes import AZIMUTHS, BLOCK_NODES, LEVELS, _ramps, tabulate
 from pipeline.compiled.arrays import nbytes
 from tests.pipeline.truth.cloths import irregular
@@ -17,8 +18,10 @@ from weaves.fabric import load_fabric
     ],
     ids=["plain", "irregular", "irregular with gaps"],
 )
-def test_tables_stay_small(fabric, most):
-    """Areas that a viewer sees are a third to a half of them."""
+def test_tables_stay_small(fabric, most, monkeypatch, _small_tables):
+    """With the grids of the package. Areas that a viewer sees are a third to a half of them."""
+    monkeypatch.setattr(nodes, "_GRID_BYTES", _small_tables)
+    nodes._lay_out.cache_clear()
     table = tabulate(fabric)
     assert nbytes(table) < most and table.evenly.sum() == pytest.approx(1.0, abs=1e-5)
     assert table.evenly.size <= 256 + 128 + 3 * BLOCK_NODES
