@@ -121,8 +121,7 @@ def test_a_rim_covers_what_the_method_says_and_lets_the_rest_pass():
     np.testing.assert_allclose(cloth.eval(hits, light[None]), covered[0] * bsdf.eval(query), rtol=1e-5)
     through = bsdf.method.transparency(bsdf.fabric, query._replace(wi=query.wo), 0)
     np.testing.assert_allclose(cloth.transparency(hits), 1 - covered + covered * through, rtol=1e-5)
-    flat = hits._replace(bend=np.zeros(1))
-    assert cloth.coverage(flat) == 1.0
+    assert cloth.coverage(hits._replace(bend=np.zeros(1))) == 1.0
     assert cloth.coverage(hits._replace(viewer=hits.viewer * [1, 1, -1])) == 1.0
 
 

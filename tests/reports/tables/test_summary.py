@@ -62,8 +62,7 @@ def test_errors_are_means_and_those_of_unseen_fabrics_geometric():
     by_fabric = summary.fabric_table(RECORDS)
     assert by_fabric["fabric"].tolist() == ["denim", "basket", "twill_4_4"]
     assert by_fabric["point_sampled k = 2"].tolist() == [6.0, 10.0, 5.0] and math.isnan(by_fabric["neumip"][1])
-    pictures = summary.picture_table(RECORDS)
-    assert pictures[["scene", "mse"]].to_numpy().tolist() == [["sphere", 0.5], ["plane", 0.7]]
+    assert summary.picture_table(RECORDS)[["scene", "mse"]].to_numpy().tolist() == [["sphere", 0.5], ["plane", 0.7]]
 
 
 def test_a_ratio_compares_the_fabrics_that_both_cover_above_the_noise():

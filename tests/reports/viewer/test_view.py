@@ -62,8 +62,7 @@ def test_a_page_draws_what_python_does(small, tmp_path):
     """The one test of the browser that is not slow."""
     with viewer(small, tmp_path) as page:
         page.run("viewer.go(3)")
-        cloth = load_fabric("gingham")
-        assert_equal(components(page, 2), expected(cloth, VIEWS["Sphere"], 2))
+        assert_equal(components(page, 2), expected(load_fabric("gingham"), VIEWS["Sphere"], 2))
         assert page.errors == [] and all(address.startswith(("file:", "data:")) for address in page.requests)
 
 
