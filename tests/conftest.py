@@ -36,15 +36,15 @@ QUICK = "not slow and not faults and not external"
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _small_tables():
-    """Make small tables of light between yarns, and small grids of horizons; return the bytes of usual grids."""
+def _small_tables(pytestconfig):
+    """Make small tables of light between yarns, in `make test` small grids too; return the bytes of usual ones."""
     from pipeline.analytic.bounces.table import bounce_table
     from pipeline.analytic.soft_nodes import nodes
     from pipeline.scenes import bounces
 
     with pytest.MonkeyPatch.context() as patch:
         usual = nodes._GRID_BYTES
-        patch.setattr(nodes, "_GRID_BYTES", 1 << 18)
+        patch.setattr(nodes, "_GRID_BYTES", 1 << 18 if pytestconfig.option.markexpr == QUICK else usual)
         for name, through in (("_TABLES", False), ("_TABLES_THROUGH", True)):
             patch.setattr(bounces, name, bounces.PerFabric(partial(bounce_table, walks=1 << 10, through=through)))
         yield usual
