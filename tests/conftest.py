@@ -18,7 +18,7 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / "pipeline" / "compiled" / "_
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.load_profile("fixed")
 
-gc.disable()  # until all tests are collected: their modules stay, and looking through them took a fifth of that time
+gc.disable()  # until all tests are collected: their modules stay, and need not be looked through
 
 STARTED = {"cpp", "programs", "webgl", "llvm", "switch"}
 """Fixtures that start a compiler, a browser or a server: what uses one is `external`."""
@@ -52,7 +52,7 @@ def _small_tables(pytestconfig):
 
 @pytest.fixture(scope="module")
 def coarse_truth():
-    """Give tables of the truth a quarter of their directions, for tests in which its accuracy plays no part."""
+    """Give tables of the truth 32 azimuths, for tests in which its accuracy plays no part."""
     from pipeline.truth.node_table.tables import COARSE, FINE
 
     with pytest.MonkeyPatch.context() as patch:
