@@ -90,7 +90,7 @@ def test_a_swatch_of_a_fabric_is_the_scene_swatch_and_shows_its_repeat(monkeypat
     assert cloth[2] > 1.2 * cloth[0]  # denim is blue
     wide = load_fabric("denim").model_copy(update={"name": "wide", "draft": Satin(ends=100, move=3)})
     asked = Mock(return_value=[])
-    monkeypatch.setattr(pipeline.scenes.picture, "answered", asked)
+    monkeypatch.setattr(pipeline.scenes.picture.WindowMaker, "made", asked)
     jobs.verbs.show.write_swatch(wide, tmp_path, (32, 24))
     assert asked.call_args.args[0].__self__.yarns == 150.0
 
