@@ -23,7 +23,7 @@ from cyclopts import CycloptsError, MissingArgumentError
 
 from weaves.errors import BadInput, WorkFailed, one_line
 
-_CONTINUES: Final = "finished work is kept, and the same command continues"
+_RESUMED: Final = {"run", "generate", "train", "bench", "report", "publish"}  # verbs that go on after a stop
 
 
 def run_to_exit(verb: Callable[[], object], tokens: Sequence[str], out: Path) -> int:
@@ -62,7 +62,10 @@ def _handle(raised: BaseException, stops: Sequence[BaseException], tokens: Seque
     if isinstance(error, BadInput | WorkFailed):
         return _end(str(error), error.exit_code)
     if isinstance(error, KeyboardInterrupt):
-        return _end(str(error) or f"stopped; {_CONTINUES}", error.code if isinstance(error, _Stopped) else 130)
+        sentence = str(error) or "stopped"
+        if not _RESUMED.isdisjoint(tokens[:1]) and ";" not in sentence:
+            sentence += "; finished work is kept, and the same command continues"
+        return _end(sentence, error.code if isinstance(error, _Stopped) else 130)
     if isinstance(error, BrokenPipeError):  # the reader of the output has closed it, such as `head`
         _drop_stdout()
         return 0
@@ -124,7 +127,7 @@ class _Stopped(KeyboardInterrupt):
     """A signal that ends a process, handled as Ctrl-C is."""
 
     def __init__(self, number: int) -> None:
-        super().__init__(f"stopped by {signal.Signals(number).name}; {_CONTINUES}")
+        super().__init__(f"stopped by {signal.Signals(number).name}")
         self.code = 128 + number
 
 

@@ -191,8 +191,7 @@ def _fallback_cost(by_fabric: Sequence[tuple[Fabric, Queries]]) -> tuple[float, 
         start = perf_counter()
         answers = fallback_answers(fabric, queries.take(rows), 0)
         seconds, count = seconds + perf_counter() - start, count + rows.size
-        truth = estimate(fabric, queries.take(rows[:_JUDGED]), TruthOptions(estimator="auto"), 1).mean
-        colour = truth @ COLOUR_WEIGHTS
+        colour = estimate(fabric, queries.take(rows[:_JUDGED]), TruthOptions(estimator="auto"), 1).mean @ COLOUR_WEIGHTS
         differences.append(answers[:_JUDGED] @ COLOUR_WEIGHTS - colour)
         colours.append(colour)
     error, mean = math.sqrt(np.mean(np.square(np.concatenate(differences)))), float(np.mean(np.concatenate(colours)))

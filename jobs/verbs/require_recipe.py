@@ -131,8 +131,7 @@ def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> di
         if stated is not None:
             refused = stated.estimator == "node_table" and table_refusal(stated, queries, fabrics)
             chosen = other if refused else stated
-            always = {"estimator": chosen.estimator, "relative_error": chosen.relative_error}
-            tables[name] = always | _stated(chosen)
+            tables[name] = chosen.model_dump(include={"estimator", "relative_error"}) | _stated(chosen)
     return tables
 
 

@@ -22,6 +22,9 @@ def test_a_signal_in_a_library_that_hides_it_is_a_stop(number, code, capsys):
     # A shell starts what runs in the background with Ctrl-C ignored, and so it stays.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        assert run_to_exit(verb, ["run"], Path("out")) == code and capsys.readouterr().err.startswith("stopped")
+        for tokens, kept in ((["run", "quick"], True), (["view", "denim"], False), ([], False)):
+            assert run_to_exit(verb, tokens, Path("out")) == code
+            told = capsys.readouterr().err
+            assert told.startswith("stopped") and ("the same command continues" in told) == kept
     finally:
         signal.signal(signal.SIGINT, before)

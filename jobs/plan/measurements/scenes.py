@@ -178,8 +178,7 @@ class OnScene(Measurement):
 
         methods = self.model.with_fallback(out, self.options.footprint)
         pictures = {setting: out / self.picture(setting) for setting in self.shown}
-        frames = shot.read_shot(out / self.shot.path)
-        records = scene_errors.measure_scene(methods, frames, self.options, pictures)
+        records = scene_errors.measure_scene(methods, shot.read_shot(out / self.shot.path), self.options, pictures)
         return [] if self.larger else records
 
 

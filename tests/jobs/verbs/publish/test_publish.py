@@ -106,8 +106,7 @@ def test_pandas_and_the_loader_read_it(published):
         "print(len(load('seen', 'train')), len(load('seen', 'test', 'denim')))\n"
         "print(load('population', 'train').fabric.nunique())"
     )
-    command = [sys.executable, "-IB", "-c", code]
-    done = subprocess.run(command, cwd=published, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-IB", "-c", code], cwd=published, capture_output=True, text=True)
     assert done.stdout.split() == ["320", "64", "3"], done.stderr
     lines = (published / "load.py").read_text().splitlines()
     assert len([line for line in lines if line.strip()]) <= 11  # and a docstring
