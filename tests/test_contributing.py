@@ -77,7 +77,7 @@ frames = page_frames(records)
 assert abs(frames["errors"]["largest_error"][0] - 0.25) < 1e-6
 table = result_tables(records, frames, {})["error"][0]
 titles = [title.replace("\\xa0", " ") for title in table.columns[1:]]
-assert table.rows[0].cells[titles.index("largest error")].text == "25.0 %"
+assert table.rows[0].cells[titles.index("largest error")].text == ".250"
 """,
     "A scene": """
 from pipeline.scenes.catalogue import load_scene

@@ -199,13 +199,13 @@ def reasons(tasks: Sequence[Task], ledger: Ledger) -> dict[str, str]:
     The predecessor of a task is the finished task of the same stage and title whose identity is most like its own.
     """
     states = {task.id: ledger.state(task) for task in tasks}
-    left = {(task.stage, task.title): task for task in tasks if states[task.id] != "done"}
-    before: dict[tuple[str, str], list[Receipt]] = {key: [] for key in left}
+    left = [task for task in tasks if states[task.id] != "done"]
+    before: dict[tuple[str, str], list[Receipt]] = {(task.stage, task.title): [] for task in left}
     for receipt in ledger.receipts(states) if left else ():
-        if (receipt.stage, receipt.title) in left:
+        if (receipt.stage, receipt.title) in before:
             before[receipt.stage, receipt.title].append(receipt)
     why = {}
-    for key, task in left.items():
+    for task in left:
         if states[task.id] == "failed":
             why[task.id] = f"failed: {ledger.reason(task)}"
         elif ledger.is_elsewhere(task):
@@ -213,7 +213,7 @@ def reasons(tasks: Sequence[Task], ledger: Ledger) -> dict[str, str]:
         elif ledger.receipt(task):
             why[task.id] = "a product is missing or damaged"
         else:
-            why[task.id] = _changed(task, before[key])
+            why[task.id] = _changed(task, before[task.stage, task.title])
     return why
 
 

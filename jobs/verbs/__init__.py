@@ -1,1 +1,1 @@
-"""One file a verb of the command line, and the tables that verbs print."""
+"""Verbs of the command line, like ones in one file."""

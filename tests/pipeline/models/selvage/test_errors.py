@@ -71,18 +71,18 @@ def test_numbers_of_a_cloth_are_differences_of_its_answers_and_find_where_a_leve
 @pytest.mark.slow
 @pytest.mark.parametrize("curved", [False, True])
 def test_expected_errors_are_calibrated_on_cloth_never_seen(curved):
-    """True errors of what is chosen over the expected ones, root mean squares over eight random cloths, for each light.
+    """True errors of what is chosen over the expected ones, root mean squares over 24 random cloths, for each light.
 
-    Between .8 and 1.25. The cloths differ in seed from those that the table was fitted to. Patches that are hidden
-    almost wholly are left out.
+    Between .8 and 1.25. The cloths differ in seed from those that the table was fitted to. Of eight cloths one decides:
+    a table without bias would fail in one draw of seven. Patches that are hidden almost wholly are left out.
     """
     families = ("plain", "compound_twill", "large_satin", "irregular")
-    fabrics = population_fabrics(Population(count=8, seed=5150, families=families, balanced=True, solid=0.5))
+    fabrics = population_fabrics(Population(count=24, seed=6151, families=families, balanced=True, solid=0.5))
     selvage = Selvage()
     for behind in (False, True):
         true, expected = {}, {}
         for fabric in fabrics:
-            queries = probes(fabric, behind, curved, 800, 77)
+            queries = probes(fabric, behind, curved, 400, 77)
             truth = estimate(fabric, queries, TruthOptions(relative_error=0.02), 3)
             colour, answers = truth.mean @ GREY, colours(fabric, queries)
             noise = np.linalg.norm(truth.standard_error * GREY, axis=1) / (colour + FLOOR)
