@@ -8,13 +8,17 @@ async function unpacked(text, Numbers) {
 
 async function openTable(content, index) {
   const table = content.tables[index];
-  const [integers, numbers, nodes, families, grid] = await Promise.all([
+  const [integers, numbers, nodes, families, horizons, walls] = await Promise.all([
     unpacked(table.integers, Int32Array),
     unpacked(table.numbers, Float32Array),
     unpacked(table.nodes, Float32Array),
     unpacked(table.families, Uint8Array),
     unpacked(content.grids[table.grid], Uint8Array),
+    unpacked(table.end_walls, Uint8Array),
   ]);
+  const grid = new Uint8Array(horizons.length + walls.length);
+  grid.set(horizons);
+  grid.set(walls, horizons.length);
   return { ...table, integers, numbers, nodes, families, grid };
 }
 

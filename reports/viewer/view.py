@@ -126,14 +126,13 @@ def content(fabric: Fabric, truth: int, progress: Callable[[float], None] = lamb
     steps = len(factors[0]) * len(factors[1]) + len(views)
     for bend, width in itertools.product(*factors):
         shape = bent(fabric, bend, width)
-        levels = list(DETAILS) if (bend, width) == (1.0, 1.0) else [USUAL]
-        of_shape = [(level, _nodes(shape, level)) for level in levels]
-        # All levels of a shape have the same grid.
+        of_shape = [(k, _nodes(shape, k)) for k in (DETAILS if (bend, width) == (1.0, 1.0) else [USUAL])]
+        # All levels of a shape have the same grid; `end_walls`, which follow it, are of each level.
         about = {"bend": bend, "width": width, "grid": len(grids)}
         front = of_shape[0][1].front
         grids.append(packed(np.concatenate([front.grid.ravel(), front.behind_grid.ravel()])))
-        kept = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
-        of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in kept]
+        of_shape = [pair for pair in of_shape if pair[1].front.evenly.size <= MOST_NODES]
+        of_shapes += [_table(shape, sides, {"level": level, **about}) for level, sides in of_shape]
         progress(len(grids) / steps)
     still, irradiance = _still(fabric)
     methods = _methods(fabric) if truth else {}
@@ -229,6 +228,7 @@ def _table(fabric: Fabric, sides: Sides, about: dict[str, Any]) -> dict[str, Any
         "integers": packed(cloth.integers),
         "numbers": packed(cloth.numbers),
         "nodes": packed(cloth.nodes),
+        "end_walls": packed(table.end_walls),
         "families": packed(_families(table)),
     }
 
