@@ -24,6 +24,6 @@ SCENES: Final = 3  # the shipped scenes, and the queries of any scene
 
 SCENE_BENCH: Final = 5  # measurements in scenes and the files they write (`reports.measure.scene`)
 
-VIEWER: Final = 4  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
+VIEWER: Final = 5  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
 
 EXTREMES: Final = 1  # measurements at extremes (`reports.measure.extremes`)
