@@ -38,8 +38,7 @@ class RepeatMesh(NamedTuple):
     warp: Mesh  # parts of the yarn that are visible from above
     weft: Mesh
     walls: Mesh
-    """The steps between them; those at x = 0 and y = 0 are in it, those at the far borders belong to the next
-    repeat."""
+    """The steps between them; those at x = 0 and y = 0 are in it, those at the far borders are of the next repeat."""
 
 
 class _Piece(NamedTuple):

@@ -70,8 +70,7 @@ def predict(fabric: Fabric, scattering: Scattering, band: str, lights: Mask) -> 
     """Return what a fabric of grey colours does with some lights (P,), where the BSDF is known."""
     predicted, patches = Predicted.nothing(scattering.basis.patches), straight_of(scattering, band, lights).patches
     if len(patches):
-        rays = gap_rays(scattering.basis, patches, _RAYS)
-        predicted.straight[patches] = straight_share(fabric, rays, len(patches))
+        predicted.straight[patches] = straight_share(fabric, gap_rays(scattering.basis, patches, _RAYS), len(patches))
     pairs = pairs_of(scattering, band, lights)
     pairs = pairs.take(np.flatnonzero(pairs.kind == 0))
     colours = np.array([getattr(y, f"{name}_rgb")[1] for name in COLOURS for y in (fabric.warp, fabric.weft)])

@@ -21,6 +21,7 @@ import numpy as np
 
 from pipeline.models.added.added_code import AddedFunction, AddedMethod
 from pipeline.models.added.source import locate
+from pipeline.models.method import refuse_other
 from weaves.errors import BadInput, WorkFailed, brief, one_line
 
 if TYPE_CHECKING:
@@ -157,7 +158,8 @@ class Guarded:
             self.of(fabric).prepare(fabric)
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
-        """Return the components of N queries, float32 (N, 4), finite and >= 0; MethodFailed if they are not."""
+        """Return the components of N queries, float32 (N, 4), finite and >= 0; BadInput for kinds it does not state."""
+        refuse_other(queries, f"the method {self.name} answers", self.options.kinds)
         before = [column.copy() for column in queries] if self._first else None
         with self._call("predict"):
             answers: Float32 = self.of(fabric).predict(fabric, queries, seed)
