@@ -74,7 +74,7 @@ def test_expected_errors_are_calibrated_on_cloth_never_seen(curved):
     """True errors of what is chosen over the expected ones, root mean squares over 24 random cloths, for each light.
 
     Between .8 and 1.25. The cloths differ in seed from those that the table was fitted to. Of eight cloths one decides:
-    a table without bias would fail in one draw of seven. Patches that are hidden almost wholly are left out.
+    the table in use fails in one draw of six. Patches that are hidden almost wholly are left out.
     """
     families = ("plain", "compound_twill", "large_satin", "irregular")
     fabrics = population_fabrics(Population(count=24, seed=6151, families=families, balanced=True, solid=0.5))
