@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
+_WIDEST: Final = 4096  # letters of a row where it is not shown on a terminal
 MOST_SENTENCES: Final = 20  # most sentences of one kind that a verb prints; it counts the others
 
 
@@ -56,12 +57,11 @@ def print_table(
     caption: str = "",
     styles: Mapping[int, str] = MappingProxyType({}),
     gap: int = 2,
-    least_width: int = 0,
 ) -> None:
     """Print a table, whose first column labels the rows.
 
     Columns in `text` hold words, others numbers, which stand on the right. `styles` are those of single rows, by their
-    number; `gap` are the letters between columns, `least_width` those of the terminal at least.
+    number; `gap` are the letters between columns. A file or a pipe takes rows of any width.
     """
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, gap, 0, 0))
     table.title, table.title_justify = title or None, "left"
@@ -71,7 +71,7 @@ def print_table(
     for index, row in enumerate(rows):
         table.add_row(*map(str, row), style=styles.get(index))
     console = Terminal()
-    console.width = max(console.width, least_width)
+    console.width = console.width if console.is_terminal else _WIDEST
     console.print(table)
 
 

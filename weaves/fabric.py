@@ -14,26 +14,20 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tomli_w
-from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, Strict, model_serializer, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, Strict, model_serializer, model_validator
 
 from weaves.colour_order import ColourOrder, ThreadColours, colours_of_yarns
 from weaves.count import PerCm, with_widths
 from weaves.draft import Draft, Loom, Matrix
 from weaves.errors import BadInput, nearest
 from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill
-from weaves.validation import Frozen, read_toml, validated
+from weaves.validation import FileName, Frozen, read_toml, validated
 from weaves.yarn import Yarn
 
 PRESETS = Path(__file__).parent / "presets"
 
 Weave = Annotated[Plain | Rib | Basket | Twill | Herringbone | Satin | Matrix | Loom, Field(discriminator="family")]
 """The weave families; a file chooses one by `family`."""
-
-
-def _file_name(name: str) -> str:
-    if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
-        raise ValueError("a name has 1 to 60 letters (without accents), digits, - and _")
-    return name
 
 
 class Fabric(Frozen):
@@ -50,7 +44,7 @@ class Fabric(Frozen):
 
     also_read = ("sett",)
 
-    name: Annotated[str, AfterValidator(_file_name)]  # letters, digits, - and _: it becomes part of file names
+    name: FileName
     source: str = Field(default="", max_length=2000)
     optical_thickness: Annotated[float, Strict()] = Field(default=2.0, ge=0.001, le=100)
     """Optical thickness T of the yarn layer."""

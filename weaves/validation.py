@@ -8,9 +8,9 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Final, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Final, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from weaves.errors import BadInput, brief, nearest, one_line
 from weaves.reading import MOST_TEXT, read_text
@@ -23,6 +23,16 @@ MOST_DEPTH: Final = 16  # most tables and lists inside one another; recipes have
 # none that goes back, keep the search itself linear.
 _PART = r"""(?:(?<![\w-])[\w-]++|"(?:\\.|[^"\\\n]){0,99}+"|'[^'\n]{0,99}+')"""
 _LONG_KEY = re.compile(rf"(?:{_PART}[ \t]{{0,99}}+\.[ \t]{{0,99}}+){{{MOST_DEPTH}}}")
+
+
+def _file_name(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
+        raise ValueError("a name has 1 to 60 letters (without accents), digits, - and _")
+    return name
+
+
+FileName = Annotated[str, AfterValidator(_file_name)]
+"""A name that becomes part of file names."""
 
 
 class Frozen(BaseModel):

@@ -10,9 +10,8 @@ from typing import Annotated, Final, NamedTuple
 
 from pydantic import AfterValidator, Field, StrictBool, StrictInt
 
-from pipeline.models.options import Name
 from weaves.errors import BadInput
-from weaves.validation import Frozen, read_toml, validated
+from weaves.validation import FileName, Frozen, read_toml, validated
 
 FORM: Final = "entry.toml"  # file of the form
 ANSWER_FILES: Final = ("answers.parquet", "answers.csv")  # files of the answers, of which one lies beside the form
@@ -38,7 +37,7 @@ class EntryForm(Frozen):
     """A form, as the entrant filled it in."""
 
     questions: str = Field(pattern=r"^[0-9a-f]{16}$", description="The questions that are answered. Leave it.")
-    name: Name = Field(description="Name in tables and files: letters, digits, - and _, at most 64.")
+    name: FileName = Field(description="Name in tables and files: letters, digits, - and _, at most 60.")
     authors: Filled = Field(description="Who made the method: one line of at most 200 letters.")
     source: Text = Field(description="Address of the code. Empty: the result is marked as one without code.")
     version: Filled = Field(

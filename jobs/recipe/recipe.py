@@ -26,7 +26,7 @@ from reports.options import BenchOptions, RuntimeName
 from reports.options import Role as MeasuredAs
 from weaves.fabric import Fabric
 from weaves.population import Population
-from weaves.validation import Frozen
+from weaves.validation import FileName, Frozen
 
 if TYPE_CHECKING:
     from jobs.recipe.entry import Entry
@@ -125,7 +125,7 @@ class ModelRecipe(Frozen):
 class RecipeFile(Frozen):
     """A recipe's TOML file, key by key."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]
+    name: FileName
     about: str = Field(default="", max_length=200)
     dataset: DatasetOptions
     models: tuple[ModelRecipe, ...] = Field(default=(), max_length=32)

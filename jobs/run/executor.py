@@ -234,7 +234,8 @@ def _refuse_gaps(todo: Sequence[Task], planned: Mapping[str, Task], finished: se
     if gaps := {need for task in todo for need in task.needs} - finished - {task.id for task in todo}:
         stage = min((planned[need].stage for need in gaps), key=STAGES.index)
         count = sum(planned[need].stage == stage for need in gaps)
-        raise WorkFailed(f"{todo[0].stage}: {count} tasks that it needs are not done; run `twillight {stage}` first")
+        way = f"run `twillight {stage}` with this recipe first"
+        raise WorkFailed(f"{todo[0].stage}: {count} tasks that it needs are not done; {way}")
 
 
 def _verified(task: Task, outcome: Outcome, ledger: Ledger) -> Outcome:

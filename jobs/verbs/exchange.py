@@ -91,7 +91,7 @@ def _part(text: str, flag: str, threads: DraftThreads) -> tuple[int, int] | None
         return None
     sides, most = re.fullmatch(r"([0-9]{1,6})-([0-9]{1,6})", text), len(threads.colours)
     if not sides or not 1 <= int(sides[1]) <= int(sides[2]) <= most:
-        raise BadInput("import", flag, text, f"FIRST-LAST is needed, from 1-1 to 1-{most}")
+        raise BadInput("import", flag, text, f"first and last thread are needed, such as 1-{most}")
     return int(sides[1]), int(sides[2])
 
 

@@ -38,8 +38,6 @@ _MEASURED: Final = ("mse", "colour_rrmse", "flicker", "fallback_share", "frame_t
 DIFFERENCE: Final = "mse, own less general"
 """Quantity that pairs both pictures, pixel by pixel (`reports.measure.block_bootstrap`)."""
 
-_WIDTH: Final = 110  # columns that a table with its intervals takes
-
 
 class Value(NamedTuple):
     """A number and, where it has one, its 95 % interval (of times the quartiles)."""
@@ -221,7 +219,7 @@ def _print(rows: Sequence[SceneSaving]) -> None:
         ratio = "–" if math.isnan(row.ratio) else f"{row.ratio:.3g}"
         cells.append((f"{row.quantity}{unit}", _shown(row.general), _shown(row.narrow), ratio))
     columns = (f"{rows[0].scene}, {rows[0].method}", "general", "own", "times less")
-    print_table(columns, cells, least_width=_WIDTH)
+    print_table(columns, cells)
     print_lines("")
 
 

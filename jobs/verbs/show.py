@@ -104,9 +104,10 @@ def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
     period = max(*fabric.weave.repeat, *(len(colours.diffuse) for colours in fabric.thread_colours()))
     swatch = Swatch(min(max(_LEAST_YARNS, 1.5 * period), _MOST_YARNS), size)
     parts, codes = picture.windows(size, _QUERIES_OF_PIXEL), np.zeros((size[1], size[0], 3), np.uint8)
-    with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
+    with Terminal().status("tables of the cloth"):
         method = method_of(fabric)
         method.prepare(fabric)
+    with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
         between = partial(bounces.light_between, tables=bounces.tables_of(_WALKS))
         maker = picture.WindowMaker({"swatch": fabric}, method, pool, ("swatch",), between)
         for number, part in enumerate(maker.made(swatch.frame, parts), 1):

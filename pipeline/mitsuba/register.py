@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, Final, NoReturn
+from typing import Any, NoReturn
 
 import mitsuba as mi
 
@@ -12,13 +12,8 @@ from pipeline.mitsuba.integrator import INTEGRATOR, integrator_class
 from pipeline.models.patch_bsdf import USUAL_METHOD
 from pipeline.scenes.loading import Loaded
 from pipeline.scenes.scene import PREFIX
-from pipeline.scenes.variant import llvm_works
+from pipeline.scenes.variant import LLVM_MISSING, llvm_works
 from weaves.errors import BadInput
-
-HOW: Final = (
-    "Mitsuba finds no LLVM library of version 19 or newer, so it computes one ray at a time, which is slow: "
-    "`apt install libllvm19` on Debian, or name the library in DRJIT_LIBLLVM_PATH"
-)
 
 _registered: set[str] = set()
 
@@ -54,7 +49,7 @@ def best_variant() -> str:
     """Return llvm_ad_rgb where it works, which a fresh process tries first; else scalar_rgb, with a warning."""
     if llvm_works():
         return "llvm_ad_rgb"
-    warnings.warn(HOW, stacklevel=4)
+    warnings.warn(LLVM_MISSING, stacklevel=4)
     return "scalar_rgb"
 
 

@@ -7,10 +7,7 @@ from pydantic import Field, SerializationInfo, SerializerFunctionWrapHandler, mo
 from pipeline import versions
 from pipeline.fingerprint import IDENTITY
 from pipeline.shards.generate import ExtraRows
-from weaves.validation import Frozen
-
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=64)]
-"""A name that is valid in file names and task ids."""
+from weaves.validation import FileName, Frozen
 
 Gaussian = Annotated[Literal["gaussian"], Field(description="Kernel it knows; must be the kernel of the truth.")]
 """The footprint of a method that knows one kernel."""
@@ -50,7 +47,7 @@ class Options(Design):
 
     model: str = ""
     """Name of its folder or file in `pipeline.models`."""
-    name: Name = Field(default_factory=lambda options: options["model"])
+    name: FileName = Field(default_factory=lambda options: options["model"])
     """Name in tables and files, and of the trained model."""
 
     learns: ClassVar[bool] = True  # true if the model is trained

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field
 
-from weaves.validation import Frozen
+from weaves.validation import FileName, Frozen
 
 PREFIX: Final = "fabric_"  # beginning of the id of a BSDF that represents a cloth
 
@@ -36,8 +36,7 @@ class Cloth(Frozen):
 class Scene(Frozen):
     """A scene and its frames: the camera moves, everything else stays."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,60}$")
-    """Letters, digits, - and _: it becomes part of file names."""
+    name: FileName
     source: Path | Callable[[Any], dict[str, Any]]
     """A Mitsuba XML file; or a function that is given the module mitsuba and returns a dictionary."""
     cloths: dict[str, Cloth] = Field(default_factory=dict)

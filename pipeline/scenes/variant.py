@@ -15,9 +15,14 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from weaves.errors import BadInput
+
+LLVM_MISSING: Final = (
+    "Mitsuba finds no LLVM library of version 19 or newer, so it computes one ray at a time, which is slow: "
+    "`apt install libllvm19` on Debian, or name the library in DRJIT_LIBLLVM_PATH"
+)
 
 _TRIAL = """
 import drjit

@@ -21,7 +21,9 @@ from pipeline.compiled.arrays import Float64
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
+from pipeline.scenes.variant import LLVM_MISSING, llvm_works
 from reports.truth.row_records import RowRecords
+from weaves.errors import WorkFailed
 
 OURS: Final = "soft_nodes:2"  # the method whose gain is stated
 OTHER: Final = "point_sampled:1"  # one random point a sample
@@ -57,8 +59,10 @@ def measure(
     """Measure every method in every scene; error and time are means over frames with different random numbers.
 
     `size` is the side of a frame in pixels. `samples` has numbers of samples a pixel by method, the last one `OTHER`;
-    `reference` is the method of the reference frames, and its samples.
+    `reference` is the method of the reference frames, and its samples. WorkFailed without LLVM, which would take hours.
     """
+    if not llvm_works():
+        raise WorkFailed(f"path_traced: {LLVM_MISSING}")
     for name in scenes:
         truths = [_frames(name, reference[0], size)(reference[1], 1000 + k)[0] for k in range(2)]
         scale = float(np.mean(truths)) ** 2

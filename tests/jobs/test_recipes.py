@@ -12,10 +12,12 @@ from jobs.plan.plan import plan
 from jobs.recipe.load import load_recipe
 from jobs.recipe.shipped import recipe_names
 from jobs.run.ledger import Ledger
+from pipeline.scenes.variant import llvm_works
 from tests.faults.runs import start
 from tests.jobs.small_recipes import MOST_MEMBERS, write_small
 
 KILLED_AFTER = 20  # tasks
+MARKS = {"mitsuba": pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")}
 
 
 def kill_on_the_way(path, out):
@@ -28,7 +30,7 @@ def kill_on_the_way(path, out):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", recipe_names())
+@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in recipe_names()])
 def test_a_recipe_runs_from_its_fabrics_to_its_page(name, tmp_path, capsys):
     path, out = write_small(name, tmp_path), tmp_path / "out"
     small, whole = load_recipe(path), load_recipe(name)

@@ -125,7 +125,7 @@ def board(
         parts += [f"## {name}"] if shown else []
         parts += [f"### {table.title}\n\n{table.markdown()}" for table in shown]
     atomic_write(to, ("\n\n".join(parts) + "\n").encode())
-    print_lines(f"{to}: {len(entries)} entries")
+    print_lines(f"{to}: entries: {len(entries)}")
 
 
 def _read(seed: str) -> str:

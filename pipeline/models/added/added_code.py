@@ -10,8 +10,8 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 from pydantic import Field, SerializationInfo, SerializerFunctionWrapHandler, model_serializer
 
 from pipeline.fingerprint import IDENTITY
-from pipeline.models.options import Name, Options
-from weaves.validation import Frozen
+from pipeline.models.options import Options
+from weaves.validation import FileName, Frozen
 
 ADDED_MODEL: Final = "added"  # the value of `model` of all methods from outside
 GROUP: Final = "twillight.methods"  # group of the entry points by which an installed package offers methods
@@ -90,7 +90,7 @@ class AddedMethod(AddedCode, Options):
 
     model: Literal["added"] = "added"
     """Mark of a method from outside."""
-    name: Name
+    name: FileName
     """Name in tables."""
     own: dict[str, Any] = Field(default={})
     """Its own options: the keywords that it is made with."""

@@ -25,7 +25,7 @@ _METRIC_PARAMETERS: Final = ("fabric", "queries", "answers", "truth", "standard_
 # Attributes that a metric may have, with their defaults.
 _OF_METRICS: Final = {"title": "", "unit": "1", "better": "lower", "format": "significant"}
 
-_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,60}")
 _SETTING: Final = re.compile(r"[\w .,=+%()-]{0,40}")  # it becomes part of file names and of tables in Markdown
 
 
@@ -111,7 +111,7 @@ def _stated(has: Mapping[str, Any], text: str) -> dict[str, Any]:
         raise BadInput(ADD, "", text, f"lacks the attribute {lacks[0]!r}")
     name, setting, version = has["name"], has["setting"], has["version"]
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise BadInput(ADD, "", text, f"name = {brief(name)} must be letters, digits, - and _, 64 at most")
+        raise BadInput(ADD, "", text, f"name = {brief(name)} must be letters, digits, - and _, 60 at most")
     if not isinstance(setting, str) or not _SETTING.fullmatch(setting):
         allowed = "must be at most 40 letters, digits, spaces and . , = + - % ( )"
         raise BadInput(ADD, "", text, f"setting = {brief(setting)} {allowed}")

@@ -31,7 +31,7 @@ def refused(files, words):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('name = "tiny"', 'name = "a/b"', ["name = 'a/b'", "match pattern"]),
+        ('name = "tiny"', 'name = "a/b"', ["name = 'a/b'", "letters"]),
         ('"denim"', '"denin"', ["dataset.seen.0 = 'denin'", "did you mean 'denim'"]),
         ('"own.toml"', '"missing.toml"', ["dataset.seen.1 = 'missing.toml'"]),
         ('"own.toml"', '"denim"', ["dataset = 'denim'", "names must differ"]),

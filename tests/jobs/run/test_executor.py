@@ -75,7 +75,7 @@ def test_damaged_needs_of_a_stage_that_does_not_run_are_named_and_each_is_read_o
     flip(tmp_path / plan[1].products[0])
     for reason in (
         "shard 1: its products were damaged and are removed; run `twillight generate`",
-        "train: 1 tasks that it needs are not done; run `twillight generate` first",
+        "train: 1 tasks that it needs are not done; run `twillight generate` with this recipe first",
     ):
         with pytest.raises(WorkFailed, match=reason):
             fake.run(plan, tmp_path, stages=["train"])

@@ -2,12 +2,13 @@ import math
 
 import pytest
 
-from pipeline.scenes.variant import mitsuba
+from pipeline.scenes.variant import llvm_works, mitsuba
 from reports.truth import path_traced
 from reports.truth.path_traced import OTHER, OURS, RECORDS, Traced, measure
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not llvm_works(), reason="no LLVM that Mitsuba can use")
 def test_every_method_has_an_error_and_a_time():
     """A frame of 4 by 4 pixels; the reference is of the same method, so that its own error is noise alone."""
     import mitsuba as mi

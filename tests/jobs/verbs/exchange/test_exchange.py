@@ -39,7 +39,7 @@ def test_a_part_of_a_draft_is_a_fabric(twillight, refused, tmp_path):
     assert [count for _, count in fabric.colours.ends] == [2, 2]
     for part in ("3", "0-4", "5-4", "1-9", "a-b"):
         complaint = refused("import", "a.wif", "--out", "b.toml", "--ends", part)
-        assert f"--ends = '{part}': FIRST-LAST is needed, from 1-1 to 1-8" in complaint
+        assert f"--ends = '{part}': first and last thread are needed, such as 1-8" in complaint
 
 
 def test_a_fabric_that_was_exported_is_imported(twillight, tmp_path):
