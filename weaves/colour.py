@@ -99,6 +99,13 @@ def encoded(rgb: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return np.asarray(science.models.eotf_inverse_sRGB(np.asarray(rgb, np.float64)), np.float64)
 
 
+def decoded(codes: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return the linear values of an sRGB encoding, the inverse of `encoded`."""
+    import colour as science
+
+    return np.asarray(science.models.eotf_sRGB(np.asarray(codes, np.float64)), np.float64)
+
+
 def delta_e(rgb: npt.ArrayLike, reference: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """Return the colour differences CIEDE2000 (...) of linear sRGB colours (..., 3) of a display with white (1, 1, 1).
 

@@ -10,18 +10,27 @@ import math
 import re
 from collections.abc import Mapping
 from functools import lru_cache
+from itertools import cycle
 from pathlib import Path
 from typing import Annotated, Any
 
 import tomli_w
 from pydantic import Field, SerializerFunctionWrapHandler, Strict, model_serializer, model_validator
 
-from weaves.colour_order import ColourOrder, ThreadColours, colours_of_yarns
+from weaves.colour_order import (
+    MOST_COLOURS,
+    MOST_THREADS,
+    ColourOrder,
+    PaletteColour,
+    ThreadColours,
+    colours_of_yarns,
+)
 from weaves.count import PerCm, with_widths
 from weaves.draft import Draft, Loom, Matrix
 from weaves.errors import BadInput, nearest
 from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill
 from weaves.validation import FileName, Frozen, read_toml, validated
+from weaves.variation import PATCH, SHADES, Variation
 from weaves.yarn import Yarn
 
 PRESETS = Path(__file__).parent / "presets"
@@ -54,6 +63,7 @@ class Fabric(Frozen):
     warp: Yarn  # the yarns along y
     weft: Yarn  # the yarns along x
     colours: ColourOrder | None = None  # colours of single ends and picks, in place of the colours of the two yarns
+    variation: Variation | None = None  # differences of yarns, which pictures show
 
     @model_validator(mode="before")
     @classmethod
@@ -75,8 +85,8 @@ class Fabric(Frozen):
 
     @model_serializer(mode="wrap")
     def _without_empty_fields(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out `colours` and `yarns_per_cm` where there are none: files and hashes do not contain them."""
-        optional = ("colours", "yarns_per_cm")
+        """Leave out what is optional where there is none: files and hashes do not contain it."""
+        optional = ("colours", "yarns_per_cm", "variation")
         return {key: value for key, value in dump(self).items() if key not in optional or value is not None}
 
     def thread_colours(self) -> tuple[ThreadColours, ThreadColours]:
@@ -112,8 +122,26 @@ class Fabric(Frozen):
         )
         return self.model_copy(update={"warp": warp, "weft": weft, "colours": None})
 
+    def in_shades(self) -> Fabric:
+        """Return the same cloth with the shades that `variation` gives its threads as their colours."""
+        if self.variation is None or not self.variation.colour:
+            return self
+        own, palette, runs = self.colours.palette if self.colours else {}, {}, {}
+        levels = min(SHADES, MOST_COLOURS // (2 * max(len(own), 1)))
+        for axis, (key, yarn) in enumerate((("ends", self.warp), ("picks", self.weft))):
+            names = (self.colours.threads(key) if self.colours else ()) or ("",)
+            count = min(PATCH * math.lcm(self.weave.repeat[axis], len(names)), MOST_THREADS)
+            shades = zip(cycle(names), self.variation.shades(axis, count, levels), strict=False)
+            threads = [(name, shade, f"{name} {axis} {shade:.3f}") for name, shade in shades]
+            runs[key] = [(shaded, 1) for _, _, shaded in threads]
+            for name, shade, shaded in set(threads):
+                dyed = own[name].on(yarn, self.optical_thickness) if name else yarn
+                colours = {k: [shade * c for c in getattr(dyed, f"{k}_rgb")] for k in PaletteColour.model_fields}
+                palette[shaded] = PaletteColour.model_validate(colours)
+        return self.model_copy(update={"colours": ColourOrder(palette=palette, **runs)})
+
     def optics(self) -> dict[str, Any]:
-        """Return all that the ground truth depends on, for fingerprints: no name, source, colour or physical size."""
+        """Return all that the ground truth depends on, for fingerprints: no name, source, colour, size or variation."""
         return {
             "draft": self.weave.rows(),
             "warp": self.warp.optics(),

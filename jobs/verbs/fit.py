@@ -1,4 +1,7 @@
-"""`twillight fit`: a fabric from a measured BSDF or a data sheet, or what such fits predict of what was kept back."""
+"""`twillight fit`: a fabric from a measured BSDF or a data sheet, or what such fits predict of what was kept back.
+
+With photographs: how far the streaks of light on a given fabric are from theirs.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,14 @@ from jobs.terminal import number, print_lines, print_table, progress
 from jobs.verbs.parameters import NOTHING, Local
 from pipeline.atomic import atomic_write, refuse_unwritable
 from weaves.errors import BadInput, nearest
+from weaves.fabric import load_fabric
 
 if TYPE_CHECKING:
     from pipeline.fitting.fitted import Fitted
 
 
 def fit(
-    data: Annotated[
-        Local, Parameter(help="BSDF (.xml, .parquet) or data sheet (.toml, .csv); shade_6216 and fabrics are shipped.")
-    ],
+    data: Annotated[Local, Parameter(help="BSDF, data sheet or photographs; shade_6216 and fabrics are shipped.")],
     *,
     out: Annotated[Local | None, Parameter(help="Fabric file to write, ending in .toml.")] = None,
     row: Annotated[str, Parameter(help="Of a CSV file: the product.")] = "",
@@ -29,11 +31,15 @@ def fit(
     band: Annotated[str, Parameter(help="Of a BSDF: the band that gives the colours.")] = "visible",
     draft: Annotated[list[str], Parameter(help="Of a BSDF: a draft to try; several; default: all.")] = NOTHING,
     held_out: Annotated[bool, Parameter(help="Print what fits predict of data that they were not given.")] = False,
+    compare: Annotated[str, Parameter(help="Of photographs: the fabric whose streaks of light are compared.")] = "",
 ) -> None:
     """Write a fabric that has the numbers of a measurement, and print these with intervals; BadInput for bad data."""
     from pipeline.fitting.measured import MEASURED
 
     path = MEASURED.get(str(data), data)
+    if compare:
+        _photographs(path, compare)
+        return
     if held_out and out is not None:
         raise BadInput("fit", "--out", str(out), "is not written with --held-out: leave one of them out")
     if not held_out:
@@ -85,6 +91,16 @@ def _sheet(path: Path, out: Path | None, row: str, like: str) -> None:
     sheet, remarks = completed(read_sheet(path, row), read_sheet(path, like) if like else None)
     for fitted, suffix in zip(fit_sheet(sheet, _name(out)), ("", "_solar"), strict=False):
         _write(fitted, out.with_stem(out.stem + suffix), f"{path} {row}".strip(), remarks)
+
+
+def _photographs(path: Path, fabric: str) -> None:
+    from reports.images.photographs import read_photographs, streaks
+
+    cloth, rows = load_fabric(fabric), []
+    for kind, photograph in read_photographs(path).items():
+        for way, streak in zip(("along", "across"), streaks(cloth, photograph), strict=True):
+            rows.append((f"{kind}, {way} the streak", f"{streak.error:.3f}", *map(number, streak[1:])))
+    print_table(("", "error of the profile", "width", "predicted"), rows)
 
 
 def _name(out: Path) -> str:

@@ -109,7 +109,7 @@ def write_swatch(fabric: Fabric, folder: Path, size: tuple[int, int]) -> Path:
         method.prepare(fabric)
     with progress("swatch") as advance, ThreadPoolExecutor(cores()) as pool:
         between = partial(bounces.light_between, tables=bounces.tables_of(_WALKS))
-        maker = picture.WindowMaker({"swatch": fabric}, method, pool, ("swatch",), between)
+        maker = picture.WindowMaker({"swatch": fabric.in_shades()}, method, pool, ("swatch",), between)
         for number, part in enumerate(maker.made(swatch.frame, parts), 1):
             codes[shown_at(part)] = tiles.displayed(part.planes["rgb"])
             advance(number / len(parts))

@@ -32,8 +32,7 @@ from pipeline.models.fallback import Fallback
 from pipeline.models.named import TRUTH, named_method
 from pipeline.models.network import one_thread
 from pipeline.models.patch_bsdf import USUAL_METHOD, PatchBSDF, Sample
-from pipeline.scenes.frame import LEAST_SIGMA
-from pipeline.scenes.gbuffer import reduced
+from pipeline.scenes.gbuffer import LEAST_SIGMA, reduced
 from pipeline.scenes.options import BOUNCES, Bounces, SceneOptions
 from pipeline.scenes.picture import TruthAnswers
 from pipeline.scenes.places import LEAST_CURVATURE, tilted

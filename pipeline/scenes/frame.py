@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
-from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.gbuffer import LEAST_SIGMA, GBuffer
 from pipeline.scenes.lights import fibonacci
 from pipeline.scenes.loading import Camera, FilmWindow, Loaded
 from pipeline.scenes.places import Places, curvature_of, dot, least_curvature, places_of, rims_of, tilted, unit
@@ -32,7 +32,6 @@ from weaves.errors import BadInput
 
 _AOVS: Final = ("position", "uv", "geo_normal", "sh_normal", "dp_du", "dp_dv", "duv_dx", "duv_dy", "shape_index")
 _AOVS_BESIDE: Final = ("position", "geo_normal", "sh_normal", "albedo", "shape_index")
-LEAST_SIGMA: Final = 1e-6  # least standard deviation of a footprint, in yarn spacings
 _LOOKS = 128  # directions in which a camera that may be inside the cloth looks around
 
 

@@ -6,13 +6,17 @@ contains the incident cosine (pipeline.truth.conventions), times the light's irr
 places under several lights are M queries, and one light that reaches every place gives M = N.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Final, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64, Index, Mask
 from pipeline.truth.query import Queries
+from weaves.fabric import Fabric
+
+LEAST_SIGMA: Final = 1e-6  # least standard deviation of a footprint, in yarn spacings
 
 
 @dataclass(frozen=True)
@@ -67,8 +71,36 @@ class GBuffer:
         result[self.rim] = of_rims
         return result
 
+    def varied(self, fabric: Fabric) -> Self:
+        """Return a G-buffer whose places are those of the lattice that a cloth of this fabric shows (`Variation`).
+
+        A footprint is stretched by d(lattice)/d(place) at its middle. Directions turn by the nearest rotation to it.
+        """
+        if fabric.variation is None:
+            return self
+        place, jacobian = fabric.variation.lattice(fabric.weave.repeat, np.stack([self.u, self.v], axis=-1))
+        cosine, sine = np.cos(self.angle), np.sin(self.angle)
+        axes = np.stack([cosine, -sine, sine, cosine], axis=-1).reshape(-1, 2, 2)
+        lengths = np.stack([self.sigma, self.sigma_minor], axis=-1)
+        turned, lengths, _ = np.linalg.svd(jacobian @ (axes * lengths[:, None]))
+        sigma, sigma_minor = np.maximum(lengths, LEAST_SIGMA).T
+        angle = np.arctan2(turned[:, 1, 0], turned[:, 0, 0])
+        by = np.arctan2(jacobian[:, 1, 0] - jacobian[:, 0, 1], jacobian[:, 0, 0] + jacobian[:, 1, 1])
+        wo, wi, rim_wo = (
+            _turned(vectors, angles)
+            for vectors, angles in ((self.wo, by), (self.wi, by[self.place]), (self.rim_wo, by[self.rim]))
+        )
+        columns = {"sigma": sigma, "sigma_minor": sigma_minor, "angle": angle, "wo": wo, "wi": wi, "rim_wo": rim_wo}
+        return replace(self, u=place[:, 0], v=place[:, 1], **columns)
+
 
 def reduced(coordinate: Float64, period: int) -> Float32:
     """Reduce modulo the repeat in float64; what float32 rounds up to the period becomes 0."""
     result = np.mod(coordinate, period).astype(np.float32)
     return np.where(result >= period, np.float32(0), result).astype(np.float32)
+
+
+def _turned(vectors: Float64, angles: Float64) -> Float64:
+    """Return vectors (N, 3) turned about z by angles (N,)."""
+    cosine, sine, (x, y, z) = np.cos(angles), np.sin(angles), vectors.T
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=-1)

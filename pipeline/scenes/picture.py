@@ -138,7 +138,7 @@ def picture(
     """
     fine, whole = sharpened(loaded, side), (side * size[0], side * size[1])
     parts, names = windows(size, side**2 * (len(loaded.lights) + 1)), (loaded.scene.name, frame, seed)
-    fabrics = {key: fabric for key, (_, fabric) in loaded.cloths.items()}
+    fabrics = {key: fabric.in_shades() for key, (_, fabric) in loaded.cloths.items()}
     between = light_between if loaded.options.bounces == "all" else None
 
     def trace(window: FilmWindow) -> SceneFrame:
@@ -167,7 +167,9 @@ class WindowMaker:
         """Yield windows, each finished, that `trace` turns into queries."""
         under_way: deque[_UnderWay] = deque()
         for window in parts:
-            under_way.append(_UnderWay(self, window, trace(window)))
+            frame = trace(window)
+            gbuffers = {key: gbuffer.varied(self.fabrics[key]) for key, gbuffer in frame.gbuffers.items()}
+            under_way.append(_UnderWay(self, window, frame._replace(gbuffers=gbuffers)))
             if len(under_way) == _AHEAD:
                 yield under_way.popleft().part()
         while under_way:

@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.compiled.arrays import Float64, Index, Mask
-from pipeline.scenes.frame import LEAST_SIGMA, SceneFrame
-from pipeline.scenes.gbuffer import GBuffer
+from pipeline.scenes.frame import SceneFrame
+from pipeline.scenes.gbuffer import LEAST_SIGMA, GBuffer
 from pipeline.scenes.loading import FilmWindow
 from pipeline.scenes.options import PixelOptions
 from pipeline.scenes.places import LEAST_CURVATURE, dot, tilted, unit

@@ -25,6 +25,7 @@ METHODS: Final[Mapping[str, tuple[Marker, str, str]]] = {
     TRUTH: ("X", "#23252b", "#ecebe6"),
     "woven": ("o", "#3d55cc", "#8fa2ff"),
     "neumip": ("v", "#0b8f77", "#45d0b0"),
+    "triple_plane": ((3, 0, 0), "#2f7f9e", "#7cc8e6"),
     "selvage": ("*", "#1a86bd", "#62c3f5"),
     "curved": ("<", "#5a7d1f", "#b3d46a"),
     "curved_grazing": ("d", "#848f0c", "#dde26a"),

@@ -14,7 +14,9 @@ from pipeline.shards.silhouettes import SilhouetteRows
 class CurvedOptions(TextureOptions):
     """Opacity, offset and reflectance of one fabric on curved surfaces [Kuznetsov2022Curved]."""
 
-    fixed: ClassVar[tuple[str, ...]] = (*TextureOptions.fixed, "silhouette_anywhere", "silhouette_weight")
+    fixed: ClassVar[tuple[str, ...]] = (
+        *TextureOptions.fixed, "certain", "silhouette_anywhere", "silhouette_texels_per_yarn", "silhouette_weight"
+    )  # fmt: skip
     any_physics: ClassVar[bool] = True
     seconds: ClassVar[tuple[float, float]] = (2.5e-5, 2e-6)
     kinds: ClassVar[frozenset[str]] = frozenset({"behind", "curvature"})
@@ -29,11 +31,11 @@ class CurvedOptions(TextureOptions):
     curvature_input: Literal["linear", "root", "touch"] = "touch"
     """Encoding of the curvature: `linear` as it is, `root` its square root, or `touch`, beside the root, the share
     tan / sqrt(tan^2 + 2 kappa) of the viewer's tangent, which says how deep the ray dips."""
-    certain: bool = True
+    certain: ClassVar[bool] = True
     """Answer an opacity of 1 where every ray sinks below every yarn; only for cloths without gaps."""
     footprint: Literal["gaussian", "box"] = "gaussian"
     """Kernel of the queries about the silhouette; must be the kernel of the truth."""
-    silhouette_texels_per_yarn: int = Field(default=4, ge=1, le=256)
+    silhouette_texels_per_yarn: ClassVar[int] = 4
     """Texels of the opacity's own texture. A ray meets crests yarns away, so that finer ones hold little but noise."""
     silhouette_rows: int = Field(default=262_144, ge=64, le=2**24)
     """Queries about the silhouette, in shards of their own."""
@@ -78,6 +80,6 @@ class CurvedOptions(TextureOptions):
             "no offset": not self.offset,
             "the root of the curvature as an input": self.curvature_input == "root",
             "how deep the ray dips as an input": self.curvature_input == "touch",
-            "full opacity where it is certain": self.certain,
+            "full opacity where it is certain": True,
         }
         return ("four components in place of RGB", *(change for change, made in changes.items() if made))

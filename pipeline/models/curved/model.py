@@ -129,8 +129,6 @@ class CurvedNetwork(TextureNetwork):
             share: Tensor = torch.special.ndtr((view.wo[:, 2] / unit - mean) / deviation)
         else:
             share = torch.sigmoid(self._silhouette(view)[:, 0])
-        if not self.options.certain:
-            return share
         # A ray so steep that it sinks below every yarn has hit one: tan^2 >= 2 kappa fall.
         cosine = view.wo[:, 2].square()
         sinks = cosine >= 2.0 * view.curvature * self.fall * (1.0 - cosine)

@@ -1,6 +1,8 @@
-"""`neumip`: a neural texture of one fabric [Kuznetsov2021NeuMIP]; its options."""
+"""`neumip` [Kuznetsov2021NeuMIP] and `triple_plane` [Xu2025Comprehensive], textures of one fabric; their options."""
 
 from typing import ClassVar, Literal
+
+from pydantic import Field
 
 from pipeline.models.options import TextureOptions
 
@@ -26,3 +28,18 @@ class NeumipOptions(TextureOptions):
     def kinds(self) -> frozenset[str]:  # type: ignore[override]
         """Curved cloth lit from all around, answered as if it were flat, with `ignore_curvature`."""
         return frozenset({"behind", "curvature"} if self.ignore_curvature else ())
+
+
+class TriplePlaneOptions(NeumipOptions):
+    """`neumip` whose decoder reads textures of the half and of the difference vector [Xu2025Comprehensive]."""
+
+    seconds: ClassVar[tuple[float, float]] = (2.5e-5, 4e-6)
+
+    model: Literal["triple_plane"] = "triple_plane"  # type: ignore[assignment]
+    direction_texels: int = Field(default=16, ge=2, le=512)
+    """Texels along a side of both textures of directions."""
+
+    @property
+    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Deviations from the published method, for the page."""
+        return (*super().departures, "no silhouettes and no synthesis of larger cloth", "sizes are our own")

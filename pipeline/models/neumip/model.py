@@ -10,6 +10,14 @@ read (pipeline.models.networks.texture); a small perceptron decodes features and
 Head and loss are ADAPTED to the four components: the specular ones are learnt in log space as in `woven`, where the
 authors put out RGB as (e^x - 1) times a mask. So are the counts of texels, queries and steps; the published training
 takes 45 minutes of a GPU.
+
+`triple_plane` [Xu2025Comprehensive] reads two more textures of 7 features, of the half vector h and of the difference
+vector d, bilinearly at their x and y, and its decoder has no other input:
+
+    h = (wi + wo) / |wi + wo|
+    d = wi - wi.(h + z) / (1 + h.z) (h + z) + 2 (wi.h) z       wi in the frame that the shortest turn from z to h gives
+
+The frame of d is a choice of ours. The usual one, which turns with the azimuth of h, jumps where h is the normal.
 """
 
 from collections.abc import Sequence
@@ -17,12 +25,12 @@ from typing import ClassVar
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import component_error, to_components
-from pipeline.models.networks.texture import TextureNetwork
-from pipeline.models.neumip import NeumipOptions
+from pipeline.models.networks.layers import component_error, perceptron, to_components
+from pipeline.models.networks.texture import LAYERS, TextureNetwork, random_pyramid, read_texture
+from pipeline.models.neumip import NeumipOptions, TriplePlaneOptions
 from weaves.fabric import Fabric
 
 
@@ -62,6 +70,40 @@ class NeumipNetwork(TextureNetwork):
         return component_error(self(*flat), target, options)
 
 
+def _half_and_difference(wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor]:
+    """Return x and y of the half vector and of the difference vector, each (n, 2), of directions (n, 3)."""
+    half = nn.functional.normalize(wi + wo, dim=-1)
+    height = half[:, 2:].clamp_min(0.0)
+    along = ((wi * half).sum(dim=-1, keepdim=True) + wi[:, 2:]) / (1.0 + height)
+    return half[:, :2], wi[:, :2] - along * half[:, :2]
+
+
+class TriplePlaneNetwork(NeumipNetwork):
+    """Planes and perceptrons of one fabric."""
+
+    textures: ClassVar[tuple[str, ...]] = (*NeumipNetwork.textures, "directions")
+    options: TriplePlaneOptions
+
+    def __init__(self, options: TriplePlaneOptions, repeat: tuple[int, int]) -> None:
+        super().__init__(options, repeat)
+        channels, side = options.channels, options.direction_texels
+        self.decoder = perceptron(3 * channels, options.hidden, LAYERS, 4)
+        self.directions = random_pyramid(channels, [(side, side)] * 2)
+
+    def forward(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
+        """Answer in network space, (n, 4); inputs as for `neumip`."""
+        u, v = self.moved(u, v, sigma, wo, wo[:, :2])
+        features = [self.read(list(self.levels), u, v, sigma)]
+        first = torch.zeros(len(u), dtype=torch.int64, device=u.device)
+        # The disc ends at the centres of the outermost texels, so that nothing wraps.
+        scale = 0.5 - 0.5 / self.options.direction_texels
+        for plane, vector in zip(self.directions, _half_and_difference(wi, wo), strict=True):
+            x, y = (0.5 + scale * vector).unbind(dim=-1)
+            features.append(read_texture([plane], x, y, [first]))
+        output: Tensor = self.decoder(torch.cat(features, dim=-1))
+        return output
+
+
 class Neumip(NetworkMethod[NeumipNetwork]):
     """Trained textures, one network for each fabric; the class tells them from other methods."""
 
@@ -69,9 +111,16 @@ class Neumip(NetworkMethod[NeumipNetwork]):
 def build(options: NeumipOptions, fabrics: Sequence[Fabric]) -> NeumipNetwork:
     """Return an untrained network; there must be exactly one fabric."""
     (fabric,) = fabrics
-    return NeumipNetwork(options, fabric.weave.repeat)
+    return _network(options, fabric.weave.repeat)
 
 
-def restore(options: NeumipOptions, trained: Trained) -> list[Neumip]:
+def restore(options: NeumipOptions, trained: Trained) -> list[NetworkMethod[NeumipNetwork]]:
     """Return one method that holds all trained fabrics."""
-    return [Neumip(*restored(options, trained, lambda repeat: NeumipNetwork(options, repeat)))]
+    kind = NetworkMethod if isinstance(options, TriplePlaneOptions) else Neumip
+    return [kind(*restored(options, trained, lambda repeat: _network(options, repeat)))]
+
+
+def _network(options: NeumipOptions, repeat: tuple[int, int]) -> NeumipNetwork:
+    if isinstance(options, TriplePlaneOptions):
+        return TriplePlaneNetwork(options, repeat)
+    return NeumipNetwork(options, repeat)

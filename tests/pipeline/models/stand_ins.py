@@ -8,7 +8,7 @@ from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.source import locate
 from pipeline.models.curved import CurvedOptions
 from pipeline.models.network import Batch
-from pipeline.models.neumip import NeumipOptions
+from pipeline.models.neumip import NeumipOptions, TriplePlaneOptions
 from pipeline.models.registry import build_network
 from pipeline.models.unified_btf import BtfAutoencoderOptions, UnifiedBtfOptions
 from pipeline.models.woven import WovenOptions
@@ -18,6 +18,7 @@ _BTF = {"texels_per_yarn": 2, "samples": 8, "fewest_samples": 4, "encoder_hidden
 SMALL = {
     "woven": WovenOptions(map_texels=16, encoder_channels=4),
     "neumip": NeumipOptions(texels_per_yarn=4),
+    "triple_plane": TriplePlaneOptions(texels_per_yarn=4, direction_texels=4),
     "curved": CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_points=32, silhouette_sigma=(0.5, 8.0)),
     "unified_btf": UnifiedBtfOptions(**_BTF),
     "btf_autoencoder": BtfAutoencoderOptions(**_BTF),

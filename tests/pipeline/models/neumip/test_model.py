@@ -1,7 +1,10 @@
+import numpy as np
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
-from pipeline.models.neumip.model import NeumipNetwork
+from pipeline.models.neumip.model import NeumipNetwork, TriplePlaneNetwork, _half_and_difference
+from tests.directions import sphere
 from tests.pipeline.models.stand_ins import SMALL
 
 NEUMIP = SMALL["neumip"]
@@ -41,3 +44,26 @@ def test_footprint_chooses_the_levels_offset_shifts_along_the_view_and_blur_halv
     assert fast["lr"] == pytest.approx(NEUMIP.texture_rate * 1e-3)
     assert len(fast["params"]) == len(network.levels) + 1
     assert len(slow["params"]) + len(fast["params"]) == len(list(network.parameters()))
+
+
+def test_vectors_are_those_of_the_shortest_turn_and_planes_are_read_where_they_point():
+    wi = sphere(20, 20)[200:]  # in front
+    wo = np.random.default_rng(1).permutation(wi)
+    half, difference = _half_and_difference(torch.from_numpy(wi), torch.from_numpy(wo))
+    middle = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+    axes = np.cross(middle, [0.0, 0.0, 1.0])
+    angles = np.arccos(middle[:, 2:]) / np.linalg.norm(axes, axis=1, keepdims=True)
+    turned = Rotation.from_rotvec(axes * angles).apply(wi)
+    np.testing.assert_allclose(half, middle[:, :2], atol=1e-12)
+    np.testing.assert_allclose(difference, turned[:, :2], atol=1e-12)
+    # A plane that holds x of its texels' centres gives x of the vector, up to the rim of the disc.
+    network = TriplePlaneNetwork(SMALL["triple_plane"], (1, 1)).eval()
+    seen = []
+    network.decoder.register_forward_pre_hook(lambda decoder, inputs: seen.extend(inputs))
+    with torch.no_grad():
+        for plane in network.directions:
+            plane.copy_(torch.linspace(-1.0, 1.0, plane.shape[-1]).expand_as(plane))
+        u, given = torch.zeros(200), [torch.from_numpy(part.astype(np.float32)) for part in (wi, wo)]
+        network(u, u, u + 1.0, *given)
+    np.testing.assert_allclose(seen[0][:, 7], half[:, 0], atol=1e-6)
+    np.testing.assert_allclose(seen[0][:, 14], difference[:, 0], atol=1e-6)
