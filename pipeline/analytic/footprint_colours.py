@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pipeline.analytic.soft_horizons import around
-from pipeline.analytic.soft_nodes.answer import LONGEST, SMALLEST, query_sums, shortened
+from pipeline.analytic.soft_nodes.answer import LONGEST, query_sums, shortened
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
 from pipeline.analytic.soft_nodes.seen_areas import angle_of, write_areas
@@ -81,7 +81,7 @@ def _by_sums(fabric: Fabric, queries: Queries) -> Float64:
         sums, _ = query_sums(table, part)
         wo = np.ascontiguousarray(part.raised().wo, np.float32)
         weights = np.ascontiguousarray(sums[:, :, (SPECULAR, DIFFUSE)], np.float64)
-        found = _weighed_colours(table, warp, weft, footprints(part, SMALLEST), wo, weights)
+        found = _weighed_colours(table, warp, weft, footprints(part), wo, weights)
         result[start : start + _CHUNK] = found.transpose(0, 2, 1, 3).reshape(-1, 4, 3)
     return result
 

@@ -24,9 +24,9 @@ from pipeline.bsdf.klems import Basis, Scattering
 from pipeline.compiled.arrays import Float64, Index, Mask
 from pipeline.compiled.decorators import kernel
 from pipeline.fitting.fitted import Interval, cloth
-from pipeline.truth.geometry.heightfield import UNDER, HeightField, height_field
+from pipeline.truth.geometry.heightfield import HeightField, height_field
 from pipeline.truth.geometry.march import ray
-from pipeline.truth.geometry.visibility import visible
+from pipeline.truth.geometry.visibility import gap_clear
 from weaves.fabric import Fabric
 
 STRAIGHT_NOISE: Final = 0.067
@@ -79,9 +79,7 @@ def _pass(front: HeightField, back: HeightField, x: Float64, y: Float64, directi
     """Write which rays through points of gaps neither face hides."""
     for n in range(len(x)):
         dx, dy, dz = directions[n, 0], directions[n, 1], directions[n, 2]
-        passed[n] = visible(front, x[n], y[n], 0.0, UNDER, ray(dx, dy, dz, 0.0)) and visible(
-            back, x[n], y[n], 0.0, UNDER, ray(-dx, -dy, dz, 0.0)
-        )
+        passed[n] = gap_clear(front, back, x[n], y[n], ray(dx, dy, dz, 0.0), ray(-dx, -dy, dz, 0.0))
 
 
 class Straight(NamedTuple):

@@ -16,10 +16,9 @@ from the run's own directions: a picture depends on the seed of its rays alone.
 
 import math
 import zlib
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache, lru_cache, partial
-from typing import Any, Final, NamedTuple, TypeVar
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,10 +26,9 @@ from pydantic import Field
 
 from pipeline.analytic.importance.lobes import HEIGHT, SHARE, STRAIGHT, Lobes
 from pipeline.compiled.arrays import Float32, Float64, Mask
-from pipeline.cores import cores
+from pipeline.models.all_cores import on_all_cores
 from pipeline.models.fallback import Fallback
 from pipeline.models.named import TRUTH, named_method
-from pipeline.models.network import one_thread
 from pipeline.models.patch_bsdf import USUAL_METHOD, PatchBSDF, Sample
 from pipeline.scenes.gbuffer import LEAST_SIGMA, reduced
 from pipeline.scenes.options import BOUNCES, Bounces, SceneOptions
@@ -54,8 +52,6 @@ _KEPT = 2**20  # rows of lobes that are kept for the next call: 250 megabytes
 _TRUTH = TruthOptions(estimator="auto", relative_error=0.1, min_count=64, max_count=256)  # many rays share a pixel
 _LARGEST_ANGLE = SceneOptions().largest_angle
 _FLAT = 1e-6  # least |cosine| of a light
-
-Part = TypeVar("Part")
 
 
 class ClothOptions(Frozen):
@@ -140,14 +136,14 @@ class Worn:
     def pdf(self, hits: RayHits, light: Float64) -> Float32:
         """Return the density with which `sample` draws N lights, (N,), 1/sr."""
         tasks = zip(_runs(self._queries(hits, light)), self._lobes(hits), strict=True)
-        return np.concatenate(_on_all_cores(self._bsdf.pdf, list(tasks)))
+        return np.concatenate(on_all_cores(self._bsdf.pdf, list(tasks)))
 
     def sample(self, hits: RayHits, random: Float64) -> Sample:
         """Draw a direction to the light for each hit, from random numbers (N, 3) in [0, 1)."""
         numbers = np.split(random, range(RUN, len(random), RUN))
         runs = zip(_runs(self._looks(hits)), numbers, self._lobes(hits), strict=True)
         tasks = [(looks, drawn, lobes, _seed(looks.u, drawn)) for looks, drawn, lobes in runs]
-        parts = _on_all_cores(self._bsdf.sample, tasks)
+        parts = on_all_cores(self._bsdf.sample, tasks)
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
         light = np.where(straight[:, None], -hits.viewer, _turned(wi.astype(np.float64), self._turn))
         weight[~straight & ~_lit(hits, light)] = 0.0
@@ -219,7 +215,7 @@ class Worn:
         looks, known = self._looks(hits), self._known
         if known is not None and all(map(np.array_equal, known[0], looks)):
             return known[1]
-        lobes = _on_all_cores(self._bsdf.lobes, [(run,) for run in _runs(looks)])
+        lobes = on_all_cores(self._bsdf.lobes, [(run,) for run in _runs(looks)])
         covered = self.coverage(hits)
         for start, run in zip(range(0, len(covered), RUN), lobes, strict=True) if (covered < 1.0).any() else ():
             share = covered[start : start + RUN, None]
@@ -254,20 +250,7 @@ def _runs(queries: Queries) -> list[Queries]:
 
 def _asked(answer: Callable[[Queries, int], npt.NDArray[Any]], queries: Queries) -> npt.NDArray[Any]:
     """Return the answers to queries and a seed, run by run."""
-    return np.concatenate(_on_all_cores(answer, [(run, _seed(run.u, run.wi)) for run in _runs(queries)]))
-
-
-def _on_all_cores(answer: Callable[..., Part], tasks: Sequence[tuple[Any, ...]]) -> list[Part]:
-    """Return the answers to the arguments of tasks, by threads if there are several."""
-    with one_thread():
-        # Before any thread starts, the first task loads kernels and tabulates the fabric.
-        first = [answer(*task) for task in tasks[:1]]
-        return [*first, *_pool().map(answer, *zip(*tasks[1:], strict=True))] if len(tasks) > 1 else first
-
-
-@cache
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(cores())
+    return np.concatenate(on_all_cores(answer, [(run, _seed(run.u, run.wi)) for run in _runs(queries)]))
 
 
 @lru_cache(maxsize=64)

@@ -5,7 +5,9 @@ of threads, and each is computed by one thread, so no bit of an answer depends o
 has threads of its own, calls the method itself.
 """
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,13 +20,15 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
+Part = TypeVar("Part")
+
 
 class AllCores(Around):
     """A method, which answers a run of queries on one thread, on several; 0: one a core that this process may use."""
 
     def __init__(self, method: Method, threads: int = 0) -> None:
         super().__init__(method)
-        self._threads = threads or cores()
+        self._threads = threads
 
     def predict(
         self, fabric: Fabric, queries: Queries, seed: int = 0, error: float | None = None, time: float | None = None
@@ -37,16 +41,21 @@ class AllCores(Around):
         if wishes and not getattr(self.method, "takes_wishes", False):
             key, value = next(iter(wishes.items()))
             raise BadInput(self.name, key, value, f"leave it out: only selvage answers within a wished {key}")
-        starts = range(CHUNK_ROWS, len(queries.u), CHUNK_ROWS)
 
         def answer(start: int) -> Float32:
-            own = int(fingerprint([seed, start]), 16)
+            own = int(fingerprint([seed, start]), 16) if start else seed
             return self.method.predict(fabric, queries.take(slice(start, start + CHUNK_ROWS)), own, **wishes)
 
-        with one_thread():
-            # Before any thread starts, the first run loads kernels and tabulates the fabric.
-            first = self.method.predict(fabric, queries.take(slice(CHUNK_ROWS)), seed, **wishes)
-            if not starts:
-                return first
-            with ThreadPoolExecutor(self._threads) as pool:
-                return np.concatenate([first, *pool.map(answer, starts)])
+        starts = range(0, max(len(queries.u), 1), CHUNK_ROWS)
+        return np.concatenate(on_all_cores(answer, [(start,) for start in starts], self._threads))
+
+
+def on_all_cores(answer: Callable[..., Part], tasks: Sequence[tuple[Any, ...]], threads: int = 0) -> list[Part]:
+    """Return the answers to the arguments of tasks, by so many threads if there are several; 0: one a core."""
+    with one_thread():
+        # Before any thread starts, the first task loads kernels and tabulates the fabric.
+        first = [answer(*task) for task in tasks[:1]]
+        if len(tasks) < 2:
+            return first
+        with ThreadPoolExecutor(threads or cores()) as pool:
+            return [*first, *pool.map(answer, *zip(*tasks[1:], strict=True))]

@@ -30,11 +30,10 @@ def read_card(folder: Path) -> dict[str, Any]:
     path = folder / CARD
     try:
         content = read_bytes(path, _MOST_BYTES, "a model card")
-        card = json.loads(content)
     except FileNotFoundError as error:
         raise BadInput(str(path), "", "does not exist", "train the model first") from error
-    except BadInput:
-        raise
+    try:
+        card = json.loads(content)
     except (ValueError, RecursionError) as error:
         raise _damaged(path) from error
     if not isinstance(card, dict):

@@ -89,21 +89,22 @@ class Fallback(Around):
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Answer N queries of any kind, float32 (N, 4)."""
-        return row_by_row(
-            queries,
-            self.out_of_domain(fabric, queries),
-            lambda part: fallback_answers(fabric, part, seed),
-            lambda part: self._answers(fabric, part, seed),
-        )
+        return np.ascontiguousarray(self.rows(fabric, queries, seed)[:, :4])
 
     def rows(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return components and transparency, (N, 5); the transparency is NaN where the method answers itself."""
 
-        def own(part: Queries) -> Float32:
-            return np.pad(self._answers(fabric, part, seed), ((0, 0), (0, 1)), constant_values=np.nan)
+        def own(side: Fabric, part: Queries) -> Float32:
+            # Footprints that see the average are no larger than trained on.
+            part = self._domain.within(side, part) if self._domain else part
+            return np.pad(self.method.predict(side, part, seed), ((0, 0), (0, 1)), constant_values=np.nan)
 
-        outside = self.out_of_domain(fabric, queries)
-        return row_by_row(queries, outside, lambda part: fallback_rows(fabric, part, seed), own)
+        return row_by_row(
+            queries,
+            self.out_of_domain(fabric, queries),
+            lambda part: fallback_rows(fabric, part, seed),
+            lambda part: self._in_front(fabric, part, own),
+        )
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, (N,), by the method or the fallback; no light changes it."""
@@ -141,14 +142,6 @@ class Fallback(Around):
         if self._domain is None:
             return behind
         return behind | self._domain.out_of_domain(fabric, self._nearest(queries))
-
-    def _answers(self, fabric: Fabric, queries: Queries, seed: int) -> Float32:
-        """Answer queries by the method; footprints that see the average are no larger than trained on."""
-
-        def answer(side: Fabric, part: Queries) -> Float32:
-            return self.method.predict(side, self._domain.within(side, part) if self._domain else part, seed)
-
-        return self._in_front(fabric, queries, answer)
 
     def _in_front(self, fabric: Fabric, queries: Queries, answer: Callable[[Fabric, Queries], Float32]) -> Float32:
         """Answer queries in the nearest form, those of viewers behind the cloth about its back."""

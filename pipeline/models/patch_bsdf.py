@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.importance import lobes as importance_lobes
-from pipeline.analytic.importance.lobes import STRAIGHT, TZ, Lobes
+from pipeline.analytic.importance.lobes import TZ, Lobes
 from pipeline.analytic.importance.mixture import density_rows, draw_rows
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
@@ -118,12 +118,11 @@ class PatchBSDF:
         """
         wi, pdf, straight = self.draw(looks, random, lobes)
         queries = looks._replace(wi=wi)
-        if not straight.any():
-            return Sample(wi, pdf, straight, self.eval(queries, seed) / pdf[:, None])
         weight = np.empty((len(wi), 3))
         weight[~straight] = self.eval(queries.take(~straight), seed) / pdf[~straight, None]
-        through = self.method.transparency(self.fabric, queries.take(straight), seed)
-        weight[straight] = (through / pdf[straight])[:, None]
+        if straight.any():
+            through = self.method.transparency(self.fabric, queries.take(straight), seed)
+            weight[straight] = (through / pdf[straight])[:, None]
         return Sample(wi, pdf, straight, weight)
 
     def draw(self, looks: Queries, random: npt.ArrayLike, lobes: Lobes | None = None) -> Drawn:
@@ -136,7 +135,7 @@ class PatchBSDF:
         return Drawn(wi, pdf, straight)
 
     def pdf(self, queries: Queries, lobes: Lobes | None = None) -> Float32:
-        """Return the density of each query's wi, (N,), 1/sr; its integral is 1 minus the probability `straight`."""
+        """Return the density of each query's wi, (N,), 1/sr; its integral is 1 minus that of the delta lobe."""
         found, result = self._known(queries, lobes), np.empty(len(queries.u), np.float32)
         wi, wo = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo))
         density_rows(found, wi, wo, result)
@@ -150,10 +149,6 @@ class PatchBSDF:
     def eval_pdf(self, queries: Queries, lobes: Lobes | None = None, seed: int = 0) -> tuple[Float64, Float32]:
         """Return `eval` and `pdf` of each query."""
         return self.eval(queries, seed), self.pdf(queries, lobes)
-
-    def straight(self, looks: Queries, lobes: Lobes | None = None) -> Float32:
-        """Return the probability with which `sample` lets light go straight through, (N,)."""
-        return self._known(looks, lobes).rest[:, STRAIGHT]
 
     def _known(self, looks: Queries, lobes: Lobes | None) -> Lobes:
         if lobes is None:

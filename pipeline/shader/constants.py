@@ -55,8 +55,8 @@ WIDENING: Final[float] = _SAMPLER["widening"].default
 
 _SAME: Final[tuple[tuple[ModuleType, tuple[str, ...]], ...]] = (
     (heightfield, ("WARP", "WEFT", "GAP")), (soft_horizons, ("AZIMUTHS",)), (groups, ("COLUMNS",)),
-    (nodes, ("LEVELS", "UPPER")), (shade, ("LEAST_SEEN", "FADED", "TINY")), (answer, ("LONGEST", "SMALLEST")),
-    (view_lines, ("MOST_GAUSS",)), (view_rays, ("FOOTPRINT_ENDS", "NEVER", "NEAREST")),
+    (nodes, ("LEVELS", "UPPER")), (shade, ("LEAST_SEEN", "FADED", "TINY")), (answer, ("LONGEST",)),
+    (mixture, ("SMALLEST",)), (view_lines, ("MOST_GAUSS",)), (view_rays, ("FOOTPRINT_ENDS", "NEVER", "NEAREST")),
     (wide, ("RESOLVED",)), (scratch, ("MOST_ON_LINES",)), (query, ("LOWEST_VIEWER",)),
     (seen_areas, ("SEEN_ANGLES",)), (coverage, ("RAYS",)), (soft_horizons, ("FALL",)), (lobes, ("SCATTERED", "BROAD")),
     (importance_mixture, ("LEAST_COSINE",)), (threads, ("TINT_COLUMNS", "SPREAD_OUT", "BELL_ENDS")),

@@ -15,14 +15,13 @@ import numpy as np
 
 from pipeline.analytic.importance.lobes import TZ, Lobes, LobeSurface, find_lobes, point_places
 from pipeline.analytic.importance.mixture import density_rows
-from pipeline.analytic.soft_nodes.answer import SMALLEST
 from pipeline.analytic.soft_nodes.components import read_behind, read_queries
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.scenes.shade import coloured
 from pipeline.shader.constants import POINTS, WIDENING
 from pipeline.shader.tables import Sides
 from pipeline.shader.threads import SeenTints
-from pipeline.truth.footprint.mixture import deviations
+from pipeline.truth.footprint.mixture import footprints
 from pipeline.truth.query import LOWEST_VIEWER, STEEPEST_CURVATURE, Queries
 from weaves.colour import LUMINANCE
 
@@ -96,7 +95,7 @@ class Golden(NamedTuple):
 
 def rows_of(queries: Queries) -> Float32:
     """Return N queries as the shader takes them, float32 (N, 12)."""
-    columns = (queries.u, queries.v, *deviations(queries, SMALLEST), queries.wi, queries.wo, queries.curvature)
+    columns = *footprints(queries), queries.wi, queries.wo, queries.curvature
     return np.column_stack(columns).astype(np.float32)
 
 

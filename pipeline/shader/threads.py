@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pipeline.analytic.soft_nodes.answer import LONGEST, SMALLEST, query_sums
+from pipeline.analytic.soft_nodes.answer import LONGEST, query_sums
 from pipeline.analytic.soft_nodes.groups import COLUMNS
 from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable
 from pipeline.analytic.soft_nodes.shade import DIFFUSE, SPECULAR
@@ -64,7 +64,7 @@ class SeenTints:
 
     def __call__(self, queries: Queries) -> Float64:
         """Return mean factors of the components of N queries, (N, 4, 3); NaN where too many threads are near."""
-        u, v, dx, dy, rho = (np.asarray(column, np.float64) for column in footprints(queries, SMALLEST))
+        u, v, dx, dy, rho = (np.asarray(column, np.float64) for column in footprints(queries))
         narrowest = np.array([narrow_axis(*row) for row in zip(dx, dy, rho, strict=True)])
         even, through = narrowest >= self._table.uniform, queries.wi[:, 2] < 0.0
         wo = queries.raised().wo.astype(np.float64)

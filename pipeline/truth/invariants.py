@@ -35,9 +35,6 @@ SIGNIFICANCE: Final = 1e-4  # probability that a check fails although the invari
 ROUNDING: Final = 2e-6  # relative error of a few operations on answers in single precision
 
 
-_Relation = Literal["=", "<="]
-
-
 class CheckResult(NamedTuple):
     """A measured number, its expected value, and whether both agree."""
 
@@ -58,17 +55,15 @@ class CheckResult(NamedTuple):
         return (self.measured - self.expected) / self.standard_error if self.standard_error else 0.0
 
 
-def exact(
-    name: str, measured: float, expected: float, tolerance: float, relation: _Relation = "=", note: str = ""
-) -> CheckResult:
+def exact(name: str, measured: float, expected: float, tolerance: float, note: str = "") -> CheckResult:
     """Check a number without statistical error; NaN is broken."""
-    beyond = measured - expected if relation == "<=" else abs(measured - expected)
-    return CheckResult(name, measured, expected, 0.0, relation, "exact" if beyond <= tolerance else "broken", note)
+    status: Literal["exact", "broken"] = "exact" if abs(measured - expected) <= tolerance else "broken"
+    return CheckResult(name, measured, expected, 0.0, "=", status, note)
 
 
 def worst(
-    name: str, measured: npt.ArrayLike, expected: float, errors: npt.ArrayLike, freedom: int, relation: _Relation = "=",
-    note: str = "",
+    name: str, measured: npt.ArrayLike, expected: float, errors: npt.ArrayLike, freedom: int,
+    relation: Literal["=", "<="] = "=", note: str = "",
 ) -> CheckResult:  # fmt: skip
     """Check many numbers; the result is that of the number furthest off, in its standard errors.
 

@@ -35,11 +35,15 @@ NARROWEST_RIMS: Final = 0.3
 that it states, because rays go on below the gaps."""
 
 
-def with_usual_walls(options: Any) -> Any:
-    """Return options in which `walls` is that of the fabric plane if they have no parallax and do not say."""
-    if isinstance(options, dict) and options.get("parallax") is False and "walls" not in options:
-        return options | {"walls": WALLS_OF_PLANE}
-    return options
+class UsualWalls(Frozen):
+    """Options in which `walls` is that of the fabric plane if they have no parallax and do not say."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _usual_walls(cls, options: Any) -> Any:
+        if isinstance(options, dict) and options.get("parallax") is False and "walls" not in options:
+            return options | {"walls": WALLS_OF_PLANE}
+        return options
 
 
 def steepness(relief: float, width: float, bend: float) -> float:
@@ -65,7 +69,7 @@ class Limits(NamedTuple):
     max_count: int
 
 
-class TruthOptions(Frozen):
+class TruthOptions(UsualWalls):
     """Options of the ground truth: how one patch BSDF value is computed."""
 
     estimator: EstimatorName = "auto"
@@ -97,11 +101,6 @@ class TruthOptions(Frozen):
     is `left_out`."""
     shadows: bool = True
     """True if points hide one another from light and viewer; without, the integrand is smooth and the value wrong."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _usual_walls(cls, options: Any) -> Any:
-        return with_usual_walls(options)
 
     @model_validator(mode="before")
     @classmethod

@@ -38,7 +38,7 @@ from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, first_hit
 from pipeline.truth.geometry.heightfield import BLEND, GAP, RADIUS, UNDER, WARP, WEFT, HeightField, surface_at
 from pipeline.truth.geometry.march import ray, wrap
 from pipeline.truth.geometry.pieces import Cell, CellPiece, cell_pieces, leaders
-from pipeline.truth.geometry.visibility import visible
+from pipeline.truth.geometry.visibility import gap_clear, visible
 
 _FEWEST: Final = 16  # points of the smallest piece; fewer of a cloth with so many that all walks are shared out
 _OFF: Final = 1e-9  # distance from a wall at which walks go on: beyond its rounding, on the open side
@@ -194,9 +194,7 @@ def _see_gaps(
     for p in range(len(x)):
         for k in range(len(viewers)):
             dx, dy, dz = viewers[k, 0], viewers[k, 1], viewers[k, 2]
-            if visible(front, x[p], y[p], 0.0, UNDER, ray(dx, dy, dz, 0.0)) and visible(
-                back, x[p], y[p], 0.0, UNDER, ray(-dx, -dy, dz, 0.0)
-            ):
+            if gap_clear(front, back, x[p], y[p], ray(dx, dy, dz, 0.0), ray(-dx, -dy, dz, 0.0)):
                 seen[k] += area[p] * dz
 
 

@@ -22,7 +22,6 @@ import numpy.typing as npt
 
 from pipeline.analytic.soft_horizons import AZIMUTHS, above, around, ramp
 from pipeline.analytic.soft_nodes import nodes
-from pipeline.analytic.soft_nodes.answer import SMALLEST
 from pipeline.analytic.soft_nodes.nodes import BLOCK, BOUND, CURVE, FAMILY, LEVELS, SHIFT, X_HIGH, X_LOW, Y_HIGH, Y_LOW
 from pipeline.analytic.torus_frame import Fibre, bend, normal, sigma, tangent
 from pipeline.compiled.arrays import Float32, Index
@@ -152,7 +151,7 @@ def find_lobes(cloth: LobeSurface, looks: Queries, places: Float32, widening: fl
     count, points = len(looks.u), len(places)
     result = Lobes(np.empty((count, FLAKE_ROWS, points + 2), np.float32), np.empty((count, STRAIGHT + 1), np.float32))
     wo, scratch = np.ascontiguousarray(looks.wo, np.float32), np.empty((_POINT_ROWS, points), np.float32)
-    _find_rows(cloth, footprints(looks, SMALLEST), wo, places, np.float32(widening), scratch, result)
+    _find_rows(cloth, footprints(looks), wo, places, np.float32(widening), scratch, result)
     return result
 
 

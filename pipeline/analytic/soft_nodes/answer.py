@@ -24,10 +24,6 @@ from pipeline.truth.footprint.mixture import Footprints, footprints, narrow_axis
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import directions_of
 
-SMALLEST: Final = np.float32(1e-3)
-"""Least deviation of a footprint: a thousandth of a yarn is a point. Smaller ones would fall between the digits of a
-place."""
-
 LONGEST: Final = 48.0
 """Largest deviation, in yarn spacings, of a footprint that does not cover the cloth evenly across: longer ones see the
 same, up to stripes of yarns almost along them, and would touch thousands of cells."""
@@ -47,7 +43,7 @@ def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32
     wi, wo, curvature = (np.ascontiguousarray(part, np.float32) for part in (looks.wi, looks.wo, looks.curvature))
     result = np.zeros((len(wi), table.kinds.sum(), NODE_SUMS), np.float32)
     gaps = np.zeros(len(wi), np.float32)
-    _sum_rows(table, scratch_for(table), footprints(queries, SMALLEST), wi, wo, curvature, result, gaps)
+    _sum_rows(table, scratch_for(table), footprints(queries), wi, wo, curvature, result, gaps)
     return result, gaps
 
 

@@ -8,7 +8,7 @@ import hashlib
 import importlib
 import sys
 from importlib.machinery import PathFinder
-from importlib.metadata import PackageNotFoundError, packages_distributions, version
+from importlib.metadata import packages_distributions, version
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -61,12 +61,8 @@ class CodeSource(NamedTuple):
         """Return name and version of the distribution that installed it; empty if none did."""
         if self.is_file or self.folder:
             return ""
-        for name in packages_distributions().get(self.place.partition(".")[0], []):
-            try:
-                return f"{name} {version(name)}"
-            except PackageNotFoundError:
-                continue
-        return ""
+        names = packages_distributions().get(self.place.partition(".")[0])
+        return f"{names[0]} {version(names[0])}" if names else ""
 
     def verify(self, sha256: str) -> None:
         """Raise WorkFailed unless the code has this hash."""

@@ -9,15 +9,15 @@ aliasing. With parallax a point is the first one that a view ray meets, without,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from pipeline.compiled.arrays import Float32, nbytes
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
 from pipeline.models.method import Method
 from pipeline.per_fabric import PerFabric
-from pipeline.truth.options import TruthOptions, Walls, with_usual_walls
+from pipeline.truth.options import TruthOptions, UsualWalls, Walls
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _Count = Annotated[int, Field(ge=1, le=4096)]  # of points
 
 
-class PointSampledOptions(AnalyticOptions):
+class PointSampledOptions(UsualWalls, AnalyticOptions):
     """The point model at k random points of the footprint [Jin2022Woven]; nothing is trained."""
 
     parameter: ClassVar[str] = "counts"
@@ -43,11 +43,6 @@ class PointSampledOptions(AnalyticOptions):
     """Independent points, or the R2 sequence with one random shift a query."""
     walls: Walls = "rim"
     """Meaning of a view ray that meets a wall; must be that of the truth."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _usual_walls(cls, options: Any) -> Any:
-        return with_usual_walls(options)
 
     def methods(self) -> Sequence[Method]:
         """Return one method for each number of points."""

@@ -15,6 +15,7 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
@@ -46,44 +47,40 @@ class Line(NamedTuple):
 COARSE_LINE: Final = Line(step=2.2, reach=2.4, three=0.28, two=0.15, half=16)
 FINE_LINE: Final = Line(step=1.3, reach=4.2, three=0.0, two=0.0, half=64)
 
+SMALLEST: Final = np.float32(1e-3)
+"""Least deviation of a footprint: a thousandth of a yarn is a point. Smaller ones would fall between the digits of a
+place."""
+
 _LITTLE: Final = 0.02  # correlation that is none to a method
-_NOTHING: Final = np.float32(0.0)
 _WIDEST: Final = np.float32(1e4)  # yarn spacings: even along that axis, and places on the line still have digits
-
-
-def deviations(queries: Queries, least: np.float32 = _NOTHING) -> tuple[Float32, Float32, Float32]:
-    """Return the deviations of N footprints along x and y and the correlation of both, each float32 (N,).
-
-    Axes count as `least` yarn spacings at least and as 1e4 at most. Correlations are 0 or such as a `COARSE_LINE`
-    resolves: an ellipse thinner than that is taken wider.
-    """
-    major, minor = (np.clip(side, least, _WIDEST) for side in (queries.sigma, queries.sigma_minor))
-    if (major == minor).all():
-        return major, major, np.zeros_like(major)
-    found = axes(*(column.astype(np.float64) for column in (major, minor, queries.angle)))
-    found[2] = np.where(np.abs(found[2]) < _LITTLE, 0.0, np.clip(found[2], -COARSE_LINE.most, COARSE_LINE.most))
-    x, y, correlation = found.astype(np.float32)
-    return x, y, correlation
 
 
 Footprints = tuple[Float32, Float32, Float32, Float32, Float32]
 """Centres in x and y, deviations along them, and their correlations, float32 (N,) each."""
 
 
-def footprints(queries: Queries, least: np.float32 = _NOTHING) -> Footprints:
-    """Return the footprints of N queries for kernels; see `deviations`."""
-    columns = (queries.u, queries.v, *deviations(queries, least))
-    u, v, x, y, correlation = (np.ascontiguousarray(column, np.float32) for column in columns)
+def footprints(queries: Queries) -> Footprints:
+    """Return the footprints of N queries for kernels.
+
+    Axes count as `SMALLEST` yarn spacings at least and as 1e4 at most. Correlations are 0 or such as a `COARSE_LINE`
+    resolves: an ellipse thinner than that is taken wider.
+    """
+    major, minor = (np.clip(side, SMALLEST, _WIDEST) for side in (queries.sigma, queries.sigma_minor))
+    spread: npt.NDArray[np.floating] = np.stack([major, minor, np.zeros_like(major)])
+    if (major != minor).any():
+        spread = axes(*(column.astype(np.float64) for column in (major, minor, queries.angle)))
+        spread[2] = np.where(np.abs(spread[2]) < _LITTLE, 0.0, np.clip(spread[2], -COARSE_LINE.most, COARSE_LINE.most))
+    u, v, x, y, correlation = (np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, *spread))
     return u, v, x, y, correlation
 
 
 @allocating_kernel
 def axes(major: Float64, minor: Float64, angle: Float64) -> Float64:
     """Return `along_axes` of N footprints, (3, N)."""
-    found = np.empty((3, len(major)))
+    spread = np.empty((3, len(major)))
     for row in range(len(major)):
-        found[0, row], found[1, row], found[2, row] = along_axes(major[row], minor[row], angle[row])
-    return found
+        spread[0, row], spread[1, row], spread[2, row] = along_axes(major[row], minor[row], angle[row])
+    return spread
 
 
 @kernel

@@ -141,3 +141,9 @@ def visible(field: HeightField, x: float, y: float, z: float, side: int, towards
         distance = leave
         cell = march.next_cell(field, cell, towards)
     return True
+
+
+@inlined_kernel
+def gap_clear(front: HeightField, back: HeightField, x: float, y: float, viewer: Ray, behind: Ray) -> bool:
+    """Return whether neither face hides a point of a gap; `behind` is the viewer's opposite as the back sees it."""
+    return visible(front, x, y, 0.0, UNDER, viewer) and visible(back, x, y, 0.0, UNDER, behind)

@@ -19,8 +19,8 @@ from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.cloth import AREA_SUM, POINT_SUMS, ClothSide
 from pipeline.truth.footprint.sequences import uniform
-from pipeline.truth.geometry.heightfield import GAP, UNDER, surface_at
-from pipeline.truth.geometry.visibility import visible
+from pipeline.truth.geometry.heightfield import GAP, surface_at
+from pipeline.truth.geometry.visibility import gap_clear, visible
 from pipeline.truth.node_table import build
 from pipeline.truth.node_table.doubts import Doubts, no_doubts
 from pipeline.truth.node_table.kernels import NodeShares
@@ -257,10 +257,7 @@ def _state(cloth: ClothSide, directions: Directions, row: Row, place: int, known
     front, light, viewer = cloth.front, directions.light, directions.viewer
     family, side, z, nx, ny, nz, _, _, _ = surface_at(front, x, y, int(x), int(y))
     if family == GAP:
-        through = visible(front, x, y, 0.0, UNDER, viewer) and visible(
-            cloth.back, x, y, 0.0, UNDER, directions.viewer_behind
-        )
-        return _LIT if through else _HIDDEN
+        return _LIT if gap_clear(front, cloth.back, x, y, viewer, directions.viewer_behind) else _HIDDEN
     if viewer.x * nx + viewer.y * ny + viewer.z * nz <= 0.0:
         return _HIDDEN
     if not known.seen and not visible(front, x, y, z, side, viewer):

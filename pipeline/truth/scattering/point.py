@@ -14,7 +14,7 @@ from pipeline.compiled.decorators import inlined_kernel, kernel
 from pipeline.truth.geometry.first_hit import MISSED, ON_WALL, first_hit, sinking
 from pipeline.truth.geometry.heightfield import ALPHA, BLEND, GAP, UNDER, HeightField, surface_at
 from pipeline.truth.geometry.march import Ray, ray, wrap
-from pipeline.truth.geometry.visibility import visible
+from pipeline.truth.geometry.visibility import gap_clear, visible
 from pipeline.truth.scattering.slab import density, reflection, sigma, transmission, unscattered
 
 Surface = tuple[int, int, float, float, float, float, float, float, float]
@@ -72,9 +72,7 @@ def point_share(
     family, side, z, nx, ny, nz, _, _, _ = surface
     if family == GAP:
         # A ray that enters a gap and ends on a yarn further down counts there, not here.
-        if choices.shadows and not (
-            visible(front, x, y, 0.0, UNDER, viewer) and visible(back, x, y, 0.0, UNDER, directions.viewer_behind)
-        ):
+        if choices.shadows and not gap_clear(front, back, x, y, viewer, directions.viewer_behind):
             return family, 0.0, 0.0, 0.0, 0.0
         return family, viewer.z, 0.0, 0.0, viewer.z
 

@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from pipeline.analytic.importance.lobes import STRAIGHT
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.shards.queries import QueryOptions, draw_queries
 from reports.truth.sampling import RECORDS, SETTINGS, Subject, _estimates, measure, scene_subjects
@@ -42,6 +43,6 @@ def test_all_samplers_have_the_same_mean(name):
 def test_looks_of_a_scene_are_those_of_its_pixels():
     (plane,) = scene_subjects("plane", 50)
     assert plane.fabric.name == "denim" and len(plane.looks.u) == 50
-    assert (PatchBSDF(plane.fabric).straight(plane.looks) < 1.0).all()
+    assert (PatchBSDF(plane.fabric).lobes(plane.looks).rest[:, STRAIGHT] < 1.0).all()
     table = scene_subjects("dinner_table", 200)
     assert len(table) == 4 and sum(len(subject.looks.u) for subject in table) == 200

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.truth.footprint.mixture import COARSE_LINE, FINE_LINE, axes, deviations, line_points, narrow_axis
+from pipeline.truth.footprint.mixture import COARSE_LINE, FINE_LINE, axes, footprints, line_points, narrow_axis
 from pipeline.truth.query import Queries
 
 CORRELATIONS = [0.02, 0.1, 0.15, 0.16, 0.28, 0.29, 0.5, 0.7, 0.9, 0.97, 0.99]
@@ -47,7 +47,7 @@ def test_the_mixture_is_the_gaussian_of_a_round_footprint_and_a_wider_one_of_a_t
     size = np.array([1.0, 1.0, 1.0], np.float32)
     minor, angle = np.array([1e-3, 1.0, 0.5], np.float32), np.array([0.7, 0.7, 0.0], np.float32)
     zero = np.zeros(3, np.float32)
-    x, y, correlation = deviations(Queries(zero, zero, size, zero, zero, minor, angle, zero))
+    _, _, x, y, correlation = footprints(Queries(zero, zero, size, zero, zero, minor, angle, zero))
     assert abs(correlation[0]) == pytest.approx(COARSE_LINE.most)
     np.testing.assert_array_equal(correlation[1:], 0.0)
     np.testing.assert_array_equal(x[1:], 1.0)
