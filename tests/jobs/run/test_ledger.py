@@ -56,12 +56,6 @@ ODD = {
 }
 
 
-@pytest.mark.parametrize("change", ODD.values(), ids=ODD)
-def test_an_odd_receipt_counts_as_missing(done, change):
-    rewrite(done, change)
-    assert done.state(TASK) == "missing" and not getattr(done.receipt(TASK), "files", {})
-
-
 def test_a_receipt_of_before_checksums_is_read_and_a_failure_keeps_its_reason_until_success(done):
     rewrite(done, {"title": "rows 0–9", "identity": {"error": 1e-05}})
     assert b"\\u2013" in (done.out / NOTE).read_bytes() and done.state(TASK) == "done"
@@ -72,12 +66,21 @@ def test_a_receipt_of_before_checksums_is_read_and_a_failure_keeps_its_reason_un
     assert (done.state(TASK), done.reason(TASK), done.seconds(TASK)) == ("done", "", 1.0)
 
 
-@pytest.mark.parametrize("content", [b"[" * 100_000, b"{" * 5, b"\xff\xfe", b"null", b"7", b" " * (2 << 20)])
-def test_a_file_that_is_no_receipt_counts_as_missing(done, content):
-    (done.out / NOTE).write_bytes(content)
-    assert done.state(TASK) == "missing" and not done.adopt(TASK)
-    (done.out / "ledger" / f"{TASK.id}.failed.json").write_bytes(content)
-    assert done.reason(TASK) == ""
+def test_an_odd_receipt_and_a_file_that_is_none_count_as_missing(done):
+    whole = (done.out / NOTE).read_bytes()
+    for about, change in ODD.items():
+        (done.out / NOTE).write_bytes(whole)
+        rewrite(done, change)
+        ledger = Ledger(done.out)
+        assert ledger.state(TASK) == "missing" and not getattr(ledger.receipt(TASK), "files", {}), about
+    for content in (b"[" * 100_000, b"{" * 5, b"\xff\xfe", b"null", b"7", b" " * (2 << 20)):
+        (done.out / NOTE).write_bytes(content)
+        ledger = Ledger(done.out)
+        assert ledger.state(TASK) == "missing" and not ledger.adopt(TASK)
+        failed = done.out / "ledger" / f"{TASK.id}.failed.json"
+        failed.write_bytes(content)
+        assert ledger.reason(TASK) == ""
+        failed.unlink()
 
 
 class About(fake.Fake):
