@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 
 from pipeline.analytic.prefiltered import CHANNELS, LEAN, NONE, TOKSVIG, answer, tabulate
+from pipeline.truth.geometry.heightfield import height_field
 from pipeline.truth.query import Queries
+from pipeline.truth.scattering.point import Choices, directions_of, point_share
 from tests.directions import above
 from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
@@ -14,8 +16,8 @@ RTOL = 1e-4
 
 
 @pytest.mark.parametrize(("wi", "wo"), [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5))], ids=["apart", "near"])
-def test_a_texel_is_a_point(point_shares, wi, wo):
-    """A tiny footprint at a texel's centre reads that texel alone."""
+def test_a_texel_is_a_point(wi, wo):
+    """A tiny footprint at a texel's centre reads that texel alone: the point model without shadows."""
     fabric = woven("denim", relief=1.2, twist=30.0).model_copy(update={"optical_thickness": 0.4})
     ends, picks = fabric.weave.repeat
     columns, rows = (1 << int(np.ceil(np.log2(extent * PER_YARN))) for extent in (ends, picks))
@@ -29,7 +31,12 @@ def test_a_texel_is_a_point(point_shares, wi, wo):
     for widening in (TOKSVIG, LEAN):
         np.testing.assert_allclose(answer(tables, queries, widening), found, rtol=RTOL, atol=RTOL * found.max())
 
-    area, specular, diffuse = point_shares(fabric, x, y, wi[0], wo[0])
+    front, towards = height_field(fabric), directions_of(*wi[0].astype(float), *wo[0].astype(float), 0.0)
+    shares = np.zeros((3, len(x), 3))
+    for k, place in enumerate(np.stack([x, y], axis=1).astype(float)):
+        family, *own, _ = point_share(front, front, *place, towards, Choices(macro=False, shadows=False))
+        shares[:, k, family] = own
+    area, specular, diffuse = shares
     whole = area.sum(axis=1, keepdims=True)
     expected = np.concatenate([specular[:, :2], diffuse[:, :2]], axis=1)
     expected = np.divide(expected, whole, out=np.zeros_like(expected), where=whole > 0)
