@@ -3,9 +3,16 @@ import math
 import numpy as np
 import pytest
 
+from pipeline.analytic.soft_nodes.components import read_queries
+from pipeline.analytic.soft_nodes.nodes import tabulate
+from pipeline.models.bounded import Bounded
 from pipeline.models.method import refuse_other
+from pipeline.truth.estimator import estimate
+from pipeline.truth.options import TruthOptions
+from reports.measure import furnace
 from reports.measure.furnace import DIRECTIONS, furnace_queries, measure_furnace
 from tests.pipeline.models.stand_ins import FakeMethod
+from tests.presets import slow
 from weaves.fabric import load_fabric
 
 
@@ -16,9 +23,7 @@ def lambertian(queries):
 
 
 def test_closed_forms_both_sides_add_up_and_a_method_may_know_one():
-    """That no legal cloth makes light, by any method, is in tests/pipeline/models/test_energy.py.
-
-    A white Lambertian surface returns all, f = .1 returns .2 pi; R2 with 256 points is good to half a per cent."""
+    """A white Lambertian surface returns all, f = .1 returns .2 pi; R2 with 256 points is good to half a per cent."""
     values = {record.metric: record.value for record in measure_furnace(FakeMethod(lambertian), load_fabric("denim"))}
     assert values["furnace_diffuse"] == pytest.approx(1.0, abs=5e-3)
     assert values["furnace_specular"] == pytest.approx(0.2 * math.pi, rel=1e-5)
@@ -48,3 +53,27 @@ def test_closed_forms_both_sides_add_up_and_a_method_may_know_one():
     values = {record.metric: record.value for record in measure_furnace(method, fabric)}
     assert values["furnace_colour"] == pytest.approx(0.5 / 4, abs=2e-3)
     assert values["furnace_all"] == pytest.approx(0.5 / 4 + 0.5 / 3 + 0.5, abs=4e-3)
+
+
+def test_the_truth_makes_no_light(monkeypatch):
+    """At one place: the mean over 256 directions has a sixteenth of the error of one."""
+    monkeypatch.setattr(furnace, "_PLACES", 1)
+    lining, options = load_fabric("polyester_lining"), TruthOptions(relative_error=0.05)
+    method = FakeMethod(lambda queries: estimate(lining, queries, options, 0).mean)
+    for record in measure_furnace(method, lining):
+        assert 0 < record.value <= 1.005, record.metric
+
+
+@pytest.mark.parametrize("name", ["polyester_lining", slow("voile"), slow("silk_charmeuse"), slow("twill_4_4")])
+def test_the_brightest_method_returns_at_most_what_arrives_and_soft_nodes_no_more(name):
+    """A network gone wrong answers a thousand times too much: what is left are the soft nodes without shadows.
+
+    At most 1 but for the error of 256 directions. Diffuse: exactly bounded. Specular, scattered once: far below. All
+    that comes from both sides, in legal colours: at most 1."""
+    fabric = load_fabric(name)
+    bright = FakeMethod(lambda queries: np.full((len(queries.u), 4), 1e3, np.float32))
+    found = {r.metric: r.value for r in measure_furnace(Bounded(bright), fabric)}
+    assert found["furnace_diffuse"] <= 1.005 and found["furnace_specular"] < 0.6
+    assert found["furnace_colour"] < found["furnace_all"] <= 1.005
+    reading = read_queries(tabulate(fabric), furnace_queries(fabric.weave.repeat))
+    assert (reading.components <= reading.bounds * 1.0001 + 1e-7).all()
