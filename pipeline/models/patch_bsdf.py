@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.importance import lobes as importance_lobes
-from pipeline.analytic.importance.lobes import TZ, Lobes
+from pipeline.analytic.importance.lobes import STRAIGHT, TZ, Lobes
 from pipeline.analytic.importance.mixture import density_rows, draw_rows
 from pipeline.compiled.arrays import Float32, Float64, Mask
 from pipeline.models.fallback import Fallback
@@ -135,7 +135,7 @@ class PatchBSDF:
         return Drawn(wi, pdf, straight)
 
     def pdf(self, queries: Queries, lobes: Lobes | None = None) -> Float32:
-        """Return the density of each query's wi, (N,), 1/sr; its integral is 1 minus that of the delta lobe."""
+        """Return the density of each query's wi, (N,), 1/sr; its integral is 1 minus the probability `straight`."""
         found, result = self._known(queries, lobes), np.empty(len(queries.u), np.float32)
         wi, wo = (np.ascontiguousarray(column, np.float32) for column in (queries.wi, queries.wo))
         density_rows(found, wi, wo, result)
@@ -149,6 +149,10 @@ class PatchBSDF:
     def eval_pdf(self, queries: Queries, lobes: Lobes | None = None, seed: int = 0) -> tuple[Float64, Float32]:
         """Return `eval` and `pdf` of each query."""
         return self.eval(queries, seed), self.pdf(queries, lobes)
+
+    def straight(self, looks: Queries, lobes: Lobes | None = None) -> Float32:
+        """Return the probability with which `sample` lets light go straight through, (N,)."""
+        return self._known(looks, lobes).rest[:, STRAIGHT]
 
     def _known(self, looks: Queries, lobes: Lobes | None) -> Lobes:
         if lobes is None:

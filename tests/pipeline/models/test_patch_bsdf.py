@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.analytic.importance.lobes import STRAIGHT, Lobes
+from pipeline.analytic.importance.lobes import Lobes
 from pipeline.models.named import named_method
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.truth.query import Queries
@@ -66,7 +66,7 @@ def test_samples_follow_their_density(names):
     values = {}
     for number, name in enumerate(names):
         bsdf, looks = bsdf_of(name), looks_of(name, COUNT)
-        shares, straight = expected_shares(bsdf, name), float(bsdf.lobes(looks.take(slice(1))).rest[0, STRAIGHT])
+        shares, straight = expected_shares(bsdf, name), float(bsdf.straight(looks.take(slice(1)))[0])
         assert shares.sum() + straight == pytest.approx(1.0, abs=2e-3), name
         sample = bsdf.draw(looks, np.random.default_rng(number).random((COUNT, 3)), lobes_of(bsdf, name, COUNT))
         np.testing.assert_allclose(np.linalg.norm(sample.wi, axis=1), 1.0, atol=1e-6)
@@ -133,7 +133,7 @@ def test_viewers_on_both_sides_are_answered_together_by_any_method():
     wi = np.random.default_rng(3).standard_normal((200, 3))
     queries = looks._replace(wi=(wi / np.linalg.norm(wi, axis=1, keepdims=True)).astype(np.float32))
     np.testing.assert_allclose(bsdf.pdf(queries), back.pdf(queries.turned()), rtol=1e-5)
-    np.testing.assert_allclose(bsdf.lobes(looks).rest, back.lobes(looks.turned()).rest, rtol=1e-6)
+    np.testing.assert_allclose(bsdf.straight(looks), back.straight(looks.turned()), rtol=1e-6)
     method, looks = named_method("prefiltered", "test", "method"), looks_of("front", 50)
     other, queries = bsdf_of("front"), looks._replace(wi=np.tile(np.float32(unit(20.0, 200.0)), (50, 1)))
     bsdf = PatchBSDF(other.fabric, method)
