@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from pipeline.models.analytic.adapter import AnalyticOptions
+from pipeline.models.selvage.wish import USUAL_ERROR, text_of
 from pipeline.truth.options import Walls
 
 if TYPE_CHECKING:
     from pipeline.models.selvage.model import Selvage
-
-USUAL_ERROR: Final = 0.02  # wished error of a method that is named without one
 
 _WishedError = Annotated[float, Field(gt=0, lt=1)]
 
@@ -50,8 +49,8 @@ class SelvageOptions(AnalyticOptions):
 
     @classmethod
     def setting_of(cls, setting: float) -> str:
-        """Return the text of a wished error in Records, tables and names of files."""
-        return f"error {100 * setting:g} %"
+        """Return the text of a wished error."""
+        return text_of(setting)
 
     def methods(self) -> list[Selvage]:
         """Return one method for each wished error."""

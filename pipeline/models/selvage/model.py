@@ -8,7 +8,6 @@ Errors are relative to a grey cloth's colour. Those of narrow footprints and low
 of walls is answered by soft nodes alone.
 """
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
@@ -19,9 +18,10 @@ from pipeline.compiled.arrays import Float32, Float64
 from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import refuse_other
-from pipeline.models.selvage import USUAL_ERROR, SelvageOptions, choice
+from pipeline.models.selvage import choice
 from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
 from pipeline.models.selvage.errors import CASES, CURVED, coefficients_of, squared_errors
+from pipeline.models.selvage.wish import USUAL_ERROR, refuse_wishes, text_of
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import Walls
 from pipeline.truth.query import Queries
@@ -42,7 +42,7 @@ class Selvage:
     takes_wishes: ClassVar[bool] = True
 
     def __init__(self, error: float = USUAL_ERROR, name: str = "selvage", walls: Walls = "rim") -> None:
-        self.name, self.setting, self.error = name, SelvageOptions.setting_of(error), error
+        self.name, self.setting, self.error = name, text_of(error), error
         self._curves = {behind: PerFabric(partial(self._error_curves, behind=behind)) for behind in (False, True)}
         self._nodes = [SoftNodes(level, name, walls) for level in NODE_LEVELS]
         self._answers: list[Callable[[Fabric, Queries, int], Float32]] = [node.predict for node in self._nodes]
@@ -81,7 +81,7 @@ class Selvage:
     ) -> choice.Chosen:
         """Return which answer each of N queries gets, (N,): a level of soft nodes by its place, 4 the fallback."""
         refuse_other(queries, f"the method {self.name} answers", ("stretch", "behind", "curvature"))
-        _refuse_wishes(self.name, error, time)
+        refuse_wishes(self.name, error, time)
         kinds = choice.kinds_of(queries)
         squares = squared_errors(queries, self._coefficients(fabric, queries))
         if time is None:
@@ -131,13 +131,3 @@ class Selvage:
 def _behind(queries: Queries) -> bool:
     """Return whether any light is behind the cloth."""
     return bool((queries.wi[:, 2] < 0.0).any())
-
-
-def _refuse_wishes(name: str, error: float | None, time: float | None) -> None:
-    """Refuse both wishes at once, and one that is out of its range, as wishes of the method `name`."""
-    if error is not None and time is not None:
-        raise BadInput(name, "time", time, "leave out time or error: only one of them can be wished")
-    if error is not None and not 0.0 < error < 1.0:
-        raise BadInput(name, "error", error, "a relative error above 0 and below 1 is needed, such as .02")
-    if time is not None and not 0.0 < time < math.inf:
-        raise BadInput(name, "time", time, "seconds a query above 0 are needed, such as 5e-6")
