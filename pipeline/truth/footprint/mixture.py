@@ -66,11 +66,11 @@ def footprints(queries: Queries) -> Footprints:
     resolves: an ellipse thinner than that is taken wider.
     """
     major, minor = (np.clip(side, SMALLEST, _WIDEST) for side in (queries.sigma, queries.sigma_minor))
-    found: npt.NDArray[np.floating] = np.stack([major, minor, np.zeros_like(major)])
+    shape: npt.NDArray[np.floating] = np.stack([major, minor, np.zeros_like(major)])
     if (major != minor).any():
-        found = axes(*(column.astype(np.float64) for column in (major, minor, queries.angle)))
-        found[2] = np.where(np.abs(found[2]) < _LITTLE, 0.0, np.clip(found[2], -COARSE_LINE.most, COARSE_LINE.most))
-    u, v, x, y, correlation = (np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, *found))
+        shape = axes(*(column.astype(np.float64) for column in (major, minor, queries.angle)))
+        shape[2] = np.where(np.abs(shape[2]) < _LITTLE, 0.0, np.clip(shape[2], -COARSE_LINE.most, COARSE_LINE.most))
+    u, v, x, y, correlation = (np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, *shape))
     return u, v, x, y, correlation
 
 
