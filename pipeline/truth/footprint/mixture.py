@@ -66,21 +66,21 @@ def footprints(queries: Queries) -> Footprints:
     resolves: an ellipse thinner than that is taken wider.
     """
     major, minor = (np.clip(side, SMALLEST, _WIDEST) for side in (queries.sigma, queries.sigma_minor))
-    spread: npt.NDArray[np.floating] = np.stack([major, minor, np.zeros_like(major)])
+    shape: npt.NDArray[np.floating] = np.stack([major, minor, np.zeros_like(major)])
     if (major != minor).any():
-        spread = axes(*(column.astype(np.float64) for column in (major, minor, queries.angle)))
-        spread[2] = np.where(np.abs(spread[2]) < _LITTLE, 0.0, np.clip(spread[2], -COARSE_LINE.most, COARSE_LINE.most))
-    u, v, x, y, correlation = (np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, *spread))
+        shape = axes(*(column.astype(np.float64) for column in (major, minor, queries.angle)))
+        shape[2] = np.where(np.abs(shape[2]) < _LITTLE, 0.0, np.clip(shape[2], -COARSE_LINE.most, COARSE_LINE.most))
+    u, v, x, y, correlation = (np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, *shape))
     return u, v, x, y, correlation
 
 
 @allocating_kernel
 def axes(major: Float64, minor: Float64, angle: Float64) -> Float64:
     """Return `along_axes` of N footprints, (3, N)."""
-    spread = np.empty((3, len(major)))
+    found = np.empty((3, len(major)))
     for row in range(len(major)):
-        spread[0, row], spread[1, row], spread[2, row] = along_axes(major[row], minor[row], angle[row])
-    return spread
+        found[0, row], found[1, row], found[2, row] = along_axes(major[row], minor[row], angle[row])
+    return found
 
 
 @kernel

@@ -45,7 +45,7 @@ class ThreadTable(NamedTuple):
     """Repeat of weave and colours together."""
 
 
-def threads_of(fabric: Fabric, transmitted: bool) -> ThreadTable:
+def _threads_of(fabric: Fabric, transmitted: bool) -> ThreadTable:
     """Return the colours of a fabric's threads; those of the diffuse components for light from one side or both."""
     warp, weft = (
         np.stack([threads.specular, threads.diffuse_transmission if transmitted else threads.diffuse], axis=1)
@@ -70,7 +70,7 @@ def component_colours(
         index = np.flatnonzero((behind == side) & (through == transmitted))
         if not index.size:
             continue
-        threads = threads_of(fabric, transmitted)
+        threads = _threads_of(fabric, transmitted)
         if fabric.colours is None:
             found.mean[index] = np.stack([threads.warp[0], threads.weft[0]], axis=1).reshape(4, 3)
             continue
