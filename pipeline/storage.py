@@ -126,11 +126,6 @@ def size_of(path: Remote) -> int:
     return int(path.stat().st_size if is_local(path) else path.fs.info(path.path)["size"])
 
 
-def is_file(path: Remote) -> bool:
-    """Return whether there is such a file; an error of the storage is no answer, and raised."""
-    return bool(path.is_file() if is_local(path) else path.fs.exists(path.path))
-
-
 def fetch_all(root: Remote, targets: Mapping[str, Path]) -> None:
     """Copy files of object storage, given by paths relative to `root`, to this machine, many at the same time."""
     if targets:
