@@ -141,13 +141,12 @@ def within_energy(fabric: Fabric, colours: Float64) -> Float64:
     return colours
 
 
-def with_colours(fabric: Fabric, colours: Float64, optics: YarnOptics | None = None) -> Fabric:
-    """Return the fabric in six grey colours and, if given, with other optics."""
+def with_colours(fabric: Fabric, colours: Float64, optics: YarnOptics) -> Fabric:
+    """Return the fabric in six grey colours and with other optics."""
     yarns = {}
     for family, name in enumerate(("warp", "weft")):
         update: dict[str, object] = {key: (float(colours[2 * k + family]),) * 3 for k, key in enumerate(COLOURS)}
-        if optics is not None:
-            update |= {"roughness": float(optics.roughness[family]), "blend": float(optics.blend)}
+        update |= {"roughness": float(optics.roughness[family]), "blend": float(optics.blend)}
         yarns[name] = getattr(fabric, name).model_copy(update=update)
     return fabric.model_copy(update=yarns)
 
