@@ -165,17 +165,18 @@ def faults(queries: Queries, parallax: bool = False) -> dict[int, tuple[str, obj
     return found
 
 
-def validate(queries: Queries, where: str = "queries", parallax: bool = False) -> None:
+def validate(queries: Queries, parallax: bool = False) -> None:
     """Refuse queries that have no answer with a BadInput that names the first and counts the others."""
     rows = np.shape(queries.u)[:1] or (1,)
     for name, column in zip(Queries._fields, queries, strict=True):
         shape = (*rows, 3) if name in ("wi", "wo") else rows
         if np.shape(column) != shape:
-            raise BadInput(where, f"shape of {name}", np.shape(column), f"must be {shape}: all columns have equal rows")
+            allowed = f"must be {shape}: all columns have equal rows"
+            raise BadInput("queries", f"shape of {name}", np.shape(column), allowed)
     found = faults(queries, parallax)
     if not found:
         return
     row = min(found)
     name, value, allowed = found[row]
     more = f" ({len(found) - 1} more bad rows)" if len(found) > 1 else ""
-    raise BadInput(where, f"{name}[{row}]", value, allowed + more)
+    raise BadInput("queries", f"{name}[{row}]", value, allowed + more)

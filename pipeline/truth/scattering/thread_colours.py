@@ -54,9 +54,7 @@ def _threads_of(fabric: Fabric, transmitted: bool) -> ThreadTable:
     return ThreadTable(warp, weft, *fabric.repeat)
 
 
-def component_colours(
-    fabric: Fabric, queries: Queries, options: TruthOptions, seed: int, start: int = 0
-) -> ComponentColours:
+def component_colours(fabric: Fabric, queries: Queries, options: TruthOptions, seed: int) -> ComponentColours:
     """Return the colours of the components of queries about a fabric.
 
     Points are doubled until the standard error of the patch BSDF's colour is `options.relative_error` of its size.
@@ -76,7 +74,7 @@ def component_colours(
             continue
         cloth, columns = cloth_side(fabric, options, side), columns_of(queries.take(index), side)
         found.mean[index], found.standard_error[index] = _sample_colours(
-            cloth, columns, start + index, threads, options.limits, np.uint64(seed)
+            cloth, columns, index, threads, options.limits, np.uint64(seed)
         )
     return found
 
