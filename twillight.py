@@ -152,9 +152,10 @@ def load_model(name_or_folder: str | Path) -> Method:
     (1, 4)
     """
     from pipeline.models.all_cores import AllCores
-    from pipeline.models.named import own_method
+    from pipeline.models.named import loaded
 
-    return AllCores(own_method(str(name_or_folder), "load_model", "name_or_folder"))
+    method, _ = loaded(str(name_or_folder), "load_model", "name_or_folder")
+    return AllCores(method)
 
 
 def to_rgb(

@@ -25,22 +25,17 @@ def untrained_names() -> list[str]:
 
 
 def named_method(name: str, where: str, key: str) -> Fallback:
-    """Return a method that answers any query; others than its own go to the fallback. As `own_method` otherwise."""
+    """Return a method that answers any query; others than its own go to the fallback. As `loaded` otherwise."""
     return Fallback(*loaded(name, where, key))
 
 
-def own_method(name: str, where: str, key: str) -> Method:
-    """Return a method that answers queries of its own kinds.
+def loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
+    """Return a method that answers queries of its own kinds, and these kinds.
 
     `name` is that of a model that learns nothing, with ``:k`` for a setting, or the folder of a trained one; `where`
     and `key` are the verb or function and its option that name it, for messages. BadInput if there is no such method,
     it must be trained first, it has no such setting, or its files are damaged.
     """
-    return loaded(name, where, key)[0]
-
-
-def loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
-    """Return a method and the kinds of queries that it knows; parameters and errors as of `own_method`."""
     model, _, setting = name.partition(":")
     if model in untrained_names():
         options = _with_setting(CLASSES[model](), setting, where, key, name)

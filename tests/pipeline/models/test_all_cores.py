@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.models.all_cores import AllCores
 from pipeline.models.method import CHUNK_ROWS
-from pipeline.models.named import own_method
+from pipeline.models.named import loaded
 from pipeline.models.woven.model import Woven, WovenNetwork
 from pipeline.shards.queries import QueryOptions, draw_queries
 from tests.pipeline.models.stand_ins import SMALL
@@ -39,7 +39,7 @@ class Fake:
 @pytest.mark.parametrize("name", ["soft_nodes:1", "selvage:.02", "woven"])
 def test_no_bit_depends_on_the_number_of_threads(name):
     network = name == "woven"
-    method = Woven(WovenNetwork(SMALL[name])) if network else own_method(name, "test", "name")
+    method = Woven(WovenNetwork(SMALL[name])) if network else loaded(name, "test", "name")[0]
     drawn = queries(options=QueryOptions() if network else ANY)
     one, *others = (AllCores(method, threads).predict(DENIM, drawn) for threads in (1, 2, 5))
     assert one.shape == (ROWS, 4) and one.dtype == np.float32
