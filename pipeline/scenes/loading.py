@@ -150,7 +150,7 @@ def _world(mi: Any, scene: Scene, where: str) -> Any:
                 refuse_lost_vertices(path)
             world = instantiate(mi, scene.source, where)
         else:
-            world = mi.load_dict(scene.source(mi), optimize=False)
+            world = mi.load_dict({"type": "scene", **scene.source(mi)}, optimize=False)
     except (RuntimeError, TypeError, OSError) as error:
         said = re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error)).replace(where, Path(where).name)
         raise BadInput(where, "", " ".join(said.split()), "a Mitsuba 3 scene that loads is needed") from error

@@ -38,7 +38,7 @@ class Scene(Frozen):
 
     name: FileName
     source: Path | Callable[[Any], dict[str, Any]]
-    """A Mitsuba XML file; or a function that is given the module mitsuba and returns a dictionary."""
+    """A Mitsuba XML file; or a function that is given the module mitsuba and returns a dictionary of parts."""
     cloths: dict[str, Cloth] = Field(default_factory=dict)
     """Cloth of each ``fabric_<key>``; a key that is not listed is a preset with the default yarns."""
     frames: int = Field(default=24, ge=1, le=100_000)

@@ -37,7 +37,6 @@ def _plane(mi: Any) -> dict[str, Any]:
     """Return denim to the horizon: from resolved yarns to many repeats a pixel, where everything aliases that can."""
     ground = mi.ScalarTransform4f().translate([0, 0.45 * _PLANE_SIDE, 0]).scale(0.5 * _PLANE_SIDE)
     return {
-        "type": "scene",
         "ground": {"type": "rectangle", "to_world": ground, "cloth": wears("denim")},
         "below": {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -1]) @ ground},
         "sun": sun([0.5, 0.55, 0.7], 3.0),
@@ -58,7 +57,6 @@ def _sphere(mi: Any) -> dict[str, Any]:
     # The near pole looks to -y, where the camera is; z is up.
     points = _joined(4.0 * u, square - 4.0, 4.0 * v) / (4.0 + square)[..., None]
     return {
-        "type": "scene",
         "ball": sheet(mi, "silk_charmeuse", points, points, _joined(u, v)),
         "core": {"type": "sphere", "radius": 0.98},
         "sun": sun([-0.45, -0.7, 0.55], 2.6),
@@ -91,7 +89,6 @@ def drape_surface() -> tuple[Float64, Float64, Float64]:
 def _drape(mi: Any) -> dict[str, Any]:
     """Return gabardine in folds, a sun from the side that leaves half of every fold in shadow."""
     return {
-        "type": "scene",
         "cloth": sheet(mi, "wool_gabardine", *drape_surface()),
         "sun": sun([-0.75, -0.6, 0.45], 3.0),
         "sky": _sky(0.12, 0.13, 0.15),
@@ -103,7 +100,6 @@ def _roll(mi: Any) -> dict[str, Any]:
     """Return a roll of cotton twill at its silhouette: some twenty yarn spacings to the radius."""
     ends = {"p0": [-0.5 * _ROLL_LENGTH, 0, 0], "p1": [0.5 * _ROLL_LENGTH, 0, 0]}
     return {
-        "type": "scene",
         "roll": {"type": "cylinder", **ends, "radius": _ROLL_RADIUS, "cloth": wears("cotton_twill")},
         "core": {"type": "cylinder", **ends, "radius": 0.98 * _ROLL_RADIUS},
         "sun": sun([-0.5, -0.45, 0.75], 3.0),
@@ -125,7 +121,6 @@ def _curtain(mi: Any) -> dict[str, Any]:
         for name, (place, half) in bars.items()
     }
     return {
-        "type": "scene",
         "curtain": sheet(mi, "voile", _joined(curve[:, 0], curve[:, 1], height), normal, _joined(length, height)),
         **window,
         "sun": sun([0.35, 0.8, 0.45], 3.0),
@@ -144,7 +139,6 @@ def _dinner_table(mi: Any) -> dict[str, Any]:
     outwards = 2.0 * np.array(_NEAR) - _FAR
     end = move().look_at(list(_NEAR), outwards.tolist(), [0, 0, 1]).scale(_NAPKIN_RADIUS)
     return {
-        "type": "scene",
         "top": {"type": "rectangle", "to_world": move().scale([1.3, 1.0, 1]), "cloth": wears("table_cloth")},
         "mat": {"type": "rectangle", "to_world": mat, "cloth": wears("mat")},
         "runner": _waves(mi, "runner", np.linspace(-0.75, -0.25, 3), y, wave),
@@ -166,7 +160,6 @@ def _swatch(mi: Any) -> dict[str, Any]:
     y = np.linspace(-0.5, 0.5, 801)
     board = {"type": "diffuse", "reflectance": {"type": "rgb", "value": swatch.BOARD}}
     return {
-        "type": "scene",
         "cloth": _waves(mi, "swatch", np.linspace(-0.5, 0.5, 3), y, swatch.height(y)),
         "board": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(swatch.HALF_BOARD), "paint": board},
         **{f"lamp_{number}": sun(list(towards), power) for number, (towards, power) in enumerate(swatch.LIGHTS)},
@@ -193,7 +186,6 @@ def _hem(mi: Any) -> dict[str, Any]:
         uv = _joined(x, length[:, None])
         lines[f"strip_{number}"] = sheet(mi, "denim", points @ roll.T, normal @ roll.T, uv)
     return {
-        "type": "scene",
         **lines,
         "sun": sun([-0.6, -0.7, 0.55], 3.0),
         "sky": _sky(0.25, 0.32, 0.43),
