@@ -205,15 +205,20 @@ def _joined(*coordinates: npt.ArrayLike) -> Float64:
     return np.stack(np.broadcast_arrays(*coordinates), axis=-1)
 
 
+def grid_faces(rows: int, columns: int) -> npt.NDArray[np.uint32]:
+    """Return the corners of two triangles a cell of a grid, uint32 (N, 3)."""
+    corner = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
+    return np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+
+
 def sheet(mi: Any, cloth: str, points: Float64, normals: Float64, uv: Float64) -> Any:
     """Return the mesh of a grid of points (R, C, 3), two triangles a cell, that wears the cloth of a key.
 
     `normals`, which broadcast to the points, are unit normals of the front, `uv` (R, C, 2) lengths along weft and warp.
     """
     rows, columns = points.shape[:2]
-    corner = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
-    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    faces = grid_faces(rows, columns)
     settings = mi.Properties()
     settings["bsdf"] = mi.load_dict(wears(cloth))
     has = {"has_vertex_normals": True, "has_vertex_texcoords": True}
@@ -222,7 +227,7 @@ def sheet(mi: Any, cloth: str, points: Float64, normals: Float64, uv: Float64) -
     of_vertices = {"positions": points, "normals": np.broadcast_to(normals, points.shape), "texcoords": uv}
     for name, values in of_vertices.items():
         parameters[f"vertex_{name}"] = values.astype(np.float32).ravel()
-    parameters["faces"] = faces.astype(np.uint32).ravel()
+    parameters["faces"] = faces.ravel()
     parameters.update()
     return mesh
 

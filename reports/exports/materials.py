@@ -24,7 +24,7 @@ from pipeline.compiled.arrays import Float64
 from pipeline.materials.lobes import SHEEN_ROUGHNESS
 from pipeline.materials.planes import Layout
 from pipeline.materials.textures import Constants, Textures, across_direction, gltf_strength
-from pipeline.scenes.shipped import DRAPE_YARNS, drape_surface
+from pipeline.scenes.shipped import DRAPE_YARNS, drape_surface, grid_faces
 from reports.images.texture import png_bytes
 from weaves.fabric import Fabric
 
@@ -237,17 +237,13 @@ def _draped(fabric: Fabric, shown: Layout) -> tuple[dict[str, Float64], npt.NDAr
     # Texture coordinates count maps; those of glTF run downwards.
     uv = lengths * metres * 100.0 * per_cm / (shown.ends, shown.picks)
     tangents = _tangents(points, normals, uv)
-    rows, columns = points.shape[:2]
-    corner = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
-    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
-    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
     tangents = np.concatenate([_upright(tangents[..., :3].reshape(-1, 3)), tangents[..., 3:].reshape(-1, 1)], axis=-1)
     return {
         "POSITION": _upright(points.reshape(-1, 3)) * metres,
         "NORMAL": _upright(normals.reshape(-1, 3)),
         "TANGENT": tangents,
         "TEXCOORD_0": (uv * (1.0, -1.0) + (0.0, 1.0)).reshape(-1, 2),
-    }, faces
+    }, grid_faces(*points.shape[:2])
 
 
 def _tangents(points: Float64, normals: Float64, uv: Float64) -> Float64:
