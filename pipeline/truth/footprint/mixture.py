@@ -77,10 +77,10 @@ def footprints(queries: Queries) -> Footprints:
 @allocating_kernel
 def axes(major: Float64, minor: Float64, angle: Float64) -> Float64:
     """Return `along_axes` of N footprints, (3, N)."""
-    found = np.empty((3, len(major)))
+    along = np.empty((3, len(major)))
     for row in range(len(major)):
-        found[0, row], found[1, row], found[2, row] = along_axes(major[row], minor[row], angle[row])
-    return found
+        along[0, row], along[1, row], along[2, row] = along_axes(major[row], minor[row], angle[row])
+    return along
 
 
 @kernel
