@@ -185,17 +185,9 @@ def fill_displaced(
 ) -> int:
     """Write the share of a Gaussian footprint of rays that falls on each node and its copies; rotated ones by a `line`.
 
-    `plane` is the height of the reference plane. Returns the points of the grid on a yarn spacing.
+    `plane` is the height of the reference plane. The folded density, of mean 1, is left in the grid; returned are its
+    points on a yarn spacing.
     """
-    wo = columns.wo[row]
-    points = _fill_density(table, columns, row, line, room)
-    read_density(table.lattice, points, plane, wo[0] / wo[2], wo[1] / wo[2], room, table.places, table.evenly, weight)
-    return points
-
-
-@kernel
-def _fill_density(table: ExactNodes, columns: WideQueries, row: int, line: Line, room: WeightRoom) -> int:
-    """Write the folded density of a footprint, of mean 1, to the grid; return the points on a yarn spacing."""
     period, rows, slip = table.lattice
     picks = int(table.repeat[1])
     major, minor = columns.sigma[row], columns.sigma_minor[row]
@@ -222,6 +214,8 @@ def _fill_density(table: ExactNodes, columns: WideQueries, row: int, line: Line,
             # A point n rows further up stands for itself `slip` further along.
             own_x = along_x[(n * slip * points) % width :]
             add_product(own_x[: width + 1], along_y[n * height : (n + 1) * height + 1], _1, grid)
+    wo = columns.wo[row]
+    read_density(table.lattice, points, plane, wo[0] / wo[2], wo[1] / wo[2], room, table.places, table.evenly, weight)
     return points
 
 
