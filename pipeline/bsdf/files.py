@@ -10,7 +10,7 @@ patches, labels as in XML) and `value` (1/sr, without the cosine). Pairs that ar
 """
 
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 from xml.etree import ElementTree
 
 import numpy as np
@@ -40,29 +40,25 @@ _TREE_KEYS: Final[tuple[str, ...]] = ("AngleBasis",)
 _BLOCKS = [f"{kind.capitalize()} {side.capitalize()}" for kind in SCATTERED for side in FACES]
 
 
-class LayerFacts(NamedTuple):
-    """Name of the product, share of normal light that goes straight, emissivity of both faces, thickness in metres."""
-
-    name: str
-    openness: float
-    emissivity: float
-    thickness: float
-
-
-def write_xml(path: Path, scattering: Scattering, facts: LayerFacts, straight: Float64 | None = None) -> None:
+def write_xml(
+    path: Path, scattering: Scattering, name: str, openness: float, emissivity: float, thickness: float,
+    straight: Float64 | None = None,
+) -> None:  # fmt: skip
     """Write a file, whole or not at all: a tensor tree if the basis is a `Square`.
 
-    A layer without a solar band has the visible one there too. `straight` is as in `tree_text`, for a tree alone.
+    `name` is that of the product, `openness` the share of normal light that goes straight, `emissivity` that of both
+    faces, `thickness` in metres. A layer without a solar band has the visible one there too. `straight` is as in
+    `tree_text`, for a tree alone.
     """
     ElementTree.register_namespace("", NAMESPACE)
     root = ElementTree.Element(f"{{{NAMESPACE}}}WindowElement")
     _add_texts(root, WindowElementType="System", FileType="BSDF")
     layer = _add(_add(root, "Optical"), "Layer")
-    material, emissivity, openness = _add(layer, "Material"), f"{facts.emissivity:g}", f"{facts.openness:.4g}"
-    _add_texts(material, Name=facts.name, Manufacturer="Twillight")
-    _add(material, "Thickness", f"{facts.thickness:.4g}", unit="Meter")
-    _add_texts(material, DeviceType="Other", EmissivityFront=emissivity, EmissivityBack=emissivity)
-    _add_texts(material, TIR=openness, EffectiveOpennessFraction=openness)
+    material, emitted, open_share = _add(layer, "Material"), f"{emissivity:g}", f"{openness:.4g}"
+    _add_texts(material, Name=name, Manufacturer="Twillight")
+    _add(material, "Thickness", f"{thickness:.4g}", unit="Meter")
+    _add_texts(material, DeviceType="Other", EmissivityFront=emitted, EmissivityBack=emitted)
+    _add_texts(material, TIR=open_share, EffectiveOpennessFraction=open_share)
     definition, basis = _add(layer, "DataDefinition"), scattering.basis
     keys, bands = _MATRIX_KEYS, scattering.mirrored().bands
     if isinstance(basis, Square):

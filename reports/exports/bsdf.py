@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Final
 
 from pipeline.atomic import refuse_unwritable
-from pipeline.bsdf.files import LayerFacts, write_xml
+from pipeline.bsdf.files import write_xml
 from pipeline.bsdf.klems import KLEMS_FULL
 from pipeline.bsdf.of_fabric import PAIR_POINTS, fabric_bsdf
 from pipeline.bsdf.tensor_tree import Square
@@ -37,7 +37,7 @@ def write_bsdf(fabric: Fabric, path: Path, solar: str = "", points: int = PAIR_P
     thickness = THICKNESS_ASSUMED
     if fabric.yarns_per_cm:
         thickness = sum(0.01 * yarn.width * yarn.relief / n for yarn, n in zip(yarns, fabric.yarns_per_cm, strict=True))
-    write_xml(path, bsdf.scattering, LayerFacts(fabric.name, openness, EMISSIVITY_ASSUMED, thickness), bsdf.direct)
+    write_xml(path, bsdf.scattering, fabric.name, openness, EMISSIVITY_ASSUMED, thickness, bsdf.direct)
     size = "" if fabric.yarns_per_cm else ", thickness (no yarns_per_cm)"
     bands = "visible and solar" if solar else "visible, which stands for solar too"
     (front, back), (through, _) = bsdf.scattering.hemispherical("visible")[:, :, patches.normal]

@@ -7,12 +7,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipeline.bsdf.files import NAMESPACE, LayerFacts, read_bsdf, write_xml
+from pipeline.bsdf.files import NAMESPACE, read_bsdf, write_xml
 from pipeline.bsdf.klems import BASES, FACES, SCATTERED, Scattering
 from tests.refusals import refusal
 from weaves.errors import BadInput
 
-FACTS, QUARTER = LayerFacts("cloth", 0.05, 0.9, 1e-3), BASES["LBNL/Klems Quarter"]
+FACTS, QUARTER = ("cloth", 0.05, 0.9, 1e-3), BASES["LBNL/Klems Quarter"]
 
 
 def layer(basis, most=0.5):
@@ -23,7 +23,7 @@ def layer(basis, most=0.5):
 @pytest.mark.parametrize("basis", BASES.values())
 def test_what_is_written_is_in_the_file_and_is_read_again(basis, tmp_path):
     """Both bands, each with a block a direction, as six digits with labels (-x, y); a visible band stands for both."""
-    write_xml(tmp_path / "layer.xml", layer(basis), FACTS)
+    write_xml(tmp_path / "layer.xml", layer(basis), *FACTS)
     again, wanted = read_bsdf(tmp_path / "layer.xml"), layer(basis).bands["visible"]
     assert again.basis == basis and set(again.bands) == {"visible", "solar"}
     np.testing.assert_allclose(again.bands["visible"], wanted, rtol=1e-5)
@@ -65,7 +65,7 @@ def test_one_row_is_one_pair_and_blocks_that_a_file_lacks_are_not_known(tmp_path
     pq.write_table(table(), tmp_path / "rows.parquet")
     blocks = read_bsdf(tmp_path / "rows.parquet").bands["visible"]
     assert np.isfinite(blocks).sum() == 1 and blocks.shape == (2, 2, 41, 41)
-    write_xml(path := tmp_path / "layer.xml", layer(QUARTER), FACTS)
+    write_xml(path := tmp_path / "layer.xml", layer(QUARTER), *FACTS)
     path.write_text(path.read_text().replace("Reflection Back", "Reflection Front"))
     assert np.isnan(read_bsdf(path).bands["visible"][SCATTERED.index("reflection"), FACES.index("back")]).all()
 
@@ -81,6 +81,6 @@ def test_one_row_is_one_pair_and_blocks_that_a_file_lacks_are_not_known(tmp_path
     ],
 )
 def test_an_xml_file_that_cannot_be_used_is_refused_in_one_sentence(old, new, sentence, tmp_path):
-    write_xml(path := tmp_path / "layer.xml", layer(QUARTER), FACTS)
+    write_xml(path := tmp_path / "layer.xml", layer(QUARTER), *FACTS)
     path.write_text(path.read_text().replace(old, new))
     assert sentence in refusal(read_bsdf, path)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.bsdf.files import LayerFacts, read_bsdf, write_xml
+from pipeline.bsdf.files import read_bsdf, write_xml
 from pipeline.bsdf.klems import BASES, KLEMS_FULL, Scattering
 from pipeline.bsdf.of_fabric import fabric_bsdf
 from pipeline.bsdf.tensor_tree import Square
@@ -19,7 +19,7 @@ from weaves.colour import LUMINANCE
 from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
-FACTS = LayerFacts("cloth", 0.05, 0.9, 1e-3)
+FACTS = ("cloth", 0.05, 0.9, 1e-3)
 QUARTER = BASES["LBNL/Klems Quarter"]
 
 
@@ -92,7 +92,7 @@ def test_radiance_and_pywincalc_read_the_same_numbers(basis, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     bsdf = fabric_bsdf(load_fabric("voile"), basis=basis, points=1)
     layer = bsdf.scattering
-    write_xml(Path("layer.xml"), layer, FACTS, bsdf.direct)
+    write_xml(Path("layer.xml"), layer, *FACTS, bsdf.direct)
     home = Path(radiance.__file__).parent
     environment = os.environ | {"RAYPATH": f".:{home / 'lib'}"}
 
