@@ -40,6 +40,14 @@ def mip_levels(maps: Sequence[npt.NDArray[Any]], extent: tuple[int, int]) -> Mip
     )
 
 
+def pyramid(finest: npt.NDArray[Any], extent: tuple[int, int]) -> MipLevels:
+    """Return maps (rows, columns, channels), whose sides are powers of two, with their means down to one texel."""
+    levels = [finest]
+    while levels[-1].shape[:2] != (1, 1):
+        levels.append(halved(levels[-1]))
+    return mip_levels(levels, extent)
+
+
 def halved(plane: _Plane) -> _Plane:
     """Return the means of two by two texels, along each side that is longer than one."""
     if plane.shape[0] > 1:

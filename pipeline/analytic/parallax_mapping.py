@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.mip_levels import MipLevels, halved, mip_levels
+from pipeline.analytic.mip_levels import MipLevels, mip_levels, pyramid
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import kernel
 from pipeline.truth.geometry.heightfield import height_field
@@ -40,10 +40,8 @@ def height_maps(fabric: Fabric, heights: Float64, extent: tuple[int, int], paral
     """
     if not parallax:
         return HeightMaps(mip_levels([np.zeros((1, 1, 1))], extent), 0.0, 0.0)
-    levels = [heights[..., None] - reference_plane(height_field(fabric))]
-    while levels[-1].size > 1:
-        levels.append(halved(levels[-1]))
-    return HeightMaps(mip_levels(levels, extent), float(levels[0].min()), float(levels[0].max()))
+    finest = heights[..., None] - reference_plane(height_field(fabric))
+    return HeightMaps(pyramid(finest, extent), float(finest.min()), float(finest.max()))
 
 
 @kernel

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pipeline.analytic.mip_levels import MipLevels, add_mean, halved, mip_levels
+from pipeline.analytic.mip_levels import MipLevels, add_mean, pyramid
 from pipeline.analytic.parallax_mapping import HeightMaps, displaced, height_maps
 from pipeline.analytic.torus_frame import sigma, spread
 from pipeline.compiled.arrays import Float32
@@ -64,14 +64,11 @@ def tabulate(fabric: Fabric, texels_per_yarn: int, parallax: bool = True) -> Pre
         t = surface.tangent
         products = np.stack([t[..., a] * t[..., b] for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], -1)
         parts.append(np.concatenate([np.ones_like(t[..., :1]), surface.normal, t, products], axis=-1) * here)
-    levels = [np.concatenate(parts, axis=-1)]
-    while levels[-1].shape[:2] != (1, 1):
-        levels.append(halved(levels[-1]))
     yarns = (fabric.warp, fabric.weft)
     seen = np.isfinite(surface.height)
     heights = np.where(seen, surface.height, surface.height[seen].min())
     return PrefilteredMaps(
-        maps=mip_levels(levels, (ends, picks)),
+        maps=pyramid(np.concatenate(parts, axis=-1), (ends, picks)),
         yarn=np.array([(yarn.roughness, yarn.blend) for yarn in yarns], np.float32),
         thickness=np.float32(fabric.optical_thickness),
         heights=height_maps(fabric, heights, (ends, picks), parallax),

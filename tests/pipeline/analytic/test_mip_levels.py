@@ -5,16 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analytic.mip_levels import add_mean, halved, mip_levels
+from pipeline.analytic.mip_levels import add_mean, pyramid
 
 TEXELS = 64
-
-
-def levels_of(plane):
-    maps = [plane]
-    while maps[-1].shape[:2] != (1, 1):
-        maps.append(halved(maps[-1]))
-    return mip_levels(maps, (8, 8))
 
 
 def read(maps, u, v, sigma, weight=1.0):
@@ -39,7 +32,7 @@ def test_the_kernel_has_the_mass_mean_and_variance_of_the_gaussian(octave):
     for column in range(28, 36):
         bright = np.zeros((TEXELS, TEXELS, 1))
         bright[:, column] = 1.0 / 64.0
-        maps, place = levels_of(bright), (column + 0.5) * width
+        maps, place = pyramid(bright, (8, 8)), (column + 0.5) * width
         kernel = np.array([read(maps, u, 0.3, sigma)[0] for u in centres])
         mass += kernel.sum()
         mean += kernel @ (centres - place)
@@ -50,13 +43,13 @@ def test_the_kernel_has_the_mass_mean_and_variance_of_the_gaussian(octave):
 
 
 def test_a_constant_is_read_as_it_is_a_coarse_reading_is_the_mean_and_a_narrow_one_bilinear(noise):
-    even, maps = levels_of(np.full((TEXELS, TEXELS, 1), 0.7)), levels_of(noise)
+    even, maps = pyramid(np.full((TEXELS, TEXELS, 1), 0.7), (8, 8)), pyramid(noise, (8, 8))
     for sigma in (1e-3, 0.06, 0.11, 0.9, 30.0):
         assert read(even, 3.3, -2.9, sigma)[0] == pytest.approx(0.7, rel=1e-6)
     np.testing.assert_allclose(read(maps, 1.0, 2.0, 1e3), noise.mean(axis=(0, 1)), rtol=1e-6)
     np.testing.assert_allclose(read(maps, 1.0, 2.0, 0.2, 2.5), 2.5 * read(maps, 1.0, 2.0, 0.2), rtol=1e-6)
     # At centres of texels their values, halfway the means of two and of four.
-    maps, width = levels_of(noise), 8.0 / TEXELS
+    maps, width = pyramid(noise, (8, 8)), 8.0 / TEXELS
     expected = {(5.5, 9.5): noise[9, 5], (6.0, 9.5): noise[9, 5:7].mean(axis=0)}
     expected |= {(6.0, 10.0): noise[9:11, 5:7].mean(axis=(0, 1)), (5.5, 0.0): noise[[-1, 0], 5].mean(axis=0)}
     for (x, y), value in expected.items():
@@ -66,7 +59,8 @@ def test_a_constant_is_read_as_it_is_a_coarse_reading_is_the_mean_and_a_narrow_o
 @pytest.mark.parametrize("sigma", [0.03, 0.1, 0.25])
 def test_a_moved_map_is_read_at_the_moved_place_and_a_mirrored_one_at_its_mirror_image(noise, sigma):
     """Moves by eight texels, which are whole texels of the four finest levels."""
-    maps, moved, mirrored = (levels_of(map_) for map_ in (noise, np.roll(noise, (8, -16), (0, 1)), noise[:, ::-1]))
+    planes = noise, np.roll(noise, (8, -16), (0, 1)), noise[:, ::-1]
+    maps, moved, mirrored = (pyramid(plane, (8, 8)) for plane in planes)
     for u, v in np.random.default_rng(1).random((20, 2)) * 8.0:
         own = read(maps, u, v, sigma)
         np.testing.assert_allclose(read(moved, u - 2.0, v + 1.0, sigma), own, rtol=1e-4)
