@@ -32,20 +32,17 @@ MOST_ELEMENTS: Final = TEXTURE_WIDTH * MOST_HEIGHT
 """Most elements of the buffer: of a texture that every WebGL 2 allows."""
 
 
-class Weights(PlacedArrays):
-    """Arrays that fill whole elements of four numbers."""
-
-    def add_perceptron(self, network: str, layers: Sequence[LinearLayer]) -> list[descriptor.PlacedLayer]:
-        """Append the layers of a network; inputs of the first one are filled up to whole elements."""
-        described = []
-        for index, layer in enumerate(layers):
-            rows, name = np.pad(layer.weights, ((0, -len(layer.weights) % 4), (0, 0))), f"{network} {index}"
-            biases = self.add(f"{name} biases", layer.biases, "biases")
-            weights = self.add(f"{name} weights", rows, "weights (inputs, outputs)")
-            activation = "none" if index == len(layers) - 1 else "ReLU"
-            entry = descriptor.PlacedLayer(network=network, biases=biases, weights=weights, activation=activation)
-            described.append(entry)
-        return described
+def _add_perceptron(buffer: PlacedArrays, network: str, layers: Sequence[LinearLayer]) -> list[descriptor.PlacedLayer]:
+    """Append the layers of a network; inputs of the first one are filled up to whole elements."""
+    described = []
+    for index, layer in enumerate(layers):
+        rows, name = np.pad(layer.weights, ((0, -len(layer.weights) % 4), (0, 0))), f"{network} {index}"
+        biases = buffer.add(f"{name} biases", layer.biases, "biases")
+        weights = buffer.add(f"{name} weights", rows, "weights (inputs, outputs)")
+        activation = "none" if index == len(layers) - 1 else "ReLU"
+        entry = descriptor.PlacedLayer(network=network, biases=biases, weights=weights, activation=activation)
+        described.append(entry)
+    return described
 
 
 _NEUMIP_ONNX: Final = {
@@ -63,7 +60,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
         raise BadInput("export", "kind", ", ".join(sorted(kinds)), f"{method.name} answers in front of flat cloth only")
     if level is not None:
         raise BadInput("export", "level", level, f"leave it out: {method.name} has no soft nodes")
-    network, weights = method.network_of(fabric), Weights(channels=4)
+    network, weights = method.network_of(fabric), PlacedArrays(channels=4)
     options = network.options
     weights.add("colours", colours(fabric).astype(np.float32), "k_s and k_d of warp and weft")
     constants, layers = _pack(network, weights)
@@ -124,7 +121,7 @@ def neumip_shader(method: Neumip, fabric: Fabric, level: int | None, kinds: Coll
 
 
 def _pack(
-    network: NeumipNetwork, weights: Weights
+    network: NeumipNetwork, weights: PlacedArrays
 ) -> tuple[dict[str, bool | int | float], list[descriptor.PlacedLayer]]:
     """Fill the buffer; return the constants of the source, and what the descriptor says of the layers."""
     options, (ends, picks) = network.options, network.repeat
@@ -135,7 +132,7 @@ def _pack(
             first, *others = layers_of(perceptron)
             # Rows of channels are filled up to whole elements, before those of directions.
             rows = np.insert(first.weights, [options.channels] * (-options.channels % 4), 0.0, axis=0)
-            described += weights.add_perceptron(name, [LinearLayer(rows, first.biases), *others])
+            described += _add_perceptron(weights, name, [LinearLayer(rows, first.biases), *others])
     starts["PYRAMID"] = weights.count
     for index, texture in enumerate(network.levels):
         weights.add(f"level {index}", texels_of(texture), "texels (rows, columns, channels); row 0 at the smallest v")
