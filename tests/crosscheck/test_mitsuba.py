@@ -21,8 +21,8 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.slab import density, sigma
 from tests.directions import unit
+from tests.pipeline.truth.cloths import equal_queries, woven
 from tests.presets import slow
-from weaves.fabric import load_fabric
 from weaves.families import Satin, Twill
 from weaves.mesh import repeat_mesh
 
@@ -59,12 +59,8 @@ FAST = {("plain", "across"), ("plain", "low_light")}
 
 
 def _fabric(preset, draft, warp, weft):
-    fabric = load_fabric(preset)
-    yarns = {
-        name: getattr(fabric, name).model_copy(update={"bend": bend, "blend": 1.0, "width": 1.0, "relief": 1.0})
-        for name, bend in (("warp", warp), ("weft", weft))
-    }
-    return fabric.model_copy(update=yarns | ({"draft": draft} if draft else {}))
+    rows = draft and draft.build().rows()
+    return woven(preset, rows, {"bend": warp}, {"bend": weft}, blend=1.0, width=1.0, relief=1.0)
 
 
 def _shape(name, mesh, colour, centre):
@@ -135,10 +131,7 @@ def _rendered(fabric, wi, wo):
 
 
 def _estimated(fabric, wi, wo):
-    one = np.ones(1, np.float32)
-    width = one * 20 * max(fabric.weave.repeat)
-    query = Queries.round(one * 0.3, one * 0.7, width, wi[None].astype(np.float32), wo[None].astype(np.float32))
-    answer = estimate(fabric, query, EXACT, 1)
+    answer = estimate(fabric, equal_queries(wi, wo, 20 * max(fabric.weave.repeat)), EXACT, 1)
     return answer.mean[0, 2:4].astype(np.float64), answer.standard_error[0, 2:4].astype(np.float64)
 
 

@@ -20,11 +20,10 @@ from pipeline.scenes.shade import coloured, colours_of
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
-from pipeline.truth.query import Queries
 from tests.directions import unit
 from tests.pipeline.analytic import methods
 from tests.pipeline.models.stand_ins import FakeMethod
-from tests.pipeline.truth.cloths import fixed
+from tests.pipeline.truth.cloths import equal_queries, fixed
 from tests.presets import slow
 from weaves.draft import Draft
 from weaves.fabric import Fabric
@@ -74,11 +73,10 @@ def legal_cloth(index):
 def look(index, fabric):
     """Return equal looks at a random place of the cloth."""
     random = RNG([8, index])
-    wo = np.float32(unit(between(random, 0.0, 86.0), random.uniform(0.0, 360.0)))
-    u, v = random.random(2) * fabric.weave.repeat
+    wo = unit(between(random, 0.0, 86.0), random.uniform(0.0, 360.0))
+    place = random.random(2) * fabric.weave.repeat
     sigma = math.exp(random.uniform(math.log(0.01), math.log(8.0)))
-    columns = (np.full(COUNT, x, np.float32) for x in (u, v, sigma))
-    return Queries.round(*columns, np.tile(wo, (COUNT, 1)), np.tile(wo, (COUNT, 1)))
+    return equal_queries(wo, wo, sigma, COUNT, place)
 
 
 def truth(fabric, queries):

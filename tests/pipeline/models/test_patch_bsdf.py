@@ -10,6 +10,7 @@ from pipeline.models.named import named_method
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.truth.query import Queries
 from tests.directions import sphere, unit
+from tests.pipeline.truth.cloths import equal_queries
 from tests.presets import slow
 from tests.refusals import refusal
 from weaves.colour import LUMINANCE
@@ -143,10 +144,8 @@ def test_viewers_on_both_sides_are_answered_together_by_any_method():
 
 @pytest.mark.slow
 def test_patches_that_nobody_sees_still_have_samples():
-    wo = np.tile(np.array(unit(89.8, 3.0), np.float32), (64, 1))
-    u, v, sigma = (np.full(64, value, np.float32) for value in (0.62, 0.57, 0.01))
-    bsdf = PatchBSDF(load_fabric("voile"))
-    sample = bsdf.sample(Queries.round(u, v, sigma, wo, wo), np.random.default_rng(1).random((64, 3)))
+    looks = equal_queries(unit(89.8, 3.0), unit(89.8, 3.0), 0.01, 64, (0.62, 0.57))
+    sample = PatchBSDF(load_fabric("voile")).sample(looks, np.random.default_rng(1).random((64, 3)))
     assert np.isfinite(sample.wi).all() and (sample.pdf > 0).all() and np.isfinite(sample.weight).all()
 
 

@@ -11,9 +11,9 @@ from pipeline.analytic.importance.lobes import STRAIGHT, Lobes
 from pipeline.analytic.importance.mixture import density_rows
 from pipeline.shader.golden import lobes_of
 from pipeline.shader.tables import BEHIND, EVERY, tabulate_sides
-from pipeline.truth.query import Queries
 from tests.directions import sphere, unit
 from tests.pipeline.shader.conftest import read
+from tests.pipeline.truth.cloths import equal_queries
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -59,11 +59,7 @@ def sides_of(fabric):
 def density(name, wi):
     """Return the density of directions by the Python, (N,), and the probability of light straight through."""
     row = look(name)
-    fabric, *_ = CONFIGURATIONS[name]
-    sides = sides_of(fabric)
-    one = np.ones(1, np.float32)
-    queries = Queries.round(row[0] * one, row[1] * one, row[2] * one, row[None, 8:11], row[None, 8:11])
-    lobes = lobes_of(sides, queries)
+    lobes = lobes_of(sides_of(CONFIGURATIONS[name][0]), equal_queries(row[8:11], row[8:11], row[2], 1, row[:2]))
     result = np.empty(len(wi), np.float32)
     repeated = Lobes(*(np.ascontiguousarray(np.repeat(column, len(wi), axis=0)) for column in lobes))
     wo = np.tile(row[8:11], (len(wi), 1))

@@ -2,19 +2,16 @@ import math
 import threading
 import time
 
-import numpy as np
 import pytest
 import torch
 
-from pipeline.truth.query import Queries
 from reports.measure import timing
 from reports.measure.timing import Contender, affordable, quartiles, thread_counts, time_side_by_side
+from tests.pipeline.truth.cloths import equal_queries
 
 
 def many_queries(rows):
-    vectors = np.tile(np.float32([0, 0, 1]), (rows, 1))
-    scalars = np.zeros(rows, np.float32)
-    return [(None, Queries.round(scalars, scalars, scalars + 1, vectors, vectors))]
+    return [(None, equal_queries([0, 0, 1], [0, 0, 1], rows=rows))]
 
 
 class Clock:
