@@ -227,8 +227,7 @@ def test_a_whole_run_and_each_verb_after_it(switch, tmp_path, recipe, call):
     assert products(tmp_path / "out").items() <= products(there).items()
     # What is gone or damaged is made again.
     shard = min(there.glob("datasets/*/*.parquet"), key=str)
-    whole = shard.read_bytes()
-    shard.write_bytes(whole[:200] + bytes([whole[200] ^ 1]) + whole[201:])
+    made_up.flip(shard)
     code, _, told = call("check", address)
     assert code == 2 and f"{shard}: damaged" in told
     weights = next(there.glob("models/*/model.safetensors"))

@@ -14,6 +14,7 @@ from pipeline.models.added.added_code import GROUP
 from pipeline.models.added.guarded import MethodFailed
 from reports.record import Record, read_records
 from tests.jobs.identities import assert_changed, ids
+from tests.pipeline.models.added.test_describe import METRIC
 from tests.refusals import refusal
 from weaves.errors import BadInput
 
@@ -23,12 +24,6 @@ class Theirs:
     covers = prepare = predict = bytes_stored = lambda self, *rest: True
     def __init__(self, rows=8): pass
 """
-
-METRIC = '''
-def largest(fabric, queries, answers, truth, standard_error):
-    """Largest error."""
-    return abs(answers - truth).max()
-'''
 
 NETWORK = METHOD + "    network = load = covers\n"
 

@@ -12,6 +12,7 @@ from jobs.run import executor
 from jobs.run.ledger import Ledger
 from jobs.run.outcome import work
 from tests.jobs import fake_stages as fake
+from tests.jobs.made_up import flip
 from weaves.errors import WorkFailed
 
 
@@ -24,10 +25,6 @@ def plan():
 
 def titles(tasks):
     return [task.title for task in tasks]
-
-
-def flip(path):
-    path.write_bytes(path.read_bytes()[:-1] + b"?")
 
 
 def test_manifests_hear_of_each_task_and_are_whole_before_a_task_that_needs_others(tmp_path, here, plan):

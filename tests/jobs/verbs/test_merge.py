@@ -42,9 +42,7 @@ def test_parts_of_a_data_set_become_the_whole(parts, tmp_path):
 def test_a_damaged_product_is_left_out_unless_the_other_folder_has_it(parts, tmp_path):
     first, second = parts.tasks[0], parts.tasks[1]
     for task, name in ((first, "a"), (second, "b")):
-        path = tmp_path / name / task.products[0]
-        content = path.read_bytes()
-        path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+        made_up.flip(tmp_path / name / task.products[0])
     made_up.execute([second], Ledger(tmp_path / "a"))
     code, said, told = parts("a", "b", "--out", "c")
     assert code == 2 and "9 finished tasks" in said
