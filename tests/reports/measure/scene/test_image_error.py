@@ -1,11 +1,16 @@
+import io
 import itertools
 import math
 
+import matplotlib.image
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from reports.measure.scene.image_error import PERCEIVED, image_errors, noise_floor
+from reports.images import tiles
+from reports.images.exr import read_exr, write_exr
+from reports.images.tiles import flip_tile, relative_tile
+from reports.measure.scene.image_error import PERCEIVED, image_errors, noise_floor, relative_differences
 from reports.record import Record
 from tests.refusals import refusal
 from weaves.colour import linear_rgb
@@ -110,6 +115,27 @@ def test_a_record_for_every_number_that_is_finite():
     assert records["psnr"].unit == "dB"
     equal, _ = measured(CLOTH, CLOTH, EXACT, ALL)
     assert not {"psnr", "psnr_floor"} & equal.keys() and {"ssim", "ssim_floor"} <= equal.keys()
+
+
+def test_maps_average_to_the_errors_tiles_are_red_where_bright_and_differences_signed_shares(tmp_path):
+    sign = np.where(X < SIZE // 2, 1.3, 0.7)[..., None]
+    errors, maps = measured(sign * CLOTH, CLOTH, 0.01 * CLOTH, DISC)
+    write_exr(tmp_path / "differences.exr", maps)
+    exr = read_exr(tmp_path / "differences.exr")
+    assert (exr.channels["lit"] == DISC).all()
+    for name in ("flip_ldr", "flip_hdr", "delta_e", "ssim"):
+        assert exr.channels[name][DISC].mean() == pytest.approx(errors[name].value, rel=1e-5)
+    squares = exr.stack("relative.R", "relative.G", "relative.B")[DISC].astype(float) ** 2
+    relative = errors["mse_relative"].value + errors["mse_relative_floor"].value
+    assert squares.mean() == pytest.approx(relative, rel=1e-5)
+    for tile in (flip_tile(exr), flip_tile(exr, "flip_hdr"), relative_tile(exr)):
+        rgba = matplotlib.image.imread(io.BytesIO(tile), format="png")[:: tiles.SCALE, :: tiles.SCALE]
+        assert ((rgba[..., 3] > 0) == DISC).all()
+    assert ((rgba[..., 0] > rgba[..., 2]) == (X < SIZE // 2))[DISC].all()
+    maps = relative_differences(sign * CLOTH, CLOTH, DISC, epsilon=1e-12)
+    assert set(maps) == {f"relative.{name}" for name in "RGBY"}
+    for plane in maps.values():
+        np.testing.assert_allclose(plane, np.where(DISC, sign[..., 0] - 1.0, 0.0), rtol=1e-6)
 
 
 def broken(array, value):
