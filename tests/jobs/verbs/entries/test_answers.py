@@ -29,11 +29,16 @@ def out(tmp_path, recipe):
     return tmp_path / "out"
 
 
-def measured(recipe, folder, out):
+def done(recipe, folder, out):
+    """Return the task that measures an entry, when it is done."""
     (task,) = (one for one in plan(load_recipe(recipe, [str(folder / "entry.toml")])) if isinstance(one, OfAnswers))
     task.run(out, lambda share: None)
     assert all((out / path).is_file() for path in task.products)
-    return read_records([out / task.records])
+    return task
+
+
+def measured(recipe, folder, out):
+    return read_records([out / done(recipe, folder, out).records])
 
 
 def held_out_rows(recipe, out):
@@ -132,9 +137,7 @@ def test_an_entry_changes_no_other_task_but_the_page_and_goes_when_it_is_not_nam
 
 
 def test_the_copy_is_the_same_entry(recipe, entry, out):
-    folder = entry()
-    (task,) = (one for one in plan(load_recipe(recipe, [str(folder / "entry.toml")])) if isinstance(one, OfAnswers))
-    task.run(out, lambda share: None)
+    task = done(recipe, entry(), out)
     copy = out / task.products[-2]
     assert [one.id for one in plan(load_recipe(recipe, [str(copy)])) if isinstance(one, OfAnswers)] == [task.id]
 

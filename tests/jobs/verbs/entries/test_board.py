@@ -2,10 +2,8 @@ import json
 
 import pytest
 
-from jobs.plan.measurements.answers import OfAnswers
-from jobs.plan.plan import plan
-from jobs.recipe.load import load_recipe
 from tests.jobs import made_up
+from tests.jobs.verbs.entries.test_answers import done
 
 
 @pytest.fixture
@@ -13,14 +11,7 @@ def measured(recipe, entry, tmp_path):
     """Return a function that measures an entry, and returns its folder among the products."""
     out = tmp_path / "out"
     made_up.finished(recipe, out, ["generate"])
-
-    def measured(name, **form):
-        form = str(entry(name=name, **form) / "entry.toml")
-        (task,) = (one for one in plan(load_recipe(recipe, [form])) if isinstance(one, OfAnswers))
-        task.run(out, lambda share: None)
-        return out.joinpath(task.records).parent
-
-    return measured
+    return lambda name, **form: (out / done(recipe, entry(name=name, **form), out).records).parent
 
 
 def test_a_board_has_the_entries_of_each_class(measured, call, tmp_path):
