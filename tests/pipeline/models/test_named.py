@@ -4,7 +4,6 @@ import pytest
 from pipeline.models.fallback import fallback_rows
 from pipeline.models.named import named_method, untrained_names
 from pipeline.truth.query import Queries
-from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 LIGHTS = np.array([[0.6, 0.0, 0.8], [0.6, 0.0, -0.8]])
@@ -42,20 +41,3 @@ def test_every_method_answers_any_query_and_knows_what_the_fallback_lets_through
         np.testing.assert_array_equal(rows[:, :4], method.predict(denim, queries, 0))
         error = {"selvage": 0.01, "soft_nodes": 0.01, "point_sampled": 0.1}.get(name, 0.0)
         np.testing.assert_allclose(method.transparency(denim, queries, 0), expected[:, 4], rtol=0, atol=error)
-
-
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("selvage:2", "above 0 and below 1"),
-        ("selvage:two", "above 0 and below 1"),
-        ("soft_nodes:3", "1, 2, 4 or 8"),
-        ("prefiltered:4", "prefiltered has no settings"),
-        ("point_sampled:x", "a number k after the colon"),
-        ("", "the folder of a trained model or a name"),
-    ],
-)
-def test_other_names_get_a_sentence(name, says):
-    with pytest.raises(BadInput, match="--method") as refused:
-        named_method(name, "render", "--method")
-    assert says in str(refused.value)

@@ -89,23 +89,6 @@ def test_code_that_ends_its_process_or_needs_more_memory_than_its_limit_gets_a_s
     assert sentence in refusal(describe, f"{path}:Theirs", {}, {"memory": 0.5})
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        *((text, "must be MODULE:NAME") for text in ("theirs", ":Theirs", "theirs:")),
-        ("nothing_of_this_name:Theirs", "there is no module nothing_of_this_name"),
-        ("nothing.py:Theirs", "there is no file nothing.py"),
-        ("a-b:Theirs", "a-b is no name of a module"),
-        ("sys:path", "sys is part of Python"),
-        ("weaves.fabric:Fabric", "is part of this package"),
-    ],
-)
-def test_a_source_of_another_form_is_refused(text, sentence, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(BadInput, match=sentence):
-        describe(text, {}, {})
-
-
 METRIC = '''
 def largest(fabric, queries, answers, truth, standard_error):
     """Largest error
