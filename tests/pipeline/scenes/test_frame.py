@@ -10,6 +10,7 @@ from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.shipped import SHIPPED, developed, sheet
 from pipeline.scenes.variant import llvm_works
 from pipeline.truth.query import faults
+from tests.pipeline.scenes.test_gbuffer import covariance
 
 SCALAR = SceneOptions(variant="scalar_rgb", environment_directions=64)
 SIZE = (64, 48)
@@ -106,10 +107,7 @@ def test_a_plane_agrees_with_its_rays():
     assert (gbuffer.curvature == 0).all()
 
     # The covariance of the ellipse is pixel_sigma^2 J J^T, whatever its axes are called.
-    cosine, sine = np.cos(gbuffer.angle), np.sin(gbuffer.angle)
-    axes = np.stack([cosine, -sine, sine, cosine], axis=-1).reshape(-1, 2, 2)
-    axes *= np.stack([gbuffer.sigma, gbuffer.sigma_minor], axis=-1)[:, None]
-    ours = axes @ np.swapaxes(axes, 1, 2)
+    ours = covariance(gbuffer)
     centre, h = uv(x, y), 1e-3
     step = np.stack([uv(x + 1, y) - centre, uv(x, y + 1) - centre], axis=-1)
     slope = np.stack([uv(x + h, y) - uv(x - h, y), uv(x, y + h) - uv(x, y - h)], axis=-1) / (2 * h)
