@@ -1,6 +1,11 @@
-"""Records of pages: `twillight compare` and `records merge`, and `results`, which writes the tables of a page."""
+"""Records of pages: `twillight compare` and `records merge`, and `results`, which writes the tables of a page.
 
-from collections.abc import Sequence
+In one file of several machines, numbers that a machine decides (times, rates, memory: `of_machine` of
+`reports.catalogue.MetricRow`) are kept of each machine, whose name is then part of their provenance. Other numbers are
+kept once where all machines have the same one.
+"""
+
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +15,8 @@ from jobs.recipe.load import load_recipe
 from jobs.terminal import number, print_lines, print_result, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Local, Out, RecipeName
 from pipeline.atomic import atomic_write
-from reports.machines import join, names_of, refuse_several
-from reports.record import OF_A_PAGE, Record, read_machine, read_records, write_records
+from reports.catalogue import metric_row
+from reports.record import OF_A_PAGE, Machine, Record, read_machine, read_records, write_records
 from weaves.errors import BadInput
 from weaves.reading import MIB, read_text
 
@@ -127,20 +132,66 @@ def merge_records(
         raise BadInput(_MERGE, "--out", str(out), "is one of the files to join; another name is needed")
     machines = [read_machine(file) for file in sources]
     names = names_of(machines)
-    joined = join(dict(zip(names, (read_records([file]) for file in sources), strict=True)))
+    records, shared, unlike = join(dict(zip(names, (read_records([file]) for file in sources), strict=True)))
     shared_packages = set.intersection(*(set(machine.packages.items()) for machine in machines))
     packages = {name: version for name, version in machines[0].packages.items() if (name, version) in shared_packages}
-    write_records(out, joined.records, machines[0].model_copy(update={"cpu": "; ".join(names), "packages": packages}))
-    _print_times(joined.records, names)
+    write_records(out, records, machines[0].model_copy(update={"cpu": "; ".join(names), "packages": packages}))
+    _print_times(records, names)
     for index, (name, machine) in enumerate(zip(names, machines, strict=True)):
         print_lines(f"{_letter(index)}: {name}, {machine.date}")
-    alike = f"{joined.shared:,} are alike and kept once"
-    print_lines(f"{out}: {len(joined.records):,} Records of {len(names)} machines; {alike}")
-    if joined.unlike:
-        a, b = joined.unlike[0]
+    print_lines(f"{out}: {len(records):,} Records of {len(names)} machines; {shared:,} are alike and kept once")
+    if unlike:
+        a, b = unlike[0]
         what = " ".join(filter(None, (a.metric, "of", a.method, a.setting, a.fabric or a.scene)))
-        unlike = f"{len(joined.unlike):,} numbers differ and both are kept"
-        print_lines(f"{unlike}, such as {what}: {a.value:g} and {b.value:g}")
+        both = f"{len(unlike):,} numbers differ and both are kept"
+        print_lines(f"{both}, such as {what}: {a.value:g} and {b.value:g}")
+
+
+def names_of(machines: Sequence[Machine]) -> list[str]:
+    """Return a name for each machine; those of equal machines end in their number."""
+    names = []
+    for m in machines:
+        threads = f"{m.threads} thread{'' if m.threads == 1 else 's'}"
+        names.append(f"{m.cpu}, {m.cores} cores, {threads}, {m.system}")
+    return [f"{name} ({names[:i].count(name) + 1})" if names.count(name) > 1 else name for i, name in enumerate(names)]
+
+
+def join(parts: Mapping[str, Sequence[Record]]) -> tuple[list[Record], int, list[tuple[Record, Record]]]:
+    """Join the Records of machines, given by the names of the machines.
+
+    Return the Records; how many numbers several machines have alike, which are kept once; and pairs of one number that
+    two machines have differently, which are both kept. BadInput if Records of one machine hold several already.
+    """
+    records: list[Record] = []
+    known: dict[tuple[object, ...], Record] = {}
+    shared, unlike = 0, []
+    for name, part in parts.items():
+        refuse_several(part, name)
+        for record in part:
+            own = record.model_copy(update={"provenance": record.provenance.model_copy(update={"machine": name})})
+            if metric_row(record.metric).of_machine:
+                records.append(own)
+                continue
+            subject = record.subject("dataset", "model", "seed", "origin", "version")  # whatever the recipe is called
+            first = known.setdefault(subject, record)
+            if first is record:
+                records.append(record)
+            elif _number(first) == _number(record):
+                shared += 1
+            else:
+                records.append(own)
+                unlike.append((first, record))
+    return records, shared, unlike
+
+
+def refuse_several(records: Sequence[Record], where: str) -> None:
+    """Raise BadInput if Records hold the numbers of several machines."""
+    if any(record.provenance.machine for record in records):
+        raise BadInput(where, "", "holds Records of several machines", "the Records of one machine are needed")
+
+
+def _number(record: Record) -> tuple[object, ...]:
+    return record.value, record.standard_error, record.low, record.high, record.count, record.curve
 
 
 def _print_times(records: Sequence[Record], names: Sequence[str]) -> None:

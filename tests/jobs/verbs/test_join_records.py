@@ -1,6 +1,6 @@
 import pytest
 
-from reports.machines import join, names_of, refuse_several
+from jobs.verbs.records import join, names_of, refuse_several
 from reports.record import Provenance, Record, this_machine
 from tests.refusals import refusal
 
@@ -15,18 +15,16 @@ def of(machine, record):
 def test_times_stay_apart_equal_numbers_are_kept_once_and_equal_machines_are_numbered():
     other = MSE.model_copy(update={"provenance": Provenance(recipe="two", dataset="d")})
     joined = join({"A": [MSE, TIME], "B": [other, TIME], "C": [TIME]})
-    assert joined.records == [MSE, of("A", TIME), of("B", TIME), of("C", TIME)]
-    assert (joined.shared, joined.unlike) == (1, [])
+    assert joined == ([MSE, of("A", TIME), of("B", TIME), of("C", TIME)], 1, [])
     other = MSE.model_copy(update={"value": 2.5})
-    joined = join({"A": [MSE], "B": [other]})
-    assert joined.records == [MSE, of("B", other)] and joined.unlike == [(MSE, other)]
+    assert join({"A": [MSE], "B": [other]}) == ([MSE, of("B", other)], 0, [(MSE, other)])
     machine = this_machine(1)
     names = names_of([machine, machine.model_copy(update={"cores": machine.cores + 1}), machine])
     assert len(set(names)) == 3 and names[0].endswith("(1)") and names[2].endswith("(2)")
     assert machine.cpu in names[1] and f"{machine.cores + 1} cores" in names[1]
-    joined = join({"A": [MSE, TIME], "B": [TIME]})
-    assert refusal(refuse_several, joined.records, "file").startswith("file: holds Records of several machines")
-    assert refusal(join, {"C": joined.records}).startswith("C: holds")
+    records, _, _ = join({"A": [MSE, TIME], "B": [TIME]})
+    assert refusal(refuse_several, records, "file").startswith("file: holds Records of several machines")
+    assert refusal(join, {"C": records}).startswith("C: holds")
 
 
 @pytest.mark.parametrize(
@@ -34,4 +32,4 @@ def test_times_stay_apart_equal_numbers_are_kept_once_and_equal_machines_are_num
 )
 def test_numbers_of_other_subjects_are_no_pair(change):
     other = MSE.model_copy(update=change)
-    assert join({"A": [MSE], "B": [other]}).records == [MSE, other]
+    assert join({"A": [MSE], "B": [other]})[0] == [MSE, other]
