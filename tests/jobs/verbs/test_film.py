@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reports.images.video import write_film
+from jobs.verbs.render import write_film
 
 
 def gradient(frame):
@@ -13,7 +13,7 @@ def test_a_film_has_its_frames_and_their_colours(tmp_path):
     """H.264 keeps flat grey to 2 codes of 255."""
     av = pytest.importorskip("av")
     for name in ("a.mp4", "b.mp4"):
-        write_film(tmp_path / name, map(gradient, range(5)), (32, 24), 24)
+        write_film(tmp_path / name, map(gradient, range(5)), (32, 24))
     with av.open(str(tmp_path / "a.mp4")) as film:
         shown = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
     assert len(shown) == 5
@@ -32,5 +32,5 @@ def test_a_film_that_fails_leaves_the_one_before(tmp_path):
 
     (tmp_path / "a.mp4").write_bytes(b"before")
     with pytest.raises(KeyboardInterrupt):
-        write_film(tmp_path / "a.mp4", frames(), (32, 24), 24)
+        write_film(tmp_path / "a.mp4", frames(), (32, 24))
     assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"] and (tmp_path / "a.mp4").read_bytes() == b"before"
