@@ -92,7 +92,7 @@ def results(
 
     BadInput if the recipe has no page in `out`, its Records are incomplete, or `readme` has no such block.
     """
-    from reports.tables.documents import README_BLOCK, block, readme_block, results_page, with_block
+    from reports.tables.documents import readme_block, results_page, split_at_block
 
     name = load_recipe(recipe, add).name
     source = records_file(out, name)
@@ -101,8 +101,8 @@ def results(
         if not readme.is_file():
             raise BadInput(str(readme), "", "does not exist", "a Markdown file with a generated block is needed")
         text = read_text(readme, MIB, "a Markdown file")
-        old = block(text, README_BLOCK, str(readme))
-        fresh = with_block(text, README_BLOCK, readme_block(records, machine, old, str(source)), str(readme))
+        before, old, after = split_at_block(text, str(readme))
+        fresh = f"{before}{readme_block(records, machine, old, str(source)).rstrip()}\n{after}"
         if fresh != text:
             atomic_write(readme, fresh.encode())
         print_lines(f"{readme}: table of {name} {'unchanged' if fresh == text else 'written'}")
