@@ -12,7 +12,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from jobs.recipe.load import load_recipe
-from jobs.terminal import number, print_lines, print_result, print_table
+from jobs.terminal import number, print_lines, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Local, Out, RecipeName
 from pipeline.atomic import atomic_write
 from reports.catalogue import metric_row
@@ -69,7 +69,14 @@ def compare(
     unlike = refuse_other_machine(machine_a, machine_b, other_machine)
     shared = differences(first, second)
     for table in difference_tables(shared):
-        print_result(table)
+        print_lines("")
+        print_table(
+            table.columns,
+            [(row.label, *row.cells) for row in table.rows],
+            text=[column for index, column in enumerate(table.columns) if not table.numeric(index)],
+            title=table.title,
+            styles={index: "bold" for index, row in enumerate(table.rows) if row.kind == "marked"},
+        )
     print_lines("", *(f"{sentence}." for sentence in (*unlike, *shared.unlike, *busy(first, second))))
     left = [f"{count} only in {name}" for name, count in (("A", shared.only_a), ("B", shared.only_b)) if count]
     marked = sum(row.result not in NO_DIFFERENCE for row in (*shared.times, *shared.errors))
