@@ -57,9 +57,9 @@ def relative_tile(differences: Exr) -> bytes:
     return _tile("RdBu_r", 0.5 + 0.5 * share, differences.channels["lit"] != 0)
 
 
-def flip_tile(differences: Exr, channel: str = "flip_ldr") -> bytes:
+def flip_tile(differences: Exr) -> bytes:
     """Return a map of FLIP, black to white from 0 to 1 by way of purple and orange, as its authors show it."""
-    return _tile("magma", differences.channels[channel], differences.channels["lit"] != 0)
+    return _tile("magma", differences.channels["flip_ldr"], differences.channels["lit"] != 0)
 
 
 def _tile(colours: str, share: npt.NDArray[np.floating], shown: npt.NDArray[np.bool_]) -> bytes:
