@@ -2,7 +2,7 @@
 
 import re
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from jobs.terminal import duration, print_lines, progress
 from jobs.verbs.parameters import NOTHING, Local, SceneName, Whole, named_flags
 from pipeline import versions
-from pipeline.atomic import atomic_path, atomic_write, refuse_unwritable
+from pipeline.atomic import atomic_write, refuse_unwritable
 from pipeline.cores import cores
 from pipeline.scenes.catalogue import load_scene
 from pipeline.scenes.loading import MOST_PIXELS, Loaded, load
@@ -25,7 +25,7 @@ from pipeline.scenes.scene import Cloth, Scene
 from pipeline.scenes.sources import worn
 from pipeline.truth.conventions import COMPONENTS
 from reports.images.exr import RGB, write_exr
-from reports.images.tiles import STOPS, Bytes8, Tone, displayed, opaque, png
+from reports.images.tiles import STOPS, Bytes8, Tone, displayed, opaque, png, write_film
 from reports.options import ShotOptions
 from weaves.errors import BadInput, WorkFailed
 from weaves.fabric import load_fabric
@@ -33,8 +33,6 @@ from weaves.validation import validated
 
 _WHERE: Final = "render"
 _MOST_FRAMES: Final = 100_000
-_RATE: Final = 24  # frames a second of a film
-_QUALITY: Final = "16"  # constant rate factor of H.264: a person sees no loss
 _LAYERS: Final = {"normal": "XYZ", "uv": "UV", "sigma": ("major", "minor")}
 _HALF: Final = ("normal", "sigma", "fabric")  # three digits are enough
 
@@ -227,24 +225,3 @@ def shown_at(part: PicturePart) -> tuple[slice, slice]:
     """Return where a window is in its picture."""
     left, top, width, height = part.window
     return slice(top, top + height), slice(left, left + width)
-
-
-def write_film(path: Path, frames: Iterable[Bytes8], size: tuple[int, int]) -> None:
-    """Write a film as MP4, H.264 by PyAV, an optional library; whole or not at all.
-
-    Frames are sRGB codes (H, W, 3) of the `size` width and height, both even.
-    """
-    import av
-    from av.video.reformatter import ColorRange, Colorspace
-
-    stable = {"fflags": "+bitexact"}
-    with atomic_path(path) as temporary, av.open(str(temporary), "w", format="mp4", options=stable) as file:
-        stream = file.add_stream("libx264", rate=_RATE, options={"crf": _QUALITY, "threads": "1"})
-        stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
-        # Players take these for large pictures; without the marks some take others for small ones.
-        stream.codec_context.colorspace, stream.codec_context.color_range = Colorspace.ITU709, ColorRange.MPEG
-        for codes in frames:
-            frame = av.VideoFrame.from_ndarray(codes, format="rgb24")
-            frame = frame.reformat(format="yuv420p", dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG)
-            file.mux(stream.encode(frame))
-        file.mux(stream.encode())

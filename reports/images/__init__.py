@@ -1,1 +1,1 @@
-"""Pictures as files and bytes: exr (frames as layers), tiles (PNG, tone curves)."""
+"""Pictures as files and bytes: exr (frames as layers), tiles (PNG, tone curves, MP4)."""

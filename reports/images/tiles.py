@@ -1,4 +1,4 @@
-"""Pictures without words: renderings, differences, and maps of the repeat, as PNG bytes.
+"""Pictures without words: renderings, differences, and maps of the repeat, as PNG bytes; and films, as MP4.
 
 Renderings are tone mapped alike: times `EXPOSURE`, cut at 1, sRGB encoding (from colour-science, by way of
 `weaves.colour`); pixels without cloth are transparent. Every pixel becomes a square of `SCALE`.
@@ -10,8 +10,9 @@ Tone curves of renderings of one's own, `EXPOSURE` 2^exposure times brighter, be
 """
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any, Final, Literal
 
 import matplotlib as mpl
@@ -20,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from pipeline.atomic import atomic_path
 from reports.images.exr import RGB, Exr
 from weaves.colour import LUMINANCE, linear_rgb
 from weaves.fabric import Fabric
@@ -32,6 +34,8 @@ DIFFERENCE_RANGE: Final = 0.5  # difference, as a share of the truth's mean lumi
 SCALE: Final = 2
 CELLS: Final = 16  # yarns shown in each direction by the maps of the repeat
 CELL_PIXELS: Final = 12
+_FRAME_RATE: Final = 24  # frames a second of a film
+_QUALITY: Final = "16"  # constant rate factor of H.264: a person sees no loss
 
 Bytes8 = npt.NDArray[np.uint8]
 
@@ -136,3 +140,24 @@ def displayed(linear: npt.NDArray[np.floating], tone: Tone = "srgb", exposure: f
     """Return linear RGB (…, 3), at least 0, as sRGB codes; `exposure` counts stops above that of the page."""
     rgb = EXPOSURE * 2.0**exposure * np.asarray(linear, np.float64)
     return encoded(rgb if tone == "srgb" else rgb / (1.0 + (rgb @ np.array(LUMINANCE))[..., None]))
+
+
+def write_film(path: Path, frames: Iterable[Bytes8], size: tuple[int, int]) -> None:
+    """Write a film as MP4, H.264 by PyAV, an optional library; whole or not at all.
+
+    Frames are sRGB codes (H, W, 3) of the `size` width and height, both even.
+    """
+    import av
+    from av.video.reformatter import ColorRange, Colorspace
+
+    stable = {"fflags": "+bitexact"}
+    with atomic_path(path) as temporary, av.open(str(temporary), "w", format="mp4", options=stable) as file:
+        stream = file.add_stream("libx264", rate=_FRAME_RATE, options={"crf": _QUALITY, "threads": "1"})
+        stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+        # Players take these for large pictures; without the marks some take others for small ones.
+        stream.codec_context.colorspace, stream.codec_context.color_range = Colorspace.ITU709, ColorRange.MPEG
+        for codes in frames:
+            frame = av.VideoFrame.from_ndarray(codes, format="rgb24")
+            frame = frame.reformat(format="yuv420p", dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG)
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode())

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jobs.verbs.render import write_film
+from reports.images.tiles import write_film
 
 
 def gradient(frame):
