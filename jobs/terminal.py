@@ -4,21 +4,16 @@ Names, sources and messages come from files of others. Characters that a termina
 the cursor or set its title, are replaced, and brackets and colons mean themselves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.table import Table
 
 from weaves.errors import printable
-
-if TYPE_CHECKING:
-    from reports.tables.table import ResultTable
 
 Item = TypeVar("Item")
 
@@ -73,18 +68,6 @@ def print_table(
     console = Terminal()
     console.width = console.width if console.is_terminal else _WIDEST
     console.print(table)
-
-
-def print_result(result: ResultTable) -> None:
-    """Print a table of results after an empty line; marked rows are bold."""
-    print_lines("")
-    print_table(
-        result.columns,
-        [(row.label, *row.cells) for row in result.rows],
-        text=[column for index, column in enumerate(result.columns) if not result.numeric(index)],
-        title=result.title,
-        styles={index: "bold" for index, row in enumerate(result.rows) if row.kind == "marked"},
-    )
 
 
 @contextmanager

@@ -68,7 +68,10 @@ def squared_error(
     measured, noise = float(squared.mean()), float(variance.mean())
     rows = (squared - variance).mean(axis=1)
     value, spread = float(rows.mean()), float(stats.sem(rows)) if len(rows) > 1 else 0.0
-    low, high = _interval(rows, value, spread, resamples)
+    low, high = value - 1.96 * spread, value + 1.96 * spread
+    if resamples > 1 and spread != 0.0:
+        ends = bootstrap((rows,), np.mean, resamples, 0).confidence_interval
+        low, high = float(ends.low), float(ends.high)
     return Error(value, spread, low, high, measured, noise, float(t.mean()), len(rows))
 
 
@@ -123,13 +126,6 @@ def ratio(numerator: tuple[float, float], denominator: tuple[float, float]) -> t
     (a, error_a), (b, error_b) = numerator, denominator
     spread = 1.96 * math.hypot(error_a / a, error_b / b)
     return a / b, a / b * math.exp(-spread), a / b * math.exp(spread)
-
-
-def _interval(rows: Float64, value: float, spread: float, resamples: int) -> tuple[float, float]:
-    if resamples < 2 or len(rows) < 2 or spread == 0.0:
-        return value - 1.96 * spread, value + 1.96 * spread
-    ends = bootstrap((rows,), np.mean, resamples, 0).confidence_interval
-    return float(ends.low), float(ends.high)
 
 
 def bootstrap(columns: tuple[npt.NDArray[Any], ...], statistic: Callable[..., Any], resamples: int, seed: int) -> Any:

@@ -46,15 +46,10 @@ def mean(values: Sequence[float]) -> float:
     return float(np.mean(values))
 
 
-def mean_over_seeds(records: Sequence[Record]) -> list[Record]:
-    """Return Records with one for each number that several trainings have, in the order of the first ones."""
-    return statistic_over_seeds(records, mean)
+def over_trainings(records: Sequence[Record], statistic: Statistic = mean) -> list[Record]:
+    """Return Records with one for each number that several trainings have, in the order of the first ones.
 
-
-def statistic_over_seeds(records: Sequence[Record], statistic: Statistic) -> list[Record]:
-    """Return Records with one for each number that several trainings have: a statistic of theirs, such as `min`.
-
-    The statistic receives the numbers in the order of the seeds.
+    It is a statistic of theirs, such as `min`, which receives the numbers in the order of the seeds.
     """
     groups: dict[Hashable, list[Record]] = {}
     for index, record in enumerate(records):
@@ -66,7 +61,7 @@ def statistic_over_seeds(records: Sequence[Record], statistic: Statistic) -> lis
 
 def first_training(records: Sequence[Record]) -> list[Record]:
     """Return Records with those of the first training alone of each number that several trainings have."""
-    return statistic_over_seeds(records, lambda values: values[0])
+    return over_trainings(records, lambda values: values[0])
 
 
 def by_seed(records: Sequence[Record]) -> list[list[Record]]:
@@ -96,7 +91,7 @@ def over_seeds(
     def decorated(table: Table) -> Table:
         @functools.wraps(table)
         def condensed(records: Sequence[Record]) -> pd.DataFrame:
-            frame = table(mean_over_seeds(records))
+            frame = table(over_trainings(records))
             if "method" not in frame:
                 return frame
             counts = trainings(records)

@@ -15,7 +15,7 @@ from pipeline.models.catalogue import CLASSES
 from pipeline.scenes.shipped import SHIPPED
 from pipeline.shards.schema import SCHEMAS
 from pipeline.truth.estimator import ESTIMATORS
-from reports.tables.documents import README_BLOCK, block, with_block
+from reports.tables.documents import split_at_block
 from weaves.fabric import PRESETS, load_fabric
 
 ROOT = Path(__file__).parents[1]
@@ -58,10 +58,11 @@ def commands_of(path, program):
 
 def test_the_readme_is_one_screen_and_a_half_and_no_number_of_it_is_typed_by_hand():
     text = text_of(ROOT / "README.md")
-    assert len(text) <= LONGEST_README and "Recipe `quick`" in block(text, README_BLOCK, "README.md")
+    before, block, after = split_at_block(text, "README.md")
+    assert len(text) <= LONGEST_README and "Recipe `quick`" in block
     least = PROJECT["requires-python"].removeprefix(">=")
     assert f"Python {least} or newer" in text
-    prose = with_block(text, README_BLOCK, "", "README.md")
+    prose = before + after
     for pattern in (r"<!--.*?-->", r"^    .+$", r"`[^`\n]+`", r"\]\([^)]*\)"):
         prose = re.sub(pattern, "", prose, flags=re.M)
     for name in NAMES_WITH_DIGITS:

@@ -65,10 +65,10 @@ def repeat_mesh(fabric: Fabric, vertices_per_cell: int = 64, repeats: tuple[int,
     walls = [_walls(pieces, cells, floor), _walls(turned, cells[::-1], floor)]
     # The second walls were found in the turned cloth, x and y swapped, which also turns every triangle over.
     walls[1] = Mesh(walls[1].vertices[:, [1, 0, 2]], walls[1].faces[:, ::-1])
-    yarns = (_joined([_grids(piece) for piece in pieces if piece.family == family]) for family in (WARP, WEFT))
+    yarns = (joined([_grids(piece) for piece in pieces if piece.family == family]) for family in (WARP, WEFT))
     copies = np.array([(i * cells[1], j * cells[0], 0.0) for j in range(repeats[1]) for i in range(repeats[0])])
-    meshes = (*yarns, _joined(walls))
-    return RepeatMesh(*(_joined([Mesh(mesh.vertices + at, mesh.faces) for at in copies]) for mesh in meshes))
+    meshes = (*yarns, joined(walls))
+    return RepeatMesh(*(joined([Mesh(mesh.vertices + at, mesh.faces) for at in copies]) for mesh in meshes))
 
 
 def _pieces(fabric: Fabric, steps: int) -> list[_Piece]:
@@ -127,7 +127,7 @@ def _walls(pieces: Sequence[_Piece], cells: tuple[int, ...], floor: float) -> Me
                 _lay(right, grid, piece, None)
         # What is left of a cell's first border lies in the cell before it.
         walls.append(_steps(border, grid, left if border else np.roll(left, 1, axis=1), right))
-    return _joined(walls)
+    return joined(walls)
 
 
 def _lay(profile: Floats, grid: Floats, piece: _Piece, column: Literal[0, -1] | None) -> None:
@@ -159,7 +159,8 @@ def _steps(border: float, grid: Floats, left: Floats, right: Floats) -> Mesh:
     return Mesh(triangles.reshape(-1, 3), np.arange(triangles.size // 3).reshape(-1, 3))
 
 
-def _joined(meshes: Sequence[Mesh]) -> Mesh:
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Return meshes as one, in their order."""
     start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     vertices = [np.empty((0, 3)), *(mesh.vertices for mesh in meshes)]
     faces = [np.empty((0, 3), np.int64), *(mesh.faces + s for mesh, s in zip(meshes, start[:-1], strict=True))]

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from PIL import Image
 
+from jobs.verbs.render import shown_at
 from pipeline.cores import cores
 from pipeline.models.named import named_method
 from pipeline.scenes.loading import load
@@ -85,14 +86,13 @@ class OneColour:
         return self._method.colours(fabric, queries.take(first), seed)[back.ravel()]
 
 
-def rendered(size: tuple[int, int], side: int = 1) -> Any:
-    """Return the picture in linear RGB; `side`: rays along each side of a pixel."""
+def rendered() -> Any:
+    """Return the picture in linear RGB."""
     loaded = load(SCENE, SceneOptions(environment_directions=9, environment_samples=256, largest_sigma=4.0))
-    rgb = np.empty((*size[::-1], 3), np.float32)
+    rgb = np.empty((*SIZE[::-1], 3), np.float32)
     with ThreadPoolExecutor(cores()) as pool:
-        for part in picture(loaded, OneColour(), pool, size, side=side):
-            left, top, width, height = part.window
-            rgb[top : top + height, left : left + width] = part.planes["rgb"]
+        for part in picture(loaded, OneColour(), pool, SIZE):
+            rgb[shown_at(part)] = part.planes["rgb"]
     return rgb
 
 
@@ -104,4 +104,4 @@ def displayed(rgb: Any) -> Image.Image:
 
 
 if __name__ == "__main__":
-    displayed(rendered(SIZE)).save(HERE.parents[1] / "reports" / "cover.jpg", quality=92, optimize=True)
+    displayed(rendered()).save(HERE.parents[1] / "reports" / "cover.jpg", quality=92, optimize=True)

@@ -117,8 +117,6 @@ class Crew:
                 first = wait(list(running), timeout=_SECONDS_OF_SILENCE, return_when="FIRST_COMPLETED")  # type: ignore[no-untyped-call]
                 for future in first.done:
                     del running[future]
-        if groups:
-            show(len(groups), ())
 
     def start(self, task: Task, out: str, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
         """Give a task to a worker, not to one of `avoided` if there is a choice.
@@ -225,8 +223,6 @@ class Serial:
             show(done, [group.name])
             with suppress(Exception):
                 group.compile(lambda kernel: self._hear({"kernel": kernel}))
-        if groups:
-            show(len(groups), ())
 
     def start(self, task: Task, out: str, inputs: Mapping[str, str], avoided: Collection[str] = ()) -> None:
         """Take a task that `ended` does; arguments as for a crew, and the folder is that of the ledger."""

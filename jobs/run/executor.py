@@ -97,6 +97,8 @@ def execute(
         groups = kernel_groups(todo)
         board.workers = len(crew.accepted)
         crew.compile(groups, lambda done, under_way: board.compiling(done, len(groups), under_way))
+        if groups:
+            board.compiling(len(groups), len(groups), ())
         board.start(len(crew.accepted), crew.dashboard)
         driver = _Driver(planned, Ready(todo, finished), crew, ledger, board, stages, summary, manifests)
         try:

@@ -28,9 +28,9 @@ class Event(NamedTuple):
     """Something that happened in a run."""
 
     name: EventName
-    task: Task | None
-    share: float | None  # finished share of the task
-    message: str | None  # reason of a failure, or a sentence
+    task: Task | None = None
+    share: float | None = None  # finished share of the task
+    message: str | None = None  # reason of a failure, or a sentence
 
 
 class Board:
@@ -65,7 +65,7 @@ class Board:
 
     def __exit__(self, *error: object) -> None:
         patience.tell(None)
-        self._emit("stop")
+        self._show(Event("stop"), self)
 
     @property
     def rate(self) -> float:
@@ -90,17 +90,17 @@ class Board:
     def start(self, workers: int, dashboard: str | None) -> None:
         """Start the clock and show the start of the tasks."""
         self._began, self.workers, self.dashboard = time.monotonic(), workers, dashboard
-        self._emit("start")
+        self._show(Event("start"), self)
 
     def compiling(self, done: int, groups: int, under_way: Iterable[str]) -> None:
         """Show how many groups of kernels are compiled, and which are under way."""
         now = "" if done == groups else f"; now {', '.join(under_way)}"
         kernels = f"{len(self._kernels)} ready, {done} of {groups} groups done"
-        self._emit("compile", message=f"compiling kernels: {kernels}{now}")
+        self._show(Event("compile", message=f"compiling kernels: {kernels}{now}"), self)
 
     def say(self, sentence: str) -> None:
         """Show a sentence about the run."""
-        self._emit("message", message=sentence)
+        self._show(Event("message", message=sentence), self)
 
     def say_once(self, sentence: str) -> None:
         """Show a sentence that several processes may say, unless it was said in the last minute."""
@@ -121,13 +121,13 @@ class Board:
         elif (task := self._left.get(message["task"])) and task.id in self._under_way:
             share = min(1.0, message["share"])
             self._advance(task, share)
-            self._emit("progress", task, share)
+            self._show(Event("progress", task, share), self)
 
     def begin(self, task: Task) -> None:
         """Show that a task begins."""
         self._reported()
         self._advance(task, 0.0)
-        self._emit("begin", task)
+        self._show(Event("begin", task), self)
 
     def end(self, task: Task, reason: str = "", *, seconds: float = 0.0, again: bool = False) -> None:
         """Count a task as done in some seconds, or as failed for a reason; `again`: it is tried once more."""
@@ -140,7 +140,7 @@ class Board:
             self._left.pop(task.id, None)
         if not reason:
             self._estimate.learn(task, seconds)
-        self._emit("again" if again else "failed" if reason else "end", task, message=reason or None)
+        self._show(Event("again" if again else "failed" if reason else "end", task, message=reason or None), self)
 
     def waiting_for(self, tasks: Iterable[Task]) -> None:
         """Name the tasks under way when nothing was reported for a minute, and again after 2, 4, … minutes."""
@@ -159,11 +159,6 @@ class Board:
             began, before = self._under_way.get(task.id, (0.0, 0.0))
             self._under_way[task.id] = began if share else time.monotonic(), share  # it may have waited at its worker
             self.work[task.stage] += task.cost * (share - before)
-
-    def _emit(
-        self, name: EventName, task: Task | None = None, share: float | None = None, message: str | None = None
-    ) -> None:
-        self._show(Event(name, task, share, message), self)
 
     def _reported(self) -> None:
         self._heard, self._silence = time.monotonic(), _SILENCE

@@ -40,14 +40,6 @@ class TruthFlags:
     walls: Annotated[str | None, Parameter(help="What a ray sees that meets a yarn's end: rim or left_out.")] = None
 
 
-def _truth_options(chosen: dict[str, Any]) -> TruthOptions:
-    """Return the options of the truth; BadInput if one cannot be used, named as it is spelt on the command line."""
-    if "estimator" in chosen and chosen["estimator"] not in ESTIMATORS:
-        raise BadInput(_WHERE, "--estimator", chosen["estimator"], nearest(chosen["estimator"], ESTIMATORS))
-    with named_flags(_WHERE, _WHERE):
-        return validated(TruthOptions, chosen, _WHERE)
-
-
 def evaluate(
     fabric: FabricName,
     queries: Annotated[Place, Parameter(help="Parquet file of queries, with the columns of a shard.")],
@@ -70,7 +62,10 @@ def evaluate(
     chosen, cloth = given(truth), load_fabric(fabric)
     threads: AbstractContextManager[None] = nullcontext()
     if model is None:
-        answerer = truth_answerer(cloth, _truth_options(chosen), seed)
+        if "estimator" in chosen and chosen["estimator"] not in ESTIMATORS:
+            raise BadInput(_WHERE, "--estimator", chosen["estimator"], nearest(chosen["estimator"], ESTIMATORS))
+        with named_flags(_WHERE, _WHERE):
+            answerer = truth_answerer(cloth, validated(TruthOptions, chosen, _WHERE), seed)
     else:
         from pipeline.models.network import one_thread
 

@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from jobs.recipe.load import load_recipe
-from jobs.terminal import number, print_lines, print_result, print_table
+from jobs.terminal import number, print_lines, print_table
 from jobs.verbs.parameters import NOTHING, OUT, Add, Local, Out, RecipeName
 from pipeline.atomic import atomic_write
 from reports.machines import join, names_of, refuse_several
@@ -64,7 +64,14 @@ def compare(
     unlike = refuse_other_machine(machine_a, machine_b, other_machine)
     shared = differences(first, second)
     for table in difference_tables(shared):
-        print_result(table)
+        print_lines("")
+        print_table(
+            table.columns,
+            [(row.label, *row.cells) for row in table.rows],
+            text=[column for index, column in enumerate(table.columns) if not table.numeric(index)],
+            title=table.title,
+            styles={index: "bold" for index, row in enumerate(table.rows) if row.kind == "marked"},
+        )
     print_lines("", *(f"{sentence}." for sentence in (*unlike, *shared.unlike, *busy(first, second))))
     left = [f"{count} only in {name}" for name, count in (("A", shared.only_a), ("B", shared.only_b)) if count]
     marked = sum(row.result not in NO_DIFFERENCE for row in (*shared.times, *shared.errors))
@@ -87,7 +94,7 @@ def results(
 
     BadInput if the recipe has no page in `out`, its Records are incomplete, or `readme` has no such block.
     """
-    from reports.tables.documents import README_BLOCK, block, readme_block, results_page, with_block
+    from reports.tables.documents import readme_block, results_page, split_at_block
 
     name = load_recipe(recipe, add).name
     source = records_file(out, name)
@@ -96,8 +103,8 @@ def results(
         if not readme.is_file():
             raise BadInput(str(readme), "", "does not exist", "a Markdown file with a generated block is needed")
         text = read_text(readme, MIB, "a Markdown file")
-        old = block(text, README_BLOCK, str(readme))
-        fresh = with_block(text, README_BLOCK, readme_block(records, machine, old, str(source)), str(readme))
+        before, old, after = split_at_block(text, str(readme))
+        fresh = f"{before}{readme_block(records, machine, old, str(source)).rstrip()}\n{after}"
         if fresh != text:
             atomic_write(readme, fresh.encode())
         print_lines(f"{readme}: table of {name} {'unchanged' if fresh == text else 'written'}")

@@ -151,7 +151,7 @@ def _costs(
 
 def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) -> dict[tuple[str, str], Value]:
     """Return a method's numbers on a scene from a page, and the time of its frame over that of 2 points."""
-    from reports.over_seeds import mean_over_seeds
+    from reports.over_seeds import over_trainings
     from reports.record import OF_A_PAGE, read_records
     from reports.tables.summary import BASELINE
 
@@ -159,7 +159,7 @@ def _measured(out: Path, page: str, scene: str, model: ModelRecipe, run: str) ->
     path = out / "report" / page / OF_A_PAGE
     if not path.is_file():
         raise BadInput("savings", "recipe", page, f"it has no page in {out / 'report'}; `twillight run {run}` first")
-    records = mean_over_seeds(read_records([path]))
+    records = over_trainings(read_records([path]))
     here = [record for record in records if record.scene == scene and not record.fabric]
     by_metric = {record.metric: record for record in here if (record.method, record.setting) == (method, setting)}
     if lacking := [metric for metric in _MEASURED if metric not in by_metric]:

@@ -3,34 +3,26 @@
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from pipeline.atomic import atomic_write
 from weaves.draft_files.write import wif_text
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-
-class ExportKind(NamedTuple):
-    """The function that writes a kind, as MODULE:NAME, and how its path ends; a folder if it ends in nothing.
-
-    The function takes fabric, path and its own options, each with a default, and returns a sentence on what it wrote.
-    """
-
-    writer: str
-    suffix: str = ""
-
-
 EXPORTS: Final = {
-    "bsdf": ExportKind("reports.exports.bsdf:write_bsdf", ".xml"),
-    "mesh": ExportKind("reports.exports.mesh:write_mesh", ".ply"),
-    "wif": ExportKind("reports.exports.export:write_draft", ".wif"),
-    "osl": ExportKind("reports.exports.osl:write_osl", ".osl"),
-    "maps": ExportKind("reports.exports.maps:write_maps"),
-    "shader": ExportKind("pipeline.shader.export_shader:write_shader"),
-    "viewer": ExportKind("reports.viewer.view:write_page", ".html"),
+    "bsdf": ("reports.exports.bsdf:write_bsdf", ".xml"),
+    "mesh": ("reports.exports.mesh:write_mesh", ".ply"),
+    "wif": ("reports.exports.export:write_draft", ".wif"),
+    "osl": ("reports.exports.osl:write_osl", ".osl"),
+    "maps": ("reports.exports.maps:write_maps", ""),
+    "shader": ("pipeline.shader.export_shader:write_shader", ""),
+    "viewer": ("reports.viewer.view:write_page", ".html"),
 }
-"""Kinds of exports."""
+"""The function that writes each kind, as MODULE:NAME, and how its path ends; a folder if it ends in nothing.
+
+The function takes fabric, path and its own options, each with a default, and returns a sentence on what it wrote.
+"""
 
 
 def export(fabric: Fabric, kind: str, path: Path, /, **options: Any) -> str:
@@ -39,13 +31,14 @@ def export(fabric: Fabric, kind: str, path: Path, /, **options: Any) -> str:
     Options that are left out have the defaults of the kind. BadInput if an option, the path or the fabric cannot be
     used; `where` is ``export`` and `key` the option or the kind.
     """
-    module, name = EXPORTS[kind].writer.split(":")
+    writer, suffix = EXPORTS[kind]
+    module, name = writer.split(":")
     write = getattr(import_module(module), name)
     for option, value in options.items():
         if option not in signature(write).parameters:
             raise BadInput("export", option, value, f"is not for {kind}; leave it out")
-    if path.suffix != EXPORTS[kind].suffix and EXPORTS[kind].suffix:
-        raise BadInput("export", kind, str(path), f"a path that ends in {EXPORTS[kind].suffix} is needed")
+    if suffix and path.suffix != suffix:
+        raise BadInput("export", kind, str(path), f"a path that ends in {suffix} is needed")
     return str(write(fabric, path, **options))
 
 

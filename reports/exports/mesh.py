@@ -14,7 +14,7 @@ from pipeline.atomic import atomic_path
 from reports.images.tiles import encoded
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
-from weaves.mesh import repeat_mesh
+from weaves.mesh import joined, repeat_mesh
 
 WALL: Final = (32, 32, 32)
 MOST_TRIANGLES: Final = 50_000_000  # more are refused: the file would have a gigabyte, and the work in memory ten
@@ -43,13 +43,8 @@ def write_mesh(fabric: Fabric, path: Path, vertices: int = 64, repeats: int = 1)
             thread = np.zeros(len(mesh.vertices), np.intp)
             thread[mesh.faces] = np.floor(mesh.vertices[mesh.faces, axis].mean(axis=1, keepdims=True))
             colours.insert(axis, encoded(dyed.diffuse)[thread % len(dyed.diffuse)])
-        start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-        whole = trimesh.Trimesh(
-            vertices=np.concatenate([mesh.vertices for mesh in meshes]),
-            faces=np.concatenate([mesh.faces + first for mesh, first in zip(meshes, start[:-1], strict=True)]),
-            vertex_colors=np.concatenate(colours),
-            process=False,  # merging or reordering vertices would take the walls' edges from them
-        )
+        # Processing would merge or reorder vertices, and take the walls' edges from them.
+        whole = trimesh.Trimesh(*joined(meshes), vertex_colors=np.concatenate(colours), process=False)
         temporary.write_bytes(trimesh.exchange.ply.export_ply(whole, encoding="binary"))
     of_weave, of_colours = np.array(fabric.weave.repeat), np.array(fabric.repeat)
     most = int((of_colours // of_weave).max())

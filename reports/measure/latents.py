@@ -11,7 +11,7 @@ is the delay until the next answer: the fabric's maps are made and encoded again
 """
 
 from functools import partial
-from typing import Final, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -47,14 +47,6 @@ class Pair(NamedTuple):
         return f"{self.differs} of {self.second.name}"
 
 
-@runtime_checkable
-class Blends(Protocol):
-    """A method that answers for a blend of two fabrics."""
-
-    def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> Float32:
-        """Answer N queries from latents blended by `share`, float32 (N, 4)."""
-
-
 def pairs() -> list[Pair]:
     """Return the pairs: three drafts, each with the yarns of another preset, and two drafts of the same yarns."""
     result = []
@@ -76,18 +68,17 @@ def between(pair: Pair, share: float) -> Fabric:
 
 
 def measure_paths(
-    method: Method, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = 1024
+    method: Any, pair: Pair, distribution: QueryOptions, truth: TruthOptions, rows: int = 1024
 ) -> list[Record]:
     """Return the errors of blending and of encoding anew along the path between two fabrics.
 
-    The method must be one that `Blends`. The `rows` queries of the distribution are the same ones at every share.
-    Records are `path_error` and, for yarns, `reencode_error`: the value is the error in the middle, the curve that at
-    `SHARES`.
+    The method must have `predict_between`, as `woven` has. The `rows` queries of the distribution are the same ones at
+    every share. Records are `path_error` and, for yarns, `reencode_error`: the value is the error in the middle, the
+    curve that at `SHARES`.
     """
     queries, records = draw_queries(distribution, pair.first.weave.repeat, _SEED, 0, rows), []
     answers = _truths(pair, queries, truth)
     subject = Record(method=method.name, setting=method.setting, fabric=pair.first.name, note=pair.about)
-    assert isinstance(method, Blends)
     ways: dict[Metric, list[Float32]] = {}
     ways["path_error"] = [method.predict_between(pair.first, pair.second, share, queries) for share in SHARES]
     if pair.differs == "yarns":

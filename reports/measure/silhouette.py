@@ -13,7 +13,7 @@ The camera looks along the plane of the normals: all queries have the curvature 
 
 import math
 from pathlib import Path
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,14 +27,6 @@ from reports.images.exr import read_exr, write_exr
 from reports.options import EdgeOptions
 from reports.record import TRUTH, Record
 from weaves.fabric import Fabric
-
-
-@runtime_checkable
-class _KnowsRims(Protocol):
-    """A method that knows which share of view rays leaves a curved cloth again."""
-
-    def coverage(self, fabric: Fabric, looks: Queries) -> Float32:
-        """Return the share of each footprint's view rays that do not leave the cloth again, float32 (N,)."""
 
 
 class Edge(NamedTuple):
@@ -68,8 +60,8 @@ def edge_of(method: Method, fabric: Fabric, options: EdgeOptions) -> Edge:
     """Return a method's pictures."""
     queries = edge_queries(options, fabric.weave.repeat)
     method.prepare(fabric)
-    if isinstance(method, _KnowsRims):
-        covered = method.coverage(fabric, queries)
+    if knows_rims := getattr(method, "coverage", None):
+        covered = knows_rims(fabric, queries)
         return _edge(fabric, queries, covered, method.predict(fabric, queries, options.seed), options)
     front = np.flatnonzero(queries.wi[:, 2] > 0)
     flat = queries._replace(curvature=np.zeros_like(queries.curvature)).take(front)

@@ -43,7 +43,6 @@ MARKS: Final[tuple[Marker, ...]] = ((4, 1, 0), (5, 0, 180), (3, 1, 0), (6, 1, 0)
 """Marks of methods that are not known, one after the other; their number and that of spare colours share no factor."""
 
 OF_TEXT: Final = 4.5
-OF_MARKS: Final = 3.0
 
 
 def contrast(first: str, second: str) -> float:

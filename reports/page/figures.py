@@ -25,7 +25,7 @@ from reports.tables.summary import BASELINE, rows
 DPI: Final = 200
 NARROWEST_PLOT: Final = 7.6  # inches: the legend needs it
 ROW: Final = 0.22  # height of a method's row, in inches
-_ROLES: Final = ("seen", "unseen")
+SHOWN_ROLES: Final = ("seen", "unseen")
 _MOST_DECADES: Final = 5  # whose labels fit under half a figure
 _MARK_EVERY: Final = 9  # points of a spectrum; one curve's marks are shifted against the next one's
 
@@ -64,7 +64,7 @@ def errors(scheme: Scheme, table: pd.DataFrame, fabrics: pd.DataFrame) -> Figure
     A broad bar is the range of that mean over trainings. The frames are from `summary.error_table` and
     `summary.fabric_table`.
     """
-    roles = [role for role in _ROLES if role in set(table["role"])]
+    roles = [role for role in SHOWN_ROLES if role in set(table["role"])]
     places, width = _places(table), max(4.6 * len(roles), NARROWEST_PLOT)
     figure, panels = new_figure(width, 1.1 + ROW * _height(places), len(roles), sharey=True)
     colours = scheme.colours(table["method"])

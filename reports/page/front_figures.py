@@ -21,12 +21,11 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLoca
 
 from reports.measure.by_size import SIZES
 from reports.page.colours import Scheme
-from reports.page.figures import NARROWEST_PLOT, new_figure
+from reports.page.figures import NARROWEST_PLOT, SHOWN_ROLES, new_figure
 from reports.page.labels import Label, place_labels
 from reports.tables.number_format import display, size
 from reports.tables.summary import OF_PAPER, PAPER, front, of_baseline, parts_of, rows
 
-_ROLES: Final = ("seen", "unseen")
 _LEGEND_COLUMNS: Final = 5
 _TIME: Final = "time of a query, ns (one process, side by side)"
 
@@ -79,7 +78,7 @@ def _by_role(
 ) -> Figure:
     """Draw `y` against `x` with the front of each role, a panel a role."""
     table = table[(table["x"] > 0) & (table["y"] > 0)]
-    roles = [role for role in _ROLES if role in set(table["role"])]
+    roles = [role for role in SHOWN_ROLES if role in set(table["role"])]
     colours = scheme.colours(table["method"])
     paper = paper and _with_paper(table)
     height = 4.5 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)

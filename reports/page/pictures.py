@@ -19,7 +19,7 @@ from pipeline.models.added.added_code import ADDED_MODEL
 from reports.images.tiles import EXPOSURE, Bytes8, encoded, png
 from reports.page.content import ModelNote, PictureFile
 from reports.record import TRUTH
-from reports.tables.number_format import beyond_noise, display, scientific
+from reports.tables.number_format import beyond_noise, scientific
 from reports.tables.summary import BASELINE, rows
 from weaves.colour import LUMINANCE
 
@@ -62,7 +62,7 @@ def strips(
     for file in sorted(pictures, key=lambda file: (file.method != TRUTH, kinds.get(file.method) != ADDED_MODEL)):
         strip = views.setdefault((file.fabric, file.scene), Strip(file.fabric, file.scene))
         value = mse.get((file.fabric, file.scene, file.method, file.setting), math.nan)
-        cell = {"stem": file.stem, "method": file.method, "label": display(file.method, file.setting)}
+        cell = {"stem": file.stem, "method": file.method, "label": file.label}
         strip.cells.append(cell | {"mse": beyond_noise(value, scientific)})
     for strip in views.values():
         of_cells = [kinds.get(cell["method"], cell["method"]) for cell in strip.cells]

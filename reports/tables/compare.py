@@ -22,7 +22,7 @@ from typing import Final, Literal, NamedTuple
 
 from scipy import stats
 
-from reports.over_seeds import mean_over_seeds, statistic_over_seeds, trainings
+from reports.over_seeds import over_trainings, trainings
 from reports.record import Machine, Metric, Record
 from reports.tables.number_format import NONE, display
 from reports.tables.table import ResultTable, TableCell, TableRow
@@ -98,7 +98,7 @@ def compare(a: Sequence[Record], b: Sequence[Record]) -> Comparison:
     Measurements of the same metric, method, setting, fabric, number of threads and edit are compared: times (`TIMES`)
     and the MSE on held-out queries, the mean over trainings. Of several that are alike the last counts.
     """
-    first, second = (_comparable(mean_over_seeds(records)) for records in (a, b))
+    first, second = (_comparable(over_trainings(records)) for records in (a, b))
     extents = _extents(a, b)
     shared = [key for key in first if key in second]
     if not shared:
@@ -169,7 +169,7 @@ def _extents(*benchmarks: Sequence[Record]) -> dict[_Key, float]:
     extents: dict[_Key, float] = {}
     for records in benchmarks:
         counts = trainings(records)
-        least, most = (_comparable(statistic_over_seeds(records, ends)) for ends in (min, max))
+        least, most = (_comparable(over_trainings(records, ends)) for ends in (min, max))
         for key, record in most.items():
             if counts[record.method, record.setting] > 1:
                 extents[key] = max(extents.get(key, 0.0), record.value - least[key].value)

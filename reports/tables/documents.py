@@ -19,7 +19,8 @@ from reports.tables.summary import BASELINE, PAPER_SAYS, over_unseen, rows
 from reports.tables.table import markdown_table, number
 from weaves.errors import BadInput
 
-README_BLOCK: Final = "quick"  # name of the block in README.md
+MARKERS: Final = ("<!-- quick: written by `make readme`, do not edit -->\n", "<!-- end of quick -->\n")
+"""Lines of README.md before and after the generated block."""
 
 README_METHODS: Final[Mapping[tuple[str, str], str]] = {
     BASELINE: "two random points, exact shadows",
@@ -148,26 +149,15 @@ def results_page(records: Sequence[Record], machine: Machine, where: str) -> str
     return "\n\n".join(parts) + "\n"
 
 
-def markers(name: str) -> tuple[str, str]:
-    """Return the lines before and after a generated block."""
-    return f"<!-- {name}: written by `make readme`, do not edit -->", f"<!-- end of {name} -->"
-
-
-def block(text: str, name: str, where: str) -> str:
-    """Return the generated block of a text, without its markers.
+def split_at_block(text: str, where: str) -> tuple[str, str, str]:
+    """Return a text up to the generated block with the marker before it, the block, and the rest.
 
     BadInput if the text does not hold both markers, the first one first; `where` names the file.
     """
-    first, last = markers(name)
-    _, opened, after = text.partition(f"{first}\n")
-    inside, closed, _ = after.partition(f"{last}\n")
+    first, last = MARKERS
+    before, opened, after = text.partition(first)
+    inside, closed, rest = after.partition(last)
     if not opened or not closed:
-        raise BadInput(where, "", f"has no block {name!r}", f"the lines {first!r} and {last!r} are needed")
-    return inside
-
-
-def with_block(text: str, name: str, content: str, where: str) -> str:
-    """Return a text with another generated block; BadInput as `block`."""
-    old = block(text, name, where)
-    first, last = markers(name)
-    return text.replace(f"{first}\n{old}{last}\n", f"{first}\n{content.rstrip()}\n{last}\n", 1)
+        needed = f"the lines {first.rstrip()!r} and {last.rstrip()!r} are needed"
+        raise BadInput(where, "", "has no block 'quick'", needed)
+    return before + opened, inside, closed + rest

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from reports.measure.by_size import EDGES, MEASURES, SIZES, WHOLE
-from reports.over_seeds import mean_over_seeds
+from reports.over_seeds import over_trainings
 from reports.record import Record
 from reports.tables.summary import rows
 
@@ -29,7 +29,7 @@ def size_table(records: Sequence[Record]) -> pd.DataFrame:
     """
     numbers_of: dict[tuple[str, str, str], dict[str, float]] = {}
     names: dict[str, str] = {"size_time": "ns"} | {metric: measure for measure, (metric, _) in MEASURES.items()}
-    for record in mean_over_seeds(records):
+    for record in over_trainings(records):
         if record.metric in names:
             values = {SIZES[EDGES.index(low)]: value for low, value in record.curve} | {WHOLE: record.value}
             for size, value in values.items():

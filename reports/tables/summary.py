@@ -28,7 +28,7 @@ from pipeline.truth.conventions import COMPONENTS
 from reports.catalogue import METRICS, OTHER, columns_of, metric_row
 from reports.error import ratio
 from reports.measure.extremes import FOOTPRINTS, SHINY, error_name
-from reports.over_seeds import Statistic, Table, first_training, mean, over_seeds, statistic_over_seeds
+from reports.over_seeds import Statistic, Table, first_training, mean, over_seeds, over_trainings
 from reports.record import TRUTH, Metric, Record, to_table
 
 BASELINE: Final = ("point_sampled", "k = 2")
@@ -92,7 +92,7 @@ def fabric_table(records: Sequence[Record], statistic: Statistic = mean) -> pd.D
 
     One row a fabric and one column a method (``method setting``).
     """
-    table = to_table(statistic_over_seeds(records, statistic))
+    table = to_table(over_trainings(records, statistic))
     table = table[(table["metric"] == "mse") & (table["scene"] == "queries")]
     labels = (table["method"] + " " + table["setting"]).str.strip()
     wide = table.assign(label=labels).pivot(index=["role", "fabric"], columns="label", values="value")

@@ -7,7 +7,7 @@ for double precision are the same times 2^-29, the ratio of the two arithmetics.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
@@ -119,11 +119,6 @@ def _errors(value: npt.ArrayLike, reference: npt.ArrayLike, floor: float, absolu
         nothing = np.equal(size, 0).astype(np.bool_)
         difference = difference / np.where(np.less(size, floor).astype(np.bool_), floor, np.where(nothing, 1, size))
     return np.where(finite, np.asarray(difference[:, 0], np.float64), 0.0), finite
-
-
-def failures(findings: Iterable[Finding]) -> list[Finding]:
-    """Return what does not hold."""
-    return [finding for finding in findings if not finding.holds]
 
 
 RECORDS: Final = RowRecords(Finding, setting=("expression", "corner"), method_field="arithmetic", once={"note": "at"})

@@ -61,13 +61,6 @@ class VarianceSaving:
     count: int  # directions
 
 
-class Subject(NamedTuple):
-    """Cloth, and looks at it."""
-
-    fabric: Fabric
-    looks: Queries
-
-
 def measure(
     looks: int = 400, fabrics: Sequence[str] = _FABRICS, scenes: Sequence[str] = tuple(SHIPPED)
 ) -> Iterator[VarianceSaving]:
@@ -75,38 +68,35 @@ def measure(
     for name in fabrics:
         cloth = load_fabric(name)
         drawn = draw_queries(QueryOptions(max_angle=75.0), cloth.weave.repeat, 3, 0, looks)
-        yield from _savings([Subject(cloth, drawn)], name)
-        yield from _savings([Subject(_specular(cloth), drawn)], f"{name} (specular)")
+        yield from _savings([(cloth, drawn)], name)
+        yield from _savings([(_specular(cloth), drawn)], f"{name} (specular)")
     for name in scenes:
-        yield from _savings(scene_subjects(name, looks), f"scene {name}")
+        yield from _savings(scene_looks(name, looks), f"scene {name}")
 
 
 RECORDS: Final = RowRecords(VarianceSaving, setting=("sampler",), method="sampler")
 
 
-def scene_subjects(name: str, looks: int) -> list[Subject]:
-    """Return random looks of a scene's first frame, of each cloth as many as its share of the pixels."""
+def scene_looks(name: str, looks: int) -> list[tuple[Fabric, Queries]]:
+    """Return each cloth of a scene's first frame with random looks, as many as its share of the pixels."""
     loaded = load(load_scene(name))
     # Which lights reach a place takes most of the time of a frame, and matters not here.
     frame = render(replace(loaded, lights=loaded.lights[:1]))
-    subjects = [
-        Subject(loaded.cloths[key][1], gbuffer.looks(loaded.cloths[key][1].weave.repeat))
-        for key, gbuffer in frame.gbuffers.items()
-        if len(gbuffer.pixel)
-    ]
-    stops = np.cumsum([len(subject.looks.u) for subject in subjects])
+    seen = [(loaded.cloths[key][1], gbuffer) for key, gbuffer in frame.gbuffers.items() if len(gbuffer.pixel)]
+    every = [(fabric, gbuffer.looks(fabric.weave.repeat)) for fabric, gbuffer in seen]
+    stops = np.cumsum([len(own.u) for _, own in every])
     chosen = np.sort(np.random.default_rng(5).choice(stops[-1], min(looks, int(stops[-1])), replace=False))
     parts = np.split(chosen, np.searchsorted(chosen, stops[:-1]))
     return [
-        Subject(fabric, own.take(part - (stop - len(own.u))))
-        for (fabric, own), part, stop in zip(subjects, parts, stops.tolist(), strict=True)
+        (fabric, own.take(part - (stop - len(own.u))))
+        for (fabric, own), part, stop in zip(every, parts, stops.tolist(), strict=True)
         if part.size
     ]
 
 
-def _savings(subjects: Sequence[Subject], name: str) -> Iterator[VarianceSaving]:
+def _savings(subjects: Sequence[tuple[Fabric, Queries]], name: str) -> Iterator[VarianceSaving]:
     """Yield the savings of all samplers over the looks of some cloths together."""
-    parts = list(map(_estimates, subjects))
+    parts = [_estimates(fabric, looks) for fabric, looks in subjects]
     base, base_time = math.nan, math.nan
     for sampler in SETTINGS:
         of_subjects, draw_seconds, seconds = zip(*(part[sampler] for part in parts), strict=True)
@@ -119,16 +109,16 @@ def _savings(subjects: Sequence[Subject], name: str) -> Iterator[VarianceSaving]
         yield VarianceSaving(sampler, name, saved, saved * base_time / whole, draw_time, whole, values.size)
 
 
-def _estimates(subject: Subject) -> dict[str, tuple[Float64, float, float]]:
+def _estimates(fabric: Fabric, seen: Queries) -> dict[str, tuple[Float64, float, float]]:
     """Return the values that each sampler finds, (looks, directions), and seconds of them all, without and with values.
 
     Samplers are timed in turns by the processor's clock, the shortest counts.
     """
-    count = len(subject.looks.u)
-    looks = subject.looks.take(np.repeat(np.arange(count), _DIRECTIONS))
+    count = len(seen.u)
+    looks = seen.take(np.repeat(np.arange(count), _DIRECTIONS))
     random = np.random.default_rng(1).random((len(looks.u), 5))
-    bsdf = PatchBSDF(subject.fabric)
-    point, lobes = PatchBSDF(subject.fabric, bsdf.method, points=1), bsdf.lobes(looks)
+    bsdf = PatchBSDF(fabric)
+    point, lobes = PatchBSDF(fabric, bsdf.method, points=1), bsdf.lobes(looks)
     straight, flakes = lobes.rest[:, STRAIGHT].astype(np.float64), lobes.flakes[:, SHARE].sum(axis=1)
     # The share of the scattered light that the lobes expect on the far side, roughly.
     scattered = np.maximum(1.0 - lobes.rest[:, STRAIGHT], 1e-6)

@@ -12,7 +12,6 @@ import html
 import itertools
 import json
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -54,7 +53,7 @@ VIEWS: Final = {
 }
 """Views of the page, each with a picture of the truth."""
 
-TILES: Final = ("map_material",)  # methods that the page has as pictures at its views, beside the truth
+TILE: Final = "map_material"  # method that the page has as pictures at its views, beside the truth
 
 AGAINST_LIGHT: Final = {"Against the light": Viewpoint("drape", -20.0, 6.0, 330.0, 165.0, 20.0)}
 """One more view of cloth that light comes through."""
@@ -246,14 +245,13 @@ def _yarn(yarn: Yarn) -> dict[str, float]:
 
 
 def _methods(fabric: Fabric) -> dict[str, Method]:
-    """Return TILES without those that cannot answer for the fabric, such as maps too small for its repeat."""
-    methods: dict[str, Method] = {}
-    for name in TILES:
-        method = named_method(name, "view", "")
-        with suppress(BadInput):
-            method.prepare(fabric)
-            methods[name] = method
-    return methods
+    """Return the method of `TILE` by its name; none if it cannot answer for the fabric: its repeat is too large."""
+    method = named_method(TILE, "view", "")
+    try:
+        method.prepare(fabric)
+    except BadInput:
+        return {}
+    return {TILE: method}
 
 
 def _view(fabric: Fabric, name: str, camera: Viewpoint, size: int, methods: dict[str, Method]) -> dict[str, Any]:

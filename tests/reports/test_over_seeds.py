@@ -3,7 +3,7 @@ import math
 import pandas as pd
 import pytest
 
-from reports.over_seeds import by_seed, first_training, mean_over_seeds, over_seeds, trainings
+from reports.over_seeds import by_seed, first_training, over_seeds, over_trainings, trainings
 from reports.record import Provenance, Record
 
 
@@ -25,7 +25,7 @@ RECORDS = [
 
 def test_trainings_are_counted_by_their_seeds_and_their_numbers_become_means_of_one_subject():
     assert trainings(RECORDS) == {("a", ""): 3, ("b", ""): 1, ("points", ""): 0}
-    mean, *others = mean_over_seeds(RECORDS)
+    mean, *others = over_trainings(RECORDS)
     assert (mean.value, mean.standard_error, mean.low, mean.high) == pytest.approx((2.0, 0.2, 1.5, 2.2))
     assert mean.curve == ((0.1, 2.0), (0.2, 2.0))
     assert others == RECORDS[3:], "other numbers are as they were"
@@ -35,7 +35,7 @@ def test_trainings_are_counted_by_their_seeds_and_their_numbers_become_means_of_
     # The data set and the machine are part of what a number is of.
     other = [trained("a", seed, value=9.0) for seed in (7, 8)]
     moved = [one.model_copy(update={"provenance": one.provenance.model_copy(update={"dataset": "z"})}) for one in other]
-    assert [one.value for one in mean_over_seeds([*RECORDS[:3], *moved])] == [2.0, 9.0]
+    assert [one.value for one in over_trainings([*RECORDS[:3], *moved])] == [2.0, 9.0]
 
 
 def test_each_training_is_seen_with_all_that_learns_nothing():

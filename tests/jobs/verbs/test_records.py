@@ -3,7 +3,7 @@ import pytest
 from pipeline.truth.conventions import COMPONENTS
 from reports import record
 from reports.record import OF_A_PAGE, Provenance, Record, read_records, this_machine, write_records
-from reports.tables.documents import markers
+from reports.tables.documents import MARKERS
 
 
 @pytest.fixture
@@ -76,12 +76,12 @@ def results(twillight, tmp_path):
 
 
 def test_only_the_block_of_a_readme_is_written_or_tables_beside_the_page_or_where_it_is_said(results, tmp_path):
-    first, last = markers("quick")
+    first, last = MARKERS
     file = tmp_path / "README.md"
-    file.write_text(f"title\n{first}\n{last}\nend\n", encoding="utf-8")
+    file.write_text(f"title\n{first}{last}end\n", encoding="utf-8")
     assert results("--readme", file)[0] == 0
     text = file.read_text(encoding="utf-8")
-    assert text.startswith(f"title\n{first}\n| method | MSE") and text.endswith(f"{last}\nend\n")
+    assert text.startswith(f"title\n{first}| method | MSE") and text.endswith(f"{last}end\n")
     assert not (tmp_path / "out" / "report" / "smoke" / "results.md").exists()
     code, said, _ = results("--readme", file)
     assert code == 0 and "unchanged" in said and file.read_text(encoding="utf-8") == text

@@ -4,7 +4,7 @@ import pytest
 
 from reports.record import Machine, Record
 from reports.tables import documents
-from reports.tables.documents import README_METHODS, block, markers, readme_block, results_page
+from reports.tables.documents import MARKERS, README_METHODS, readme_block, results_page, split_at_block
 from tests.refusals import refusal
 
 MACHINE = Machine(
@@ -93,15 +93,13 @@ def test_the_file_says_where_its_numbers_come_from_and_a_block_is_replaced_alone
     assert "## Scenes" not in page, "what was not measured has no section"
     for table in page.split("\n\n"):
         assert len({line.count("|") for line in table.splitlines() if line.startswith("|")}) <= 1, table
-    assert block(TEXT, "speeds", "file") == "old\n"
-    assert documents.with_block(TEXT, "speeds", "new\n\n", "file") == f"before\n{FIRST}\nnew\n{LAST}\nafter\n"
-    assert documents.with_block(TEXT, "speeds", "old", "file") == TEXT
+    parts = f"before\n{FIRST}", "old\n", f"{LAST}after\n"
+    assert split_at_block("".join(parts), "file") == parts
 
 
-FIRST, LAST = markers("speeds")
-TEXT = f"before\n{FIRST}\nold\n{LAST}\nafter\n"
+FIRST, LAST = MARKERS
 
 
-@pytest.mark.parametrize("text", ["nothing", f"{FIRST}\nno end", f"{LAST}\n{FIRST}\n"])
+@pytest.mark.parametrize("text", ["nothing", f"{FIRST}no end", f"{LAST}{FIRST}"])
 def test_a_missing_marker_is_named(text):
-    assert refusal(block, text, "speeds", "notes.md").startswith("notes.md: has no block 'speeds'")
+    assert refusal(split_at_block, text, "notes.md").startswith("notes.md: has no block 'quick'")

@@ -5,7 +5,7 @@ import pytest
 from pipeline.analytic.importance.lobes import STRAIGHT
 from pipeline.models.patch_bsdf import PatchBSDF
 from pipeline.shards.queries import QueryOptions, draw_queries
-from reports.truth.sampling import RECORDS, SETTINGS, Subject, _estimates, measure, scene_subjects
+from reports.truth.sampling import RECORDS, SETTINGS, _estimates, measure, scene_looks
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
@@ -32,7 +32,7 @@ def test_all_samplers_have_the_same_mean(name):
     """Each against the cosine, over all looks, by a z-test; chance of a false alarm 0.3 %."""
     fabric = load_fabric(name)
     looks = draw_queries(QueryOptions(max_angle=75.0), fabric.weave.repeat, 3, 0, 200)
-    values = {sampler: found for sampler, (found, *_) in _estimates(Subject(fabric, looks)).items()}
+    values = {sampler: found for sampler, (found, *_) in _estimates(fabric, looks).items()}
     for sampler in SETTINGS[1:]:
         apart = values[sampler].mean() - values["cosine"].mean()
         error = math.sqrt(sum((values[one].var(axis=1) / values[one].shape[1]).mean() for one in ("cosine", sampler)))
@@ -41,8 +41,8 @@ def test_all_samplers_have_the_same_mean(name):
 
 @pytest.mark.slow
 def test_looks_of_a_scene_are_those_of_its_pixels():
-    (plane,) = scene_subjects("plane", 50)
-    assert plane.fabric.name == "denim" and len(plane.looks.u) == 50
-    assert (PatchBSDF(plane.fabric).lobes(plane.looks).rest[:, STRAIGHT] < 1.0).all()
-    table = scene_subjects("dinner_table", 200)
-    assert len(table) == 4 and sum(len(subject.looks.u) for subject in table) == 200
+    ((fabric, looks),) = scene_looks("plane", 50)
+    assert fabric.name == "denim" and len(looks.u) == 50
+    assert (PatchBSDF(fabric).lobes(looks).rest[:, STRAIGHT] < 1.0).all()
+    table = scene_looks("dinner_table", 200)
+    assert len(table) == 4 and sum(len(looks.u) for _, looks in table) == 200

@@ -14,7 +14,7 @@ from pipeline.shader.tables import BEHIND, tabulate_sides
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from reports.viewer.shapes import seen
-from reports.viewer.view import AGAINST_LIGHT, TILES, VIEWS, bent
+from reports.viewer.view import AGAINST_LIGHT, TILE, VIEWS, bent
 from tests.reports.viewer.conftest import FABRIC, SIZE, shown_of, viewer
 from weaves.fabric import load_fabric
 
@@ -260,7 +260,7 @@ def test_the_truth_is_shown_and_errors_are_those_of_python(fresh, whole):
     assert 0.0 < of_truth < 3.0 and whole["views"][3]["standard_error"] < 0.02
 
 
-@pytest.mark.parametrize("name", TILES)
+@pytest.mark.parametrize("name", [TILE])
 def test_tiles_are_the_answers_of_their_methods(fresh, name):
     fresh.run("viewer.go(3)")
     picture = seen(VIEWS["Sphere"], SIZE, ENDS)
