@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from jobs.plan.task import Task
 from pipeline.fingerprint import file_sha256
 from weaves.errors import BadInput
 from weaves.reading import MIB, read_bytes
+from weaves.validation import Frozen
 
 _END: Final = b"\n}\n"  # of the file
 _LONGEST_LEAF: Final = 24  # characters of a value that is written as it is
@@ -24,10 +25,8 @@ Leaf = str | int | float | bool | None
 """A value of an identity; a string that begins with # is the hash of a longer one."""
 
 
-class Product(BaseModel):
+class Product(Frozen, strict=True):
     """A finished file: its hash and its size in bytes."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     bytes: Annotated[int, Field(ge=0)]
@@ -38,10 +37,8 @@ class Product(BaseModel):
         return cls(sha256=file_sha256(path), bytes=path.stat().st_size)
 
 
-class Receipt(BaseModel):
+class Receipt(Frozen, strict=True):
     """Entry of the ledger for a done task."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     task: str  # id of the task
     stage: str
@@ -49,7 +46,7 @@ class Receipt(BaseModel):
     files: dict[Annotated[str, Field(pattern=r"^[^/\\.][^/\\]*$")], Product]
     """Products by file name, which is never a path: a folder of products may come from a stranger."""
     seconds: Annotated[float, Field(ge=0.0)]
-    identity: dict[str, Leaf] = {}
+    identity: dict[str, Leaf] = Field(default_factory=dict)
     """Identity of the task by dotted keys of at most two parts, long values by their hash; for `changes`."""
     checksum: str = ""
     """Hash of the rest; receipts of earlier versions have none, and their bytes may be of another form."""
