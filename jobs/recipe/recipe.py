@@ -172,13 +172,17 @@ class Recipe:
         return (*((fabric, "seen") for fabric in self.seen), *((fabric, "unseen") for fabric in unseen))
 
     @property
+    def physics(self) -> dict[str, Any]:
+        """The options of the truth that are its physics."""
+        return {name: getattr(self.dataset.truth, name) for name in PHYSICS}
+
+    @property
     def questions(self) -> str:
         """Fingerprint of all that held-out queries and their right answers depend on, whatever their precision."""
         dataset = self.dataset
         drawn = [versions.TRUTH, dataset.seed, dataset.rows.test, dataset.queries.model_dump(mode="json")]
-        physics = {name: getattr(dataset.truth, name) for name in PHYSICS}
         fabrics = [fabric.model_dump(mode="json", exclude={"source"}) for fabric, _ in self.tested]
-        return fingerprint(["questions", *drawn, physics, fabrics])
+        return fingerprint(["questions", *drawn, self.physics, fabrics])
 
     @property
     def own_models(self) -> list[ModelRecipe]:

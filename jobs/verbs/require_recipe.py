@@ -22,7 +22,6 @@ from jobs.recipe.recipe import ModelRecipe, Recipe
 from jobs.recipe.validation import table_refusal
 from pipeline.atomic import atomic_write
 from pipeline.models.added.added_code import AddedMethod
-from pipeline.models.domain import PHYSICS
 from pipeline.scenes.requirement import Requirement
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
@@ -125,8 +124,7 @@ def _truths(general: Recipe, queries: QueryOptions, fabrics: list[Fabric]) -> di
     """Return how rows are answered: as in the general recipe, where its estimators know the queries."""
     truth, training = general.dataset.truth, general.dataset.training_truth
     tables: dict[str, Any] = {}
-    physics = {name: getattr(truth, name) for name in PHYSICS}
-    sampled = truth.model_copy(update={"estimator": SAMPLED.estimator}), SAMPLED.model_copy(update=physics)
+    sampled = truth.model_copy(update={"estimator": SAMPLED.estimator}), SAMPLED.model_copy(update=general.physics)
     for name, stated, other in zip(("truth", "training_truth"), (truth, training), sampled, strict=True):
         if stated is not None:
             refused = stated.estimator == "node_table" and table_refusal(stated, queries, fabrics)

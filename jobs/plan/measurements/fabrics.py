@@ -11,7 +11,6 @@ from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import HeldOutRows, Subjects, Trained
 from jobs.plan.measurements.truth import TruthEdge, TruthFrames, TruthPicture
 from jobs.plan.task import Coloured, Made, Progress, Uncoloured
-from pipeline.models.domain import PHYSICS
 from pipeline.scenes.options import View
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.options import TruthOptions
@@ -248,8 +247,7 @@ class AtExtremes(Measurement):
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
         """Yield one a model and seed, on the first fabric of each role that it answers for."""
-        physics = {name: getattr(subjects.recipe.dataset.truth, name) for name in PHYSICS}
-        truth = options.EXTREME_TRUTH.model_copy(update=physics)
+        truth = options.EXTREME_TRUTH.model_copy(update=subjects.recipe.physics)
         for model in subjects.models:
             known: dict[options.Role, Fabric] = {}
             for fabric, role in subjects.fabrics:

@@ -20,7 +20,6 @@ from jobs.verbs.parameters import NOTHING, Add, Local, RecipeName
 from jobs.verbs.show import write_geometry
 from pipeline import versions
 from pipeline.folders import own_files
-from pipeline.models.domain import PHYSICS
 from pipeline.scenes.shade import colours
 from pipeline.shards.entry_files import QUESTION_COLUMNS, QUESTION_FILES, RGB_COLUMNS, write_questions
 from pipeline.shards.generate import ShardTask
@@ -72,7 +71,7 @@ def _about(recipe: Recipe) -> dict[str, Any]:
         "questions": recipe.questions,
         "truth_version": versions.TRUTH,
         "queries": dataset.queries.model_dump(mode="json"),
-        "truth": {name: getattr(dataset.truth, name) for name in PHYSICS},
+        "truth": recipe.physics,
         "fabrics": [
             {
                 "role": role,
@@ -95,7 +94,6 @@ def _readme(recipe: Recipe, count: int) -> str:
         (f"`{fabric.name}`", role, f"{fabric.weave.name}, {' × '.join(map(str, fabric.weave.repeat))}")
         for fabric, role in recipe.tested
     ]
-    physics = {name: getattr(recipe.dataset.truth, name) for name in PHYSICS}
     return _TEMPLATE.read_text(encoding="utf-8").format(
         recipe=recipe.name,
         count=f"{count:,}",
@@ -108,6 +106,6 @@ def _readme(recipe: Recipe, count: int) -> str:
         fabrics=markdown_table(("fabric", "role", "weave, ends × picks"), fabrics),
         components=", ".join(f"`{name}`" for name in conventions.COMPONENTS),
         rgb=", ".join(f"`{name}`" for name in RGB_COLUMNS),
-        physics=", ".join(f"`{name} = {value}`" for name, value in physics.items()),
+        physics=", ".join(f"`{name} = {value}`" for name, value in recipe.physics.items()),
         conventions=str(conventions.__doc__).rstrip(),
     )
