@@ -34,7 +34,6 @@ from weaves.fabric import Fabric
 from weaves.reading import refuse_irregular
 from weaves.validation import Frozen, read_toml, validated
 
-_KINDS: Final = ("reflection", "transmission")
 _MOST_PIXELS: Final = 50_000_000  # of a picture
 _BLOCKS, _STRIPS = 48, 24  # blocks along the longer side of a picture; strips of a profile
 _WHITE: Final = 0.98  # of the largest code: brighter pixels may be cut off
@@ -82,8 +81,8 @@ class Streak(NamedTuple):
 def read_photographs(path: Path) -> dict[str, Photograph]:
     """Read the photographs of a file by their kinds; BadInput if one, or its geometry, cannot be used."""
     setups, photographs = validated(_Setups, read_toml(path), str(path)), {}
-    for kind in _KINDS:
-        if setup := getattr(setups, kind):
+    for kind, setup in setups:
+        if setup:
             behind = kind == "transmission"
             if setup.camera[2] <= 0.0 or (setup.light[2] < 0.0) != behind or setup.light[2] == 0.0:
                 side = "behind it, z < 0" if behind else "in front of it, z > 0"
