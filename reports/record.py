@@ -63,7 +63,7 @@ class Provenance(Frozen):
     seed: int = 0  # of its training
     origin: str = ""
     """Of a method or metric from outside: distribution or file, its version, and the SHA-256 of its code."""
-    machine: str = ""  # where Records of several are in one file (`jobs.verbs.records`)
+    machine: str = ""  # where Records of several are in one file (`reports.machines`)
     version: int = BENCH  # of the measurements
 
 
