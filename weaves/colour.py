@@ -23,6 +23,7 @@ Unit = Annotated[float, Strict(), Field(ge=0, le=1, allow_inf_nan=False)]
 Rgb = tuple[float, float, float]
 
 EXPECTED = 'a colour is three numbers from 0 to 1 (linear RGB), "#rrggbb" (sRGB), or a spectrum { wavelengths, values }'
+EXPOSURE: Final = 1.6  # factor on linear values before pictures show them
 LUMINANCE: Final = (0.2126, 0.7152, 0.0722)  # luminance of linear sRGB primaries (Rec. 709)
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterable[tuple[Fabric, Queries]]) -> float:
-    """Return the share of queries that fall back for a model, as a benchmark would measure it; `recipe` trains it.
+    """Return the share of queries that fall back for a model, as the benchmark of `recipe` would measure it.
 
     All queries fall back on a fabric that a model of one material was not trained on.
     """
@@ -22,9 +22,9 @@ def fallback_share(model: ModelRecipe, recipe: Recipe, queries_by_fabric: Iterab
     from pipeline.models.domain import Domain
     from pipeline.models.fallback import Fallback
 
-    options, alone = model.options, model.options.of_one_material
-    learnt_from = recipe.seen + (recipe.unseen if alone else recipe.population)
-    domain = Domain.of(recipe.dataset.model_dump(mode="json"), learnt_from) if options.learns else None
+    options, alone, trainer = model.options, model.options.of_one_material, recipe.trainer_of(model)
+    learnt_from = trainer.seen + (trainer.unseen if alone else trainer.population)
+    domain = Domain.of(trainer.dataset.model_dump(mode="json"), learnt_from) if options.learns else None
     method: Any = SimpleNamespace(name="", setting="", domain=domain, turns=options.turns)
     fallback = Fallback(method, options.kinds, recipe.bench.scenes.footprint)
     optics, fallback_rows = [fabric.optics() for fabric in learnt_from] if alone else [], []

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from jobs.plan.dataset import DataSet, Shard
 from jobs.plan.page import Page
@@ -21,8 +21,6 @@ from weaves.errors import BadInput
 
 Kind = Literal["missing", "outdated", "cut", "damaged", "odd", "foreign"]
 """`odd`: its bytes are those that were written, but its values are not allowed. `foreign`: no task made it."""
-
-_OTHER_BYTES: Final = "it does not have the bytes that were written (SHA-256 differs)"
 
 
 class Fault(NamedTuple):
@@ -79,21 +77,16 @@ def task_faults(task: Task, ledger: Ledger) -> list[Fault]:
 
 def _product_faults(ledger: Ledger, path: str, receipt: Receipt, task: Task) -> Iterator[Fault]:
     expected, size = receipt.files.get(Path(path).name), ledger.store.size(path)
-    try:
-        if expected is None:
-            yield Fault("outdated", path, "it is not on the receipt of its task", task)
-        elif size is None:
-            yield Fault("missing", path, f"it does not exist, although {task.stage} {task.title} was run", task)
-        elif size < expected.bytes:
-            yield Fault("cut", path, f"it has {size:,} of {expected.bytes:,} bytes", task)
-        elif size > expected.bytes:
-            yield Fault("damaged", path, f"it has {size:,} bytes in place of {expected.bytes:,}", task)
-        elif file_sha256(ledger.out / path) != expected.sha256:
-            yield Fault("damaged", path, _OTHER_BYTES, task)
-    except OSError as error:
-        if not ledger.store.is_local:
-            raise  # it is the storage that fails
-        yield Fault("damaged", path, f"it cannot be read ({error.strerror})", task)
+    if expected is None:
+        yield Fault("outdated", path, "it is not on the receipt of its task", task)
+    elif size is None:
+        yield Fault("missing", path, f"it does not exist, although {task.stage} {task.title} was run", task)
+    elif size < expected.bytes:
+        yield Fault("cut", path, f"it has {size:,} of {expected.bytes:,} bytes", task)
+    elif size > expected.bytes:
+        yield Fault("damaged", path, f"it has {size:,} bytes in place of {expected.bytes:,}", task)
+    else:
+        yield from _byte_faults(ledger, path, expected.sha256, task)
 
 
 def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
@@ -108,8 +101,18 @@ def _page_faults(page: Page, ledger: Ledger) -> Iterator[Fault]:
         path = f"{page.folder}/{name}"
         if not ledger.store.is_file(path):
             yield Fault("missing", path, "it does not exist, although the page was written", page)
-        elif file_sha256(ledger.out / path) != sha256:
-            yield Fault("damaged", path, _OTHER_BYTES, page)
+        else:
+            yield from _byte_faults(ledger, path, sha256, page)
+
+
+def _byte_faults(ledger: Ledger, path: str, sha256: str, task: Task) -> Iterator[Fault]:
+    try:
+        if file_sha256(ledger.out / path) != sha256:
+            yield Fault("damaged", path, "it does not have the bytes that were written (SHA-256 differs)", task)
+    except OSError as error:
+        if not ledger.store.is_local:
+            raise  # it is the storage that fails
+        yield Fault("damaged", path, f"it cannot be read ({error.strerror})", task)
 
 
 def _value_faults(part: Shard, out: Path, receipt: Receipt) -> Iterator[Fault]:

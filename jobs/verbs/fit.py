@@ -37,11 +37,12 @@ def fit(
     from pipeline.fitting.measured import MEASURED
 
     path = MEASURED.get(str(data), data)
+    if out is not None and (held_out or compare):
+        other = "--compare" if compare else "--held-out"
+        raise BadInput("fit", "--out", str(out), f"is not written with {other}: leave one of them out")
     if compare:
         _photographs(path, compare)
         return
-    if held_out and out is not None:
-        raise BadInput("fit", "--out", str(out), "is not written with --held-out: leave one of them out")
     if not held_out:
         if out is None or out.suffix != ".toml":
             raise BadInput("fit", "--out", "" if out is None else str(out), "a path that ends in .toml is needed")

@@ -21,11 +21,10 @@ import numpy.typing as npt
 from PIL import Image
 
 from reports.images.exr import RGB, Exr
-from weaves.colour import LUMINANCE, linear_rgb
+from weaves.colour import EXPOSURE, LUMINANCE, linear_rgb
 from weaves.fabric import Fabric
 from weaves.surface import GAP, ClothSurface, surface_at
 
-EXPOSURE: Final = 1.6  # factor on linear values before they are shown
 RELATIVE_RANGE: Final = 0.5  # relative difference that is shown in full colour
 
 DIFFERENCE_RANGE: Final = 0.5  # difference, as a share of the truth's mean luminance, that is shown in full colour

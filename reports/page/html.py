@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 
 from reports.catalogue import METRICS
 from reports.images import tiles
-from reports.images.tiles import EXPOSURE, hex_colour
+from reports.images.tiles import hex_colour
 from reports.over_seeds import first_training
 from reports.page.colours import DARK, LIGHT, Scheme
 from reports.page.content import PageInput
@@ -22,6 +22,7 @@ from reports.tables.page_tables import ranged_frames, sections
 from reports.tables.sentences import headline, lacking, learnt, own_figures, scene_sentences, trade
 from reports.tables.summary import OF_PAPER, parts_of, rows, scene_table
 from reports.tables.table import WORDS
+from weaves.colour import EXPOSURE
 from weaves.fabric import Fabric
 
 FIRST_SIGHT: Final = frozenset({"trade", "error", "pictures", "live", "scenes", "traced", "measured"})

@@ -16,12 +16,12 @@ import numpy.typing as npt
 import pandas as pd
 
 from pipeline.models.added.added_code import ADDED_MODEL
-from reports.images.tiles import EXPOSURE, Bytes8, encoded, png
+from reports.images.tiles import Bytes8, encoded, png
 from reports.page.content import ModelNote, PictureFile
 from reports.record import TRUTH
 from reports.tables.number_format import beyond_noise, scientific
 from reports.tables.summary import BASELINE, rows
-from weaves.colour import LUMINANCE
+from weaves.colour import EXPOSURE, LUMINANCE
 
 FRAME_GAP: Final = 2  # clear pixels between frames
 SHOWN: Final = 6  # frames of a strip, if there are as many

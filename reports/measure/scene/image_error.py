@@ -41,7 +41,7 @@ from reports.error import Error, relative_weight, squared_error
 from reports.measure.block_bootstrap import block_interval, blocks
 from reports.options import ImageOptions
 from reports.record import Metric, Record
-from weaves.colour import LUMINANCE, delta_e, encoded
+from weaves.colour import EXPOSURE, LUMINANCE, delta_e, encoded
 from weaves.errors import BadInput
 
 PERCEIVED: Final[tuple[Metric, ...]] = ("psnr", "ssim", "flip_ldr", "flip_hdr", "delta_e")
@@ -50,7 +50,6 @@ PERCEIVED: Final[tuple[Metric, ...]] = ("psnr", "ssim", "flip_ldr", "flip_hdr", 
 RELATIVE_EPSILON: Final = 0.01
 """Constant that keeps the relative MSE of dark pixels finite, as a share of the truth's squared mean."""
 
-DISPLAY_EXPOSURE: Final = 1.6  # factor on linear values before they are shown, as on the page
 _DEFAULTS: Final = ImageOptions()
 
 
@@ -155,7 +154,7 @@ def _perceived_maps(picture: Float64, truth: Float64, lit: Mask) -> dict[str, Fl
     """Return the maps above by name, (H, W); pictures (H, W, 3), `lit` (H, W) the pixels that count."""
     grey = float(np.median(truth[lit] @ LUMINANCE))
     picture, truth = (np.where(lit[..., None], values, grey) for values in (picture, truth))
-    light, light_truth = (np.clip(DISPLAY_EXPOSURE * values, 0.0, 1.0) for values in (picture, truth))
+    light, light_truth = (np.clip(EXPOSURE * values, 0.0, 1.0) for values in (picture, truth))
     shown, shown_truth = encoded(light), encoded(light_truth)
     # The window is Gaussian, of 1.5 pixels, and cut at 3.5 of these.
     window = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}

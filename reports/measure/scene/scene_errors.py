@@ -30,12 +30,12 @@ from reports.images.exr import frame_layers
 from reports.measure.aliasing import excess_energy, flicker, temporal_variances
 from reports.measure.block_bootstrap import block_interval
 from reports.measure.pictures import write_picture
-from reports.measure.scene.image_error import DISPLAY_EXPOSURE, image_errors, noise_floor
+from reports.measure.scene.image_error import image_errors, noise_floor
 from reports.measure.scene.shot import Shot
 from reports.measure.timing import Contender, affordable, time_side_by_side, timed
 from reports.options import ImageOptions, RepeatOptions, SceneErrorOptions
 from reports.record import TRUTH, Record
-from weaves.colour import LUMINANCE
+from weaves.colour import EXPOSURE, LUMINANCE
 
 _LONGEST: Final = 0.01  # seconds of a timed call
 _FEWEST: Final = 128  # queries about a cloth in such a call: its fixed cost must not count as the cost of queries
@@ -160,6 +160,6 @@ def fovvideovdp(subject: Record, film: Float64, truth: Float64) -> list[Record]:
         device="cpu",
         quiet=True,
     )
-    light = [(_PEAK * np.clip(DISPLAY_EXPOSURE * frames, 0.0, 1.0)).astype(np.float32) for frames in (film, truth)]
+    light = [(_PEAK * np.clip(EXPOSURE * frames, 0.0, 1.0)).astype(np.float32) for frames in (film, truth)]
     score = float(metric.predict(*light, dim_order="FHW", frames_per_second=30.0)[0])
     return [subject.of("fovvideovdp", score, len(film))]

@@ -6,7 +6,8 @@ import pytest
 
 from reports.images import draft, tiles
 from reports.images.exr import Exr
-from reports.images.tiles import EXPOSURE, displayed, encoded
+from reports.images.tiles import displayed, encoded
+from weaves.colour import EXPOSURE
 from weaves.draft import Draft, Matrix
 from weaves.fabric import load_fabric
 
@@ -24,7 +25,7 @@ def exr(rgb, alpha):
 
 def test_tones_are_those_of_the_page_or_of_reinhard_and_a_difference_is_blue_where_dark():
     """Linear .21404 is sRGB 127.5/255 by IEC 61966-2-1; 0 stays 0, what is too bright is cut, no cloth is clear."""
-    linear = np.array([[[0.21404 / tiles.EXPOSURE] * 3, [0.0] * 3, [9.0] * 3, [1.0] * 3]])
+    linear = np.array([[[0.21404 / EXPOSURE] * 3, [0.0] * 3, [9.0] * 3, [1.0] * 3]])
     shown = decoded(tiles.picture(exr(linear, [[1, 1, 1, 0]])))[0, :: tiles.SCALE]
     assert shown[0, :3].tolist() in ([127] * 3, [128] * 3) and shown[1].tolist() == [0, 0, 0, 255]
     assert shown[2].tolist() == [255, 255, 255, 255] and shown[3].tolist() == [0, 0, 0, 0]

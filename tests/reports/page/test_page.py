@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from pipeline.models.added.added_code import ADDED_MODEL
-from reports.images.tiles import EXPOSURE, hex_colour, size_of
+from reports.images.tiles import hex_colour, size_of
 from reports.measure.latents import SHARES
 from reports.page import figures
 from reports.page.colours import DARK, LIGHT
@@ -23,6 +23,7 @@ from reports.tables import summary
 from reports.tables.page_tables import page_frames
 from reports.tables.table import WORDS
 from tests.reports.page.conftest import Reader
+from weaves.colour import EXPOSURE
 from weaves.fabric import load_fabric
 
 

@@ -9,6 +9,7 @@ from pipeline.models.added.added_code import ADDED_MODEL
 from reports.images import tiles
 from reports.page.content import ModelNote, PictureFile
 from reports.page.pictures import FRAME_GAP, MOST_FILMS, SHOWN, films, filmstrip, liveliest, strips
+from weaves.colour import EXPOSURE
 
 
 def file(method, setting="", scene="attic", fabric=""):
@@ -53,7 +54,7 @@ def test_every_row_shows_its_frames_and_a_slice_over_time():
     picture = matplotlib.image.imread(io.BytesIO(filmstrip({"truth": frames, "points": frames[::-1]})), format="png")
     shown = np.rint(255 * picture).astype(int)[:: tiles.SCALE, :: tiles.SCALE]
     assert shown.shape == (2 * 12 + FRAME_GAP, (SHOWN + 1) * 20 + (SHOWN + 2) * FRAME_GAP, 4)
-    codes = tiles.encoded(tiles.EXPOSURE * frames)
+    codes = tiles.encoded(EXPOSURE * frames)
     for row, order in enumerate((range(SHOWN), range(7, 7 - SHOWN, -1))):
         line = shown[row * (12 + FRAME_GAP) :][:12]
         for place, frame in enumerate(order):
