@@ -8,21 +8,22 @@ have no place on a logarithmic axis and are left out.
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Final
 
 import numpy as np
 import pandas as pd
+from adjustText import adjust_text
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from reports.measure.by_size import SIZES
 from reports.page.colours import Scheme
 from reports.page.figures import NARROWEST_PLOT, SHOWN_ROLES, new_figure
-from reports.page.labels import Label, place_labels
 from reports.tables.number_format import display, size
 from reports.tables.summary import OF_PAPER, PAPER, front, of_baseline, parts_of, rows
 
@@ -83,12 +84,11 @@ def _by_role(
     paper = paper and _with_paper(table)
     height = 4.5 + 0.2 * -(-len(colours) // _LEGEND_COLUMNS)
     figure, panels = new_figure(max(4.9 * len(roles), NARROWEST_PLOT), height, len(roles), sharey=True)
-    labels: list[Label] = []
     for axes, role in zip(panels, roles, strict=True):
         own = table[table["role"] == role]
         _band(axes, scheme, own[own["front"]].sort_values("x"))
         for method, settings in parts_of(own, "method"):
-            labels += _curve(axes, scheme, method, settings, colours[method], role)
+            _curve(axes, scheme, method, settings, colours[method], role)
         for row in rows(own[of_baseline(own)]) if paper else ():
             _paper_arrow(axes, scheme, (row.x, row.y), math.sqrt(PAPER[0]))
         axes.set(title=f"{role.capitalize()} fabrics", xlabel=cost, xscale="log", yscale="log")
@@ -97,8 +97,21 @@ def _by_role(
         _tick(axes.xaxis, axes.get_xlim(), lambda value: f"{value:,.0f}", 7)
     panels[0].set_ylabel(error)
     _legend(figure, scheme, colours, math.sqrt(PAPER[0]) if paper else math.nan)
-    place_labels(figure, labels, scheme)
+    figure.draw_without_rendering()  # the layout moves the axes
+    for axes in panels:
+        _spread_labels(axes, scheme)
+    figure.set_layout_engine("none")
     return figure
+
+
+def _spread_labels(axes: Axes, scheme: Scheme) -> None:
+    """Move labels until none covers another or a mark, alike for equal figures; lines join those away from theirs."""
+    labels = [text for text in axes.texts if text.get_text()]
+    marks = [line.get_xydata() for line in axes.lines if line.get_marker() != "None"]
+    arrow = {"arrowstyle": "-", "color": scheme.muted, "linewidth": 0.7, "shrinkB": 4}
+    if labels:
+        x, y = np.concatenate(marks).T
+        adjust_text(labels, x, y, ax=axes, expand=(1.5, 1.9), max_move=None, iter_lim=500, arrowprops=arrow)
 
 
 def _against_time(
@@ -177,8 +190,8 @@ def _band(axes: Axes, scheme: Scheme, best: pd.DataFrame, width: float = 7.0) ->
     axes.plot(best["x"], best["y"], color=scheme.line, linewidth=width, zorder=1, solid_capstyle="round")
 
 
-def _curve(axes: Axes, scheme: Scheme, method: str, settings: pd.DataFrame, colour: str, role: str) -> Iterator[Label]:
-    """Draw the settings of a method as one curve; yield the labels of the first, the last and the baseline."""
+def _curve(axes: Axes, scheme: Scheme, method: str, settings: pd.DataFrame, colour: str, role: str) -> None:
+    """Draw the settings of a method as one curve, with labels at the first, the last and the baseline."""
     face = colour if role == "seen" else scheme.ground
     axes.plot(
         settings["x"], settings["y"], color=colour, marker=scheme.marker(method), markersize=7, markerfacecolor=face,
@@ -190,7 +203,8 @@ def _curve(axes: Axes, scheme: Scheme, method: str, settings: pd.DataFrame, colo
     ends = {settings["setting"].iloc[0], settings["setting"].iloc[-1]}
     for row in rows(settings[settings["setting"].isin(ends) | of_baseline(settings)]):
         if row.setting:
-            yield Label(axes, row.setting.removeprefix("k = "), row.x, row.y, scheme.text(colour))
+            label = axes.text(row.x, row.y, row.setting.removeprefix("k = "), fontsize=8, color=scheme.text(colour))
+            label.set(zorder=6, in_layout=False, path_effects=[withStroke(linewidth=2.5, foreground=scheme.ground)])
 
 
 def _paper_arrow(axes: Axes, scheme: Scheme, start: tuple[float, float], lower: float) -> None:

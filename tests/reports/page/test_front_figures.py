@@ -1,7 +1,9 @@
+import itertools
 import math
 
 import pandas as pd
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from reports.page import front_figures
 from reports.page.colours import LIGHT
@@ -47,6 +49,22 @@ def test_settings_are_curves_flicker_a_distance_and_bytes_have_a_front_of_their_
     figure = front_figures.error_against_bytes(LIGHT, table)
     band = figure.axes[0].lines[0].get_xydata()
     assert list(band[:, 0]) == [2000.0, 2005.0, 2006.0]  # woven, then 16 and 64 points
+
+
+def test_no_label_covers_another_or_a_mark_or_leaves_its_panel():
+    """Five methods of nearly one time and error, each with two labelled ends, a few pixels apart."""
+    rows = [(f"m{k}", 1000.0 * (1 + 0.02 * k), 0.03 * (1 + 0.01 * k), setting) for k in range(5) for setting in "ab"]
+    table = pd.DataFrame(rows, columns=["method", "ns", "flicker", "setting"])
+    table.loc[table["setting"] == "b", "ns"] *= 1.2
+    table = pd.concat([table, pd.DataFrame([("far", 9e3, 0.3, "a"), ("near", 1e2, 0.01, "a")], columns=table.columns)])
+    figure = front_figures.aliasing_against_time(LIGHT, table.assign(role="seen", front_flicker=False))
+    (axes,), canvas = figure.axes, FigureCanvasAgg(figure)
+    canvas.draw()
+    boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
+    assert len(boxes) == 12 and not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    marks = axes.transData.transform(table[["ns", "flicker"]].to_numpy())
+    assert not any(box.contains(*mark) for box in boxes for mark in marks)
+    assert all(axes.bbox.contains(*box.p0) and axes.bbox.contains(*box.p1) for box in boxes)
 
 
 def test_scenes_mark_their_fronts_and_what_cannot_be_drawn_has_no_panel():
