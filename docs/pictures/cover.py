@@ -16,7 +16,8 @@ from PIL import Image
 
 from jobs.verbs.render import shown_at
 from pipeline.cores import cores
-from pipeline.models.named import named_method
+from pipeline.models import named
+from pipeline.models.fallback import Fallback
 from pipeline.scenes.loading import load
 from pipeline.scenes.options import SceneOptions
 from pipeline.scenes.picture import picture
@@ -71,27 +72,22 @@ SCENE: Final = Scene(
 )
 
 
-class OneColour:
+class OneColour(Fallback):
     """Soft nodes, whose thread colours are those of a place under any of its lights: that saves most of the time."""
 
-    def __init__(self) -> None:
-        self._method = named_method("soft_nodes:2", "cover", "method")
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._method, name)
-
-    def colours(self, fabric: Any, queries: Any, seed: int) -> Any:
+    def colours(self, fabric: Any, queries: Any, seed: int = 0) -> Any:
         """Return the colours of the components of N queries, (N, 4, 3)."""
         _, first, back = np.unique(np.column_stack([queries.u, queries.v, queries.wo]), True, True, axis=0)
-        return self._method.colours(fabric, queries.take(first), seed)[back.ravel()]
+        return super().colours(fabric, queries.take(first), seed)[back.ravel()]
 
 
 def rendered() -> Any:
     """Return the picture in linear RGB."""
     loaded = load(SCENE, SceneOptions(environment_directions=9, environment_samples=256, largest_sigma=4.0))
+    method = OneColour(*named.loaded("soft_nodes:2", "cover", "method"))
     rgb = np.empty((*SIZE[::-1], 3), np.float32)
     with ThreadPoolExecutor(cores()) as pool:
-        for part in picture(loaded, OneColour(), pool, SIZE):
+        for part in picture(loaded, method, pool, SIZE):
             rgb[shown_at(part)] = part.planes["rgb"]
     return rgb
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar
 
+from jobs.plan.measurements.fabrics import TimeOfMethods
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.scenes import SceneShot
 from jobs.plan.measurements.subjects import Subjects
-from jobs.plan.measurements.timing import TimeOfMethods
 from jobs.plan.measurements.truth import LivePage
 from jobs.plan.task import PLACE, Place, Places, Progress, Stage, Task
 from jobs.plan.training import Training

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from jobs.plan.dataset import DataSet, Shard
-from jobs.plan.measurements import answers, fabrics, scenes, timing, truth
+from jobs.plan.measurements import answers, fabrics, scenes, truth
 from jobs.plan.measurements.measurement import Measurement
 from jobs.plan.measurements.subjects import Subjects
 from jobs.plan.page import Page
@@ -26,7 +26,7 @@ KINDS: Final[tuple[type[Measurement], ...]] = (
     scenes.SceneShot,
     scenes.FrameTime,
     fabrics.AtExtremes,
-    timing.TimeOfMethods,
+    fabrics.TimeOfMethods,
     fabrics.ErrorsBySize,
     fabrics.OfAddedMetric,
     answers.OfAnswers,

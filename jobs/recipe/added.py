@@ -52,20 +52,17 @@ class Added:
                 raise BadInput(ADD, "", text, f"a method {method.name!r} is given twice")
             self._given[method.name] = method
 
-    def entered(self, content: Mapping[str, Any], where: str, all_given: bool) -> dict[str, Any]:
-        """Return a recipe's file in which entries of methods from outside have all that the code says of them.
+    def entered(self, entries: Sequence[Any], where: str, all_given: bool) -> list[Any]:
+        """Return the models of a recipe's file; those from outside have all that the code says of them.
 
         With `all_given` the methods of `--add` that it does not name are entered too. BadInput if an entry names a
         method that is neither of the package, nor given, nor installed, or that cannot be used.
         """
-        entries = content.get("models", [])
-        if not isinstance(entries, list):
-            return dict(content)
         models = [self._entry(entry, f"models.{index}", where) for index, entry in enumerate(entries)]
         if all_given:
             named = [entry.get("model", entry.get("name")) for entry in entries if isinstance(entry, Mapping)]
             models += [method.model_dump() for name, method in self._given.items() if name not in named]
-        return {**content, "models": models} if models else dict(content)
+        return models
 
     def model_of(self, method: AddedMethod) -> str:
         """Return the value of `model` by which a recipe names a method: the name that its code states."""

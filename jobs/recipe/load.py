@@ -61,8 +61,10 @@ def _load(path: Path, chain: tuple[Path, ...], read: dict[Path, Recipe], added: 
         read[real] = _load(other, named[:-1], read, added)
         return read[real]
 
-    content = added.entered(read_toml(path), where, all_given=not chain)
-    content, trained_by = with_trained_by(content, where, load)
+    content, trained_by = read_toml(path), dict[str, Recipe]()
+    if isinstance(entries := content.get("models", []), list):
+        entered = added.entered(entries, where, all_given=not chain)
+        content["models"], trained_by = with_trained_by(entered, where, load)
     file = validated(RecipeFile, content, where)
     dataset = file.dataset
     recipe = Recipe(

@@ -9,7 +9,7 @@ on yarns like those of all. So "seen" and "unseen" mean the same for it as for t
 measured on the fabrics it was trained on and left out on the others.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from jobs.recipe.recipe import ModelRecipe, Recipe
@@ -21,24 +21,21 @@ _KEYS = ("model", "name", "recipe", "runtimes")  # of an entry; all other keys a
 
 
 def with_trained_by(
-    content: Mapping[str, Any], where: str, load: Callable[[Any, str], Recipe]
-) -> tuple[dict[str, Any], dict[str, Recipe]]:
+    entries: Sequence[Any], where: str, load: Callable[[Any, str], Recipe]
+) -> tuple[list[Any], dict[str, Recipe]]:
     """Replace entries of models that another recipe trains by their entries there.
 
-    Return the file with those entries written out, and the recipe that trains each such model, by the model's name.
+    Return the models of a file with those entries written out, and the recipe that trains each such model, by its name.
     `load` returns the recipe of a name, which stands at a key of the file. BadInput if there is no such recipe or no
     such model in it, nothing to train, or another key than `_KEYS`.
     """
-    entries = content.get("models")
-    if not isinstance(entries, list):
-        return dict(content), {}
     models, trained_by = [], {}
     for index, entry in enumerate(entries):
         if isinstance(entry, Mapping) and "recipe" in entry:
             entry, trainer = _taken_over(entry, f"models.{index}", where, load)
             trained_by[entry["name"]] = trainer
         models.append(entry)
-    return {**content, "models": models}, trained_by
+    return models, trained_by
 
 
 def check_trained_by(recipe: Recipe, where: str) -> None:

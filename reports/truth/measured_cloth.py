@@ -18,7 +18,7 @@ from pipeline.fitting.straight import STRAIGHT_NOISE
 from reports.truth.row_records import RowRecords
 
 LABORATORY: Final = "a second measurement"  # the laboratories' own errors
-_DRAFTS: Final = ("plain", "twill 2/2")  # one takes two to three minutes for all rings
+_DRAFTS: Final = ("plain", "twill 2/2", "sateen")  # one takes two to three minutes for all rings
 _SHADE = "shade_6216"
 _QUANTITIES: Final = ("light straight through", "reflectance", "BRDF below 65 degrees")
 

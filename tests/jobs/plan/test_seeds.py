@@ -1,8 +1,7 @@
 import pytest
 
-from jobs.plan.measurements.fabrics import AtExtremes, ErrorsBySize, Latents, OnFabric
+from jobs.plan.measurements.fabrics import AtExtremes, ErrorsBySize, Latents, OnFabric, TimeOfMethods
 from jobs.plan.measurements.scenes import FrameTime, OnScene
-from jobs.plan.measurements.timing import TimeOfMethods
 from jobs.plan.training import Training
 from tests.jobs.identities import assert_changed
 
