@@ -3,17 +3,15 @@
 import re
 import shutil
 import subprocess
-import threading
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.shader.golden import DENSITY_COLUMN, TRANSPARENCY_COLUMN
-from tests.browser import opened
+from tests.browser import opened, served
 from tests.pipeline.shader.conftest import ALLOWED, read
+from weaves.colour import encoded
 
 pytestmark = pytest.mark.external  # slangc, g++ and Chromium
 
@@ -29,17 +27,13 @@ def example(language):
 def test_the_quad_draws_what_the_shader_answers(exported, cpp, tmp_path):
     shutil.copytree(exported("denim", 2, "glsles"), tmp_path / "shaders" / "denim")
     (tmp_path / "quad.html").write_text(example("html"))
-    handler = partial(SimpleHTTPRequestHandler, directory=tmp_path)
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        address = f"http://127.0.0.1:{server.server_port}/quad.html"
-        with opened(address, tmp_path / "profile", ready="document.title === 'drawn'") as page:
-            row = page.run("""(() => {
-                const gl = document.getElementById("cloth").getContext("webgl2"), seen = new Uint8Array(4 * 256);
-                gl.readPixels(0, 100, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, seen);
-                return Array.from(seen);
-            })()""")
-        server.shutdown()
+    ready = "document.title === 'drawn'"
+    with served(tmp_path) as address, opened(f"{address}/quad.html", tmp_path / "profile", ready=ready) as page:
+        row = page.run("""(() => {
+            const gl = document.getElementById("cloth").getContext("webgl2"), seen = new Uint8Array(4 * 256);
+            gl.readPixels(0, 100, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, seen);
+            return Array.from(seen);
+        })()""")
     pixels = np.reshape(row, (256, 4))[:, :3].astype(float)
 
     # The camera of the page: row 100 of 256, eight yarns wide, from 40 yarns above.
@@ -49,8 +43,7 @@ def test_the_quad_draws_what_the_shader_answers(exported, cpp, tmp_path):
     rows = np.zeros((256, 12))
     rows[:, :2], rows[:, 2:4], rows[:, 5:8], rows[:, 8:11] = 4.0 + ray[:, :2], 0.5 * side, (0.48, 0.36, 0.8), wo
     colours = np.array(list(cloth.about["colours"].values()))[:4]
-    colour = np.minimum(3.0 * cpp(cloth.buffers, rows)[:, :4] @ colours, 1.0)
-    expected = 255.0 * np.where(colour <= 0.0031308, 12.92 * colour, 1.055 * colour ** (1 / 2.4) - 0.055)
+    expected = 255.0 * encoded(np.minimum(3.0 * cpp(cloth.buffers, rows)[:, :4] @ colours, 1.0))
     # Places are rounded in another order, which moves a few of them into the next cell of a grid.
     assert np.ptp(expected) > 50.0 and (np.abs(pixels - expected).max(axis=1) <= 1.0).mean() > 0.98
 

@@ -6,9 +6,6 @@ import os
 import re
 import shutil
 import subprocess
-import threading
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +14,7 @@ from PIL import Image
 
 from jobs.cli import main
 from pipeline.shader.languages import slangc
-from tests.browser import opened
+from tests.browser import opened, served
 
 ROOT = Path(__file__).parents[4]
 
@@ -38,12 +35,9 @@ def test_three_draws_the_sample_its_material_and_the_shader(tmp_path, monkeypatc
     assert main(["export", "denim", "--shader", "shaders/denim", "--language", "glsles"]) == 0
     Path("three.html").write_text(page.replace(address, "./package"), encoding="utf-8")
     Path("favicon.ico").touch()
-    with ThreadingHTTPServer(("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=tmp_path)) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        place = f"http://127.0.0.1:{server.server_port}/three.html"
-        with opened(place, tmp_path / "profile", ready="document.title === 'drawn'") as browser:
-            data = browser.run("document.getElementById('cloth').toDataURL()")
-        server.shutdown()
+    ready = "document.title === 'drawn'"
+    with served(tmp_path) as place, opened(f"{place}/three.html", tmp_path / "profile", ready=ready) as browser:
+        data = browser.run("document.getElementById('cloth').toDataURL()")
     assert not browser.errors
     shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(data.partition(",")[2]))).convert("RGB")).astype(float)
     if os.environ.get("TWILLIGHT_WRITE_PICTURES"):
