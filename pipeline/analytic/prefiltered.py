@@ -1,16 +1,13 @@
 """MIP maps of normals and tangents: one evaluation of the point model for each family.
 
 For each family a pyramid holds the share c of the cloth's area that it covers, and the means over this share of the
-normal n, the tangent t and, for `lean`, the products t t^T; a texel of the next level is the mean of four (mip_levels).
+normal n, the tangent t and the products t t^T; a texel of the next level is the mean of four (mip_levels).
 The answer is the ratio of sums over both families (and gaps) of c <wo.n> / (n_s.n) F, n normalised, with a roughness
-widened by how much the tangents differ:
+widened by the variance of h.t, h the half vector, as LEAN mapping does for glossy normals [Olano2010LEAN]:
 
-    toksvig   alpha'^2 = alpha^2 + (1 - |E t|^2) / 2               the mean's length tells the variance
-    lean      alpha'^2 = alpha^2 + h^T (E[t t^T] - E[t] E[t]^T) h   the variance of h.t itself, h the half vector
-    none      alpha'   = alpha
+    alpha'^2 = alpha^2 + h^T (E[t t^T] - E[t] E[t]^T) h
 
-as Toksvig (2005) and LEAN mapping (Olano and Baker 2010) do for glossy normals. Nothing hides anything; with parallax,
-a footprint is moved to the place that its middle ray sees (parallax_mapping).
+Nothing hides anything; with parallax, a footprint is moved to the place that its middle ray sees (parallax_mapping).
 """
 
 import math
@@ -28,13 +25,11 @@ from pipeline.truth.scattering.slab_float32 import reflection
 from weaves.fabric import Fabric
 from weaves.surface import surface_at
 
-NONE, TOKSVIG, LEAN = range(3)
-WIDENINGS: Final = {"none": NONE, "toksvig": TOKSVIG, "lean": LEAN}
-
+TEXELS_PER_YARN: Final = 16  # at least, of the finest level
 CHANNELS: Final = 13
 """Numbers a family and texel: coverage; times it normal, tangent, and tangent's products xx, yy, zz, xy, xz, yz."""
 
-_0, _1, _2, _HALF = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(0.5)
+_0, _1, _2 = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 _TINY = np.float32(1e-12)
 _FAINT = np.float32(1e-6)  # coverage below which a family is not there
 _INVERSE_PI, _FOURTH_PI = np.float32(1.0 / math.pi), np.float32(0.25 / math.pi)
@@ -49,13 +44,10 @@ class PrefilteredMaps(NamedTuple):
     heights: HeightMaps  # heights of the same texels; gaps have the lowest
 
 
-def tabulate(fabric: Fabric, texels_per_yarn: int, parallax: bool = True) -> PrefilteredMaps:
-    """Average the maps of a fabric's surface, down to one texel; sides are powers of two.
-
-    The finest level has at least `texels_per_yarn` texels along a yarn spacing.
-    """
+def tabulate(fabric: Fabric, parallax: bool = True) -> PrefilteredMaps:
+    """Average the maps of a fabric's surface, down to one texel; sides are powers of two."""
     ends, picks = fabric.weave.repeat
-    columns, rows = (1 << math.ceil(math.log2(extent * texels_per_yarn)) for extent in (ends, picks))
+    columns, rows = (1 << math.ceil(math.log2(extent * TEXELS_PER_YARN)) for extent in (ends, picks))
     x, y = (np.arange(columns) + 0.5) * (ends / columns), (np.arange(rows) + 0.5) * (picks / rows)
     surface = surface_at(fabric, x[None, :], y[:, None])
     parts = []
@@ -75,13 +67,13 @@ def tabulate(fabric: Fabric, texels_per_yarn: int, parallax: bool = True) -> Pre
     )
 
 
-def answer(tables: PrefilteredMaps, queries: Queries, widening: int) -> Float32:
+def answer(tables: PrefilteredMaps, queries: Queries) -> Float32:
     """Return the components (N, 4); queries are round, flat and lit from the front."""
-    return _answer(tables, Queries(*(np.ascontiguousarray(column, np.float32) for column in queries)), widening)
+    return _answer(tables, Queries(*(np.ascontiguousarray(column, np.float32) for column in queries)))
 
 
 @allocating_kernel
-def _answer(tables: PrefilteredMaps, queries: Queries, widening: int) -> Float32:
+def _answer(tables: PrefilteredMaps, queries: Queries) -> Float32:
     u, v, wi, wo = queries.u, queries.v, queries.wi, queries.wo
     result = np.zeros((len(u), 4), np.float32)
     read = np.zeros(2 * CHANNELS, np.float32)
@@ -108,12 +100,9 @@ def _answer(tables: PrefilteredMaps, queries: Queries, widening: int) -> Float32
             square = yarn[family, 0] * yarn[family, 0]
             along = hx * tx + hy * ty + hz * tz
             length = tx * tx + ty * ty + tz * tz
-            if widening == TOKSVIG:
-                square = min(square + _HALF * max(_1 - length, _0), _1)
-            elif widening == LEAN:
-                crossed = hx * hy * read[k + 10] + hx * hz * read[k + 11] + hy * hz * read[k + 12]
-                variance = hx * hx * read[k + 7] + hy * hy * read[k + 8] + hz * hz * read[k + 9] + _2 * crossed
-                square = min(square + size * max(variance * inverse - along * along, _0), _1)
+            crossed = hx * hy * read[k + 10] + hx * hz * read[k + 11] + hy * hz * read[k + 12]
+            variance = hx * hx * read[k + 7] + hy * hy * read[k + 8] + hz * hz * read[k + 9] + _2 * crossed
+            square = min(square + size * max(variance * inverse - along * along, _0), _1)
             t = _1 / np.sqrt(max(length, _TINY))
             cos_o, cos_i = (ox * nx + oy * ny + oz * nz) * n, (ix * nx + iy * ny + iz * nz) * n
             if cos_o <= _0:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from pydantic import Field
-
 from pipeline.models.analytic.adapter import Analytic, AnalyticOptions
 from pipeline.per_fabric import PerFabric
 
@@ -24,18 +22,13 @@ class PrefilteredOptions(AnalyticOptions):
     prepare_seconds: ClassVar[float] = 0.3
 
     model: Literal["prefiltered"] = "prefiltered"
-    texels_per_yarn: int = Field(default=16, ge=1, le=128)
-    """Texels of the finest level along one yarn spacing, at least; a repeat's sides are powers of two."""
-    widening: Literal["none", "toksvig", "lean"] = "lean"
-    """Source of the widened roughness: none, the mean tangent's length, or the half vector's variance."""
 
     def methods(self) -> list[Analytic[PrefilteredMaps]]:
         """Return the one method."""
-        from pipeline.analytic.prefiltered import WIDENINGS, answer, tabulate
+        from pipeline.analytic.prefiltered import answer, tabulate
 
         def stored(tables: PrefilteredMaps) -> int:
             return tables.maps.texels.nbytes + self.parallax * tables.heights.maps.texels.nbytes
 
-        widening = WIDENINGS[self.widening]
-        tables = PerFabric(lambda fabric: tabulate(fabric, self.texels_per_yarn, self.parallax))
-        return [Analytic(self, None, tables, lambda tables, queries, _: answer(tables, queries, widening), stored)]
+        tables = PerFabric(lambda fabric: tabulate(fabric, self.parallax))
+        return [Analytic(self, None, tables, lambda tables, queries, _: answer(tables, queries), stored)]
