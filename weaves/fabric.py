@@ -39,6 +39,9 @@ Weave = Annotated[Plain | Rib | Basket | Twill | Herringbone | Satin | Matrix | 
 """The weave families; a file chooses one by `family`."""
 
 
+Thickness = Annotated[float, Strict(), Field(ge=0.001, le=100)]
+
+
 class Fabric(Frozen):
     """A woven fabric.
 
@@ -55,7 +58,7 @@ class Fabric(Frozen):
 
     name: FileName
     source: str = Field(default="", max_length=2000)
-    optical_thickness: Annotated[float, Strict()] = Field(default=2.0, ge=0.001, le=100)
+    optical_thickness: Thickness = 2.0
     """Optical thickness T of the yarn layer."""
     yarns_per_cm: tuple[PerCm, PerCm] | None = None
     """Ends per centimetre and picks per centimetre: the physical size, where it is known; a file may call it `sett`."""

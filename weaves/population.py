@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from functools import cache
 from typing import Literal, get_args
@@ -25,7 +25,7 @@ from pydantic import Field, StrictBool, StrictInt, ValidationError, ValidationIn
 
 from weaves.draft import Draft, Family, Matrix, cells
 from weaves.errors import BadInput
-from weaves.fabric import Fabric
+from weaves.fabric import Fabric, Thickness
 from weaves.families import Basket, Herringbone, Plain, Rib, Satin, Twill, valid_moves
 from weaves.validation import Frozen
 from weaves.yarn import Number, Yarn
@@ -51,6 +51,8 @@ class Ranges(Frozen):
     """Gap scale; the published generator takes [0.6, 0.9] for plain weaves, [0.85, 0.95] for the others."""
     bend: Range = (10.0, 50.0)  # largest inclination, degrees
     twist: Range = (0.0, 0.0)  # fibre angle, degrees; one value for both yarns, which a mill spins alike
+    blend: Range = (0.5, 0.5)  # one value for both yarns, too
+    optical_thickness: tuple[Thickness, Thickness] = (2.0, 2.0)  # uniform in its logarithm
 
     @field_validator("*")
     @classmethod
@@ -58,6 +60,8 @@ class Ranges(Frozen):
         if bounds[0] > bounds[1]:
             raise ValueError("a range is [lowest, highest]")
         for value in bounds:
+            if info.field_name == "optical_thickness":
+                break  # its type says what a cloth may have
             try:
                 Yarn.model_validate({"bend": 0.0, "roughness": 1.0, str(info.field_name).partition("_")[0]: value})
             except ValidationError as error:
@@ -121,21 +125,26 @@ def _draw(population: Population, allowed: list[tuple[FamilyName, list[Draft]]],
         # A stream of its own, so that the other numbers are what they were without it.
         solid = bool(np.random.default_rng([population.seed, index, 1]).random() < population.solid)
 
-    def between(bounds: Range) -> float:
+    def between(bounds: Range, share: Callable[[], float] = random) -> float:
         # Six decimals: a number that a person can copy from a manifest.
-        return round(bounds[0] + (bounds[1] - bounds[0]) * random(), 6)
+        return round(bounds[0] + (bounds[1] - bounds[0]) * share(), 6)
 
     def spin(roughness: Range, twist: float) -> Yarn:
         low, high = np.sqrt(roughness).tolist()
         alpha = min(max(round(between((low, high)) ** 2, 6), roughness[0]), roughness[1])
         relief, width = between(ranges.relief), between(ranges.width)
-        shape = {"width": 1.0 if solid else width, "bend": between(ranges.bend), "twist": twist}
-        return Yarn(roughness=alpha, relief=relief, **shape)
+        shape = {"width": 1.0 if solid else width, "bend": between(ranges.bend), "twist": twist, "blend": blend}
+        return Yarn(roughness=alpha, relief=relief, diffuse=(grey, grey, grey), **shape)
 
-    twist = between(ranges.twist)
+    twist, later = between(ranges.twist), np.random.default_rng([population.seed, index, 3]).random
+    blend, (thin, thick) = between(ranges.blend, later), ranges.optical_thickness
+    thickness = min(max(round(thin * (thick / thin) ** later(), 6), thin), thick)
+    # Of thin yarns no brighter grey is legal; rows have unit colours.
+    grey = min(0.3, math.floor(1e4 * Yarn(bend=0.0, roughness=1.0).most_diffuse(thickness)[0]) / 1e4)
     return Fabric(
         name=names.format(index=index, family=family),
         source=f"Drawn from seed {population.seed}: {draft.name}, begun {shift[0]} ends and {shift[1]} picks further.",
+        optical_thickness=thickness,
         draft=Matrix(rows=tuple(draft.rolled(*shift).rows())),
         warp=spin(ranges.roughness_warp, twist),
         weft=spin(ranges.roughness_weft, twist),

@@ -43,8 +43,8 @@ def test_excluded_drafts_do_not_occur_in_any_disguise():
 
 @pytest.mark.parametrize("family", get_args(FamilyName))
 def test_numbers_lie_in_their_ranges(family):
-    shared = {"relief": (0.5, 0.6), "width": (0.8, 0.9), "bend": (7, 9), "twist": (5, 6)}
-    ranges = Ranges(roughness_warp=(0.1, 0.2), roughness_weft=(0.3, 0.4), **shared)
+    shared = {"relief": (0.5, 0.6), "width": (0.8, 0.9), "bend": (7, 9), "twist": (5, 6), "blend": (0.2, 0.3)}
+    ranges = Ranges(roughness_warp=(0.1, 0.2), roughness_weft=(0.3, 0.4), optical_thickness=(0.1, 4.0), **shared)
     population = Population(count=20, seed=2, families=(family,), **dict.fromkeys(RANGES, ranges))
     for fabric in population_fabrics(population):
         assert Fabric.model_validate(fabric.model_dump()) == fabric and max(fabric.weave.repeat) <= 16
@@ -52,6 +52,7 @@ def test_numbers_lie_in_their_ranges(family):
             for key, (low, high) in (shared | {"roughness": roughness}).items():
                 assert low <= getattr(yarn, key) <= high
         assert fabric.warp.bend != fabric.weft.bend and fabric.warp.twist == fabric.weft.twist
+        assert 0.1 <= fabric.optical_thickness <= 4.0 and fabric.warp.blend == fabric.weft.blend
 
 
 def test_square_roots_of_roughness_are_uniform_and_families_equally_likely():

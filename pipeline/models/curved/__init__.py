@@ -15,7 +15,8 @@ class CurvedOptions(TextureOptions):
     """Opacity, offset and reflectance of one fabric on curved surfaces [Kuznetsov2022Curved]."""
 
     fixed: ClassVar[tuple[str, ...]] = (
-        *TextureOptions.fixed, "certain", "silhouette_anywhere", "silhouette_texels_per_yarn", "silhouette_weight"
+        *TextureOptions.fixed, "certain", "silhouette_anywhere", "silhouette_points", "silhouette_seed",
+        "silhouette_texels_per_yarn", "silhouette_weight",
     )  # fmt: skip
     any_physics: ClassVar[bool] = True
     seconds: ClassVar[tuple[float, float]] = (2.5e-5, 2e-6)
@@ -39,13 +40,13 @@ class CurvedOptions(TextureOptions):
     """Texels of the opacity's own texture. A ray meets crests yarns away, so that finer ones hold little but noise."""
     silhouette_rows: int = Field(default=262_144, ge=64, le=2**24)
     """Queries about the silhouette, in shards of their own."""
-    silhouette_points: Literal[32, 64, 128, 256, 512, 1024] = 32
+    silhouette_points: ClassVar[int] = 32
     """Rays of each query; a grazing cosine takes a sixteenth of them."""
     silhouette_sigma: tuple[float, float] = (0.05, 32.0)
     """Range of their footprints, in yarn spacings; drawn log-uniformly."""
     largest_curvature: float = Field(default=0.5, gt=0, le=1)
     """Largest curvature learnt and answered, in 1/yarn spacings."""
-    silhouette_seed: int = Field(default=0, ge=0, lt=2**63)
+    silhouette_seed: ClassVar[int] = 0
     """Seed of these queries and of their rays."""
     silhouette_anywhere: ClassVar[float] = 0.1
     """Share of the queries about the silhouette with any cosine; the others lie where the opacity varies."""

@@ -37,8 +37,8 @@ class WovenOptions(ComponentLossOptions):
     spatial_fusion: bool = True
     """Merge latent and patch before the directions (the published design); otherwise all enter together."""
     transmission: bool = False
-    """Learn cloth with gaps and light from behind: widths and optical thickness join the fabric's parameters (the paper
-    reads four and shows one transmissive cloth), and the transparency is a fifth output."""
+    """Learn cloth with gaps and light from behind: widths, blends and optical thickness join the fabric's parameters
+    (the paper reads four and shows one transmissive cloth), and the transparency is a fifth output."""
     standard: bool = True
     """Bring every fabric into standard position first, so that mirror images need not be learnt."""
     roll: bool = True
@@ -54,6 +54,11 @@ class WovenOptions(ComponentLossOptions):
         if self.one_blob == "local" and not self.spatial_fusion:
             raise ValueError("one_blob = 'local' needs spatial_fusion")
         return self
+
+    @property
+    def version(self) -> int:
+        """Version of the model's numbers; `transmission` had fewer parameters before."""
+        return super().version + self.transmission
 
     @property
     def departures(self) -> tuple[str, ...]:  # type: ignore[override]

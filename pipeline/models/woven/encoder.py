@@ -11,6 +11,7 @@ latent is then the same wherever the repeat begins. The paper's encoder of the m
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -33,8 +34,8 @@ class WovenInputs(NamedTuple):
     maps: Tensor
     """Ply normal and fibre tangent at texel centres over one repeat; row = y, column = x, (F, 6, side, side)."""
     parameters: Tensor
-    """alpha_warp, alpha_weft, beta_warp, beta_weft; with `transmission` both widths and the optical thickness,
-    (F, 4 or 7)."""
+    """alpha_warp, alpha_weft, beta_warp, beta_weft; with `transmission` both widths and blends, and the logarithm of
+    the optical thickness over its usual value, (F, 4 or 9)."""
     placement: Placement  # transformation of queries into standard position
 
     def take(self, index: Tensor) -> WovenInputs:
@@ -74,7 +75,8 @@ def read_cloth(fabrics: Sequence[Fabric], options: WovenOptions, like: Fabric | 
         surface = surface_at(seen, centre[None, :] * ends, centre[:, None] * picks)
         maps.append(np.concatenate([surface.normal, surface.tangent], axis=-1).transpose(2, 0, 1))
         numbers = [seen.warp.roughness, seen.weft.roughness, seen.warp.relief, seen.weft.relief]
-        more = [seen.warp.width, seen.weft.width, seen.optical_thickness / 2.0]
+        more = [seen.warp.width, seen.weft.width, seen.warp.blend, seen.weft.blend]
+        more += [math.log(seen.optical_thickness / 2.0)]
         parameters.append(numbers + (more if options.transmission else []))
         placements.append(placement(fabric, symmetry, start))
     together = Placement(*(torch.cat(parts) for parts in zip(*placements, strict=True)))
@@ -95,7 +97,7 @@ class _MapBlock(nn.Module):
 
 
 class Encoder(nn.Module):
-    """Maps (F, 6, side, side) and parameters (F, 4 or 7) to latents, with a picture appended if it is `local`."""
+    """Maps (F, 6, side, side) and parameters (F, 4 or 9) to latents, with a picture appended if it is `local`."""
 
     def __init__(self, options: WovenOptions) -> None:
         super().__init__()
@@ -104,7 +106,7 @@ class Encoder(nn.Module):
         self.local, self.bins = options.one_blob == "local", options.bins
         flat = channels[-1] if self.local else channels[-1] * (options.map_texels // 16) ** 2
         self.flat = nn.Linear(flat, options.latent)
-        self.join = nn.Linear(options.latent + (7 if options.transmission else 4), options.hidden)
+        self.join = nn.Linear(options.latent + (9 if options.transmission else 4), options.hidden)
         self.deeper = nn.Linear(options.hidden, options.hidden) if options.extra_layer == "encoder" else None
         self.mix = Residual(options.hidden)
         self.last = nn.Linear(options.hidden, options.latent)

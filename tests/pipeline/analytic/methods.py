@@ -35,7 +35,7 @@ def points(fabric, queries, count=256, rims=True):
 
 
 def averaged_normals(fabric, queries):
-    return prefiltered.answer(_maps(fabric, 16), queries, prefiltered.LEAN)
+    return prefiltered.answer(_maps(fabric), queries)
 
 
 PLACED = [soft_nodes, unshadowed, soft_nodes_behind, averaged_normals]

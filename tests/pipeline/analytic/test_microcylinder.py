@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.analytic.microcylinder import FITTED_WIDTHS, Cylinders, answer, cylinders_of, fit, lobes
 from pipeline.shards.queries import QueryOptions, draw_queries
+from tests.pipeline.truth.cloths import IMAGES, LOPSIDED, agree
 from weaves.fabric import load_fabric
 
 QUERIES = draw_queries(QueryOptions(max_angle=85.0), (4, 4), 1, 0, 200)
@@ -54,3 +55,11 @@ def test_lobes_are_those_of_the_angles_and_a_fit_finds_its_own_answers(name):
     again = fit(threads, QUERIES, answer(made, QUERIES).astype(float))
     np.testing.assert_allclose(again.widths, made.widths)
     np.testing.assert_allclose(again.scales, made.scales, atol=1e-4)
+
+
+@pytest.mark.parametrize("image", IMAGES)
+def test_a_cloth_drawn_in_another_way_has_the_same_answers(image):
+    """A mirror is no other cloth here, because cylinders have no twist."""
+    fabric, turned = IMAGES[image](QUERIES)
+    own, there = (answer(cylinders_of(cloth), q) for cloth, q in ((LOPSIDED, QUERIES), (fabric, turned)))
+    agree(own, there[:, [1, 0, 3, 2] if image == "exchange" else slice(None)], 1e-5, 1e-6)

@@ -9,8 +9,7 @@ from tests.directions import above
 from tests.pipeline.truth.cloths import woven
 from weaves.fabric import load_fabric
 
-RTOL = 1e-4
-"""Some forty roundings of 6e-8, and ten times that where a highlight's narrow denominator is a small difference."""
+RTOL = 1e-4  # forty roundings of 6e-8, and ten times that where a narrow denominator is a small difference
 
 
 @pytest.mark.parametrize(("wi", "wo"), [((0.3, -0.4), (0.1, 0.6)), ((-0.7, 0.3), (-0.6, 0.5))], ids=["apart", "near"])
@@ -39,16 +38,11 @@ def test_a_texel_is_a_point(wi, wo):
     np.testing.assert_allclose(found, expected, rtol=RTOL, atol=1e-6 * expected.max())
 
 
-@pytest.fixture(scope="module")
-def maps():
-    return tabulate(load_fabric("denim"))
-
-
-def test_each_level_is_the_mean_of_the_one_before_and_widening_lowers_highlights_alone(maps):
+def test_each_level_is_the_mean_of_the_one_before_and_widening_lowers_highlights_alone():
+    maps = tabulate(load_fabric("denim"))
     texels, levels = maps.maps.texels.astype(np.float64), maps.maps.levels
-    whole = texels[: levels[0, 1] * levels[0, 2]].mean(axis=0)
-    for first, width, height in levels:
-        np.testing.assert_allclose(texels[first : first + width * height].mean(axis=0), whole, atol=1e-6)
+    means = [texels[first : first + width * height].mean(axis=0) for first, width, height in levels]
+    np.testing.assert_allclose(means, means[:1] * len(means), atol=1e-6)
     shares = texels[-1, [0, CHANNELS]]
     assert shares.sum() == pytest.approx(1.0, abs=1e-6) and shares.min() > 0.1  # denim has no gaps
     # A texel of many tangents has a broader lobe: lower in its middle; diffuse light knows no roughness.
@@ -58,7 +52,6 @@ def test_each_level_is_the_mean_of_the_one_before_and_widening_lowers_highlights
         share, t = equal[:, first, None], equal[:, first + 4 : first + 7]
         pairs = np.stack([t[:, a] * t[:, b] for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=1)
         equal[:, first + 7 : first + CHANNELS] = pairs / np.maximum(share, 1e-9)
-    none = answer(maps._replace(maps=maps.maps._replace(texels=equal)), middle)[0]
-    lean = answer(maps, middle)[0]
+    none, lean = (answer(table, middle)[0] for table in (maps._replace(maps=maps.maps._replace(texels=equal)), maps))
     np.testing.assert_allclose(lean[2:], none[2:], rtol=1e-6)
     assert lean[:2].max() < none[:2].max()

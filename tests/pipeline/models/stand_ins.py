@@ -19,7 +19,7 @@ SMALL = {
     "woven": WovenOptions(map_texels=16, encoder_channels=4),
     "neumip": NeumipOptions(texels_per_yarn=4),
     "triple_plane": TriplePlaneOptions(texels_per_yarn=4, direction_texels=4),
-    "curved": CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_points=32, silhouette_sigma=(0.5, 8.0)),
+    "curved": CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_sigma=(0.5, 8.0)),
     "unified_btf": UnifiedBtfOptions(**_BTF),
     "btf_autoencoder": BtfAutoencoderOptions(**_BTF),
 }

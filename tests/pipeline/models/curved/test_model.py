@@ -120,8 +120,8 @@ def test_silhouettes_are_learnt(options):
     random = np.random.default_rng(3)
     losses = descend(optimiser, 120, lambda _: network._edge_loss(*network.silhouettes.draw(128, random)))
     assert min(losses) > 0 or options.silhouette == "opacity"
-    other = CURVED.model_copy(update={"silhouette_seed": 5, "silhouette_points": 256})
-    others = SilhouetteData(other.extra_rows[0].answer(DENIM, 0, 512), DENIM.weave.repeat)
+    other = CURVED.extra_rows[0].model_copy(update={"seed": 5, "points": 256})
+    others = SilhouetteData(other.answer(DENIM, 0, 512), DENIM.weave.repeat)
     view = View(*(others.get_buffer(name) for name in View._fields))
     target = others.get_buffer("target")[:, 0]
     error = (network.eval().cover(view).detach() - target).square().mean().sqrt()

@@ -61,13 +61,12 @@ def test_bare_numbers_and_the_bias_are_at_their_start_and_transmission_sees_widt
     expected = [(math.log1p(k * 0.02) + math.log1p(k * 0.04)) / 2, (math.log1p(k * 0.01) + math.log1p(k * 0.03)) / 2]
     assert network.decoder.last.bias.tolist() == pytest.approx([*expected, 0.1, 0.3], rel=1e-5)
     assert network.decoder.last.weight.abs().max() < 0.05 * before.abs().max()
-    # Cloths that differ in width alone have other latents; transparency stays in [0, 1]; off, it is 0.
+    # Cloths that differ in width or blend alone have other inputs; transparency stays in [0, 1]; off, it is 0.
     options = WOVEN.model_copy(update={"transmission": True})
     voile = load_fabric("voile")
     method = Woven(WovenNetwork(options))
-    cloth = read_cloth([voile, woven("voile", warp={"width": 0.6})], options)
-    assert cloth.parameters.shape == (2, 7)
-    assert not torch.equal(cloth.parameters[0], cloth.parameters[1])
+    cloth = read_cloth([voile, *(woven("voile", warp=change) for change in ({"width": 0.6}, {"blend": 0.9}))], options)
+    assert cloth.parameters.shape == (3, 9) and len(cloth.parameters.unique(dim=0)) == 3
     asked = draw_queries(QueryOptions(behind=0.5), voile.weave.repeat, 1, 0, 64)
     share = method.transparency(voile, asked)
     assert share.shape == (64,) and ((share >= 0) & (share <= 1)).all()
