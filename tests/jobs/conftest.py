@@ -100,6 +100,7 @@ def twillight(capsys, monkeypatch, tmp_path):
     """Run the command line in a folder of its own; return exit code, output and complaint."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr("jobs.cli.app._fallback_console", None)  # it keeps the width at its first use
 
     def call(*tokens):
         capsys.readouterr()
