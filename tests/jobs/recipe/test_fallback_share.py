@@ -37,13 +37,11 @@ def test_shares(model, fabrics, share):
     assert fallback_share(MODELS[model], QUICK, asked(*fabrics)) == pytest.approx(share, abs=0.03)
 
 
-def test_a_model_that_another_recipe_trains_has_the_domain_of_that_one():
+def test_it_is_what_the_model_itself_will_leave_whichever_recipe_trains_it():
     trade = load_recipe("trade")
     shares = {model.options.name: fallback_share(model, trade, asked("voile")) for model in trade.models}
     assert shares["woven"] == 1.0 and 0.0 < shares["woven_transmission"] < 0.3
 
-
-def test_it_is_what_the_model_itself_will_leave():
     class Trained:
         name = setting = ""
         domain = Domain.of(QUICK.dataset.model_dump(mode="json"), QUICK.seen + QUICK.population)

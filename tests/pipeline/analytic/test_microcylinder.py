@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 
 from pipeline.analytic.microcylinder import FITTED_WIDTHS, Cylinders, answer, cylinders_of, fit, lobes
 from pipeline.shards.queries import QueryOptions, draw_queries
@@ -45,20 +44,20 @@ def by_angles(threads, wi, wo):
     return result / area
 
 
-@pytest.mark.parametrize("name", ["satin_8", "gauze"])
-def test_lobes_are_those_of_the_angles_and_a_fit_finds_its_own_answers(name):
-    threads = cylinders_of(load_fabric(name))
-    assert 0.0 < threads.cover.sum() <= 1.0 + 1e-12 and (name == "gauze") == (threads.cover.sum() < 0.999)
-    made = Cylinders(*threads[:2], FITTED_WIDTHS[[[5, 12], [8, 20]]], np.array([[0.1, 0.2, 0.3], [0.05, 0.4, 0.0]]))
-    expected = [by_angles(made, *pair) for pair in zip(QUERIES.wi.astype(float), QUERIES.wo.astype(float), strict=True)]
-    np.testing.assert_allclose(lobes(made, QUERIES), expected, rtol=1e-6, atol=1e-9)
-    for one, other in zip(fit(threads, QUERIES, answer(made, QUERIES).astype(float)), made, strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-4)
+def test_lobes_are_those_of_the_angles_and_a_fit_finds_its_own_answers():
+    for name in ("satin_8", "gauze"):
+        own = cylinders_of(load_fabric(name))
+        assert 0.0 < own.cover.sum() <= 1.0 + 1e-12 and (name == "gauze") == (own.cover.sum() < 0.999)
+        made = Cylinders(*own[:2], FITTED_WIDTHS[[[5, 12], [8, 20]]], np.array([[0.1, 0.2, 0.3], [0.05, 0.4, 0.0]]))
+        directions = zip(QUERIES.wi.astype(float), QUERIES.wo.astype(float), strict=True)
+        expected = [by_angles(made, *pair) for pair in directions]
+        np.testing.assert_allclose(lobes(made, QUERIES), expected, rtol=1e-6, atol=1e-9)
+        for one, other in zip(fit(own, QUERIES, answer(made, QUERIES).astype(float)), made, strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-4)
 
 
-@pytest.mark.parametrize("image", IMAGES)
-def test_a_cloth_drawn_in_another_way_has_the_same_answers(image):
+def test_a_cloth_drawn_in_another_way_has_the_same_answers():
     """A mirror is no other cloth here, because cylinders have no twist."""
-    fabric, turned = IMAGES[image](QUERIES)
-    own, there = (answer(cylinders_of(cloth), q) for cloth, q in ((LOPSIDED, QUERIES), (fabric, turned)))
-    agree(own, there[:, [1, 0, 3, 2] if image == "exchange" else slice(None)], 1e-5, 1e-6)
+    for image, draw in IMAGES.items():
+        own, there = (answer(cylinders_of(cloth), q) for cloth, q in ((LOPSIDED, QUERIES), draw(QUERIES)))
+        agree(own, there[:, [1, 0, 3, 2] if image == "exchange" else slice(None)], 1e-5, 1e-6)
