@@ -37,10 +37,10 @@ savings: $(READY)
 readme: $(READY)
 	@$(BIN)/twillight results quick --readme README.md
 
-# reports/RESULTS.md from the page of `standard`, TRADE.md from that of `trade`: `make report RECIPE=standard` first.
+# reports/RESULTS.md from the page of `standard`, TRADE.md and REAL.md from those of `trade` and `real`, which run first.
 results: RECIPE = standard
 results: $(READY)
-	@$(BIN)/twillight results $(RECIPE) --file reports/$(if $(filter trade,$(RECIPE)),TRADE,RESULTS).md
+	@$(BIN)/twillight results $(RECIPE) --file reports/$(or $(if $(filter trade,$(RECIPE)),TRADE),$(if $(filter real,$(RECIPE)),REAL),RESULTS).md
 
 # Linters and types beside the tests, which have one process a core. Every test process computes on one thread.
 test: $(READY)
