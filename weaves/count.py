@@ -13,7 +13,8 @@ that is inclined along the warp passes between two wefts, ellipses b wide and re
 
     tan(angle) = sqrt(1 - b^2) / (relief b)      cos(angle) = b for round yarns
 
-from the normal: the cut-off angle along the warp. That along the weft is the same of a. Yarns are taken as straight.
+from the normal: the cut-off angle along the warp. That along the weft is the same of a, the tangent along a diagonal
+sqrt(2) times the smaller one. Yarns are taken as straight.
 """
 
 import math
@@ -108,13 +109,12 @@ class Cover(NamedTuple):
     cut_off_along_warp: float
     """Angle to the normal, in degrees, from which on no light inclined along the warp passes straight; 0: none does."""
     cut_off_along_weft: float
+    cut_off_along_diagonals: float
 
 
 def cover(warp: Yarn, weft: Yarn) -> Cover:
     """Return the cover factors, the openness and the cut-off angles of a cloth."""
     openness = (1.0 - warp.width) * (1.0 - weft.width)
-    angles = [
-        math.degrees(math.atan2(math.sqrt(1.0 - yarn.width**2), yarn.relief * yarn.width)) if openness else 0.0
-        for yarn in (weft, warp)
-    ]
+    tangents = [(openness > 0) * math.sqrt(1 - yarn.width**2) / (yarn.relief * yarn.width) for yarn in (weft, warp)]
+    angles = (math.degrees(math.atan(tangent)) for tangent in (*tangents, math.sqrt(2.0) * min(tangents)))
     return Cover(warp.width, weft.width, 1.0 - openness, openness, *angles)

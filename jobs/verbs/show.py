@@ -139,8 +139,8 @@ def _print_fabric(fabric: Fabric) -> None:
     shares = f"warp {closed.warp:.1%}, weft {closed.weft:.1%}, cloth {closed.cloth:.1%}; openness {closed.openness:.1%}"
     print_lines(f"cover factor: {shares}")
     if closed.openness:
-        angles = f"{closed.cut_off_along_warp:.0f}° along the warp, {closed.cut_off_along_weft:.0f}° along the weft"
-        print_lines(f"cut-off angle of light through the gaps: {angles}")
+        warp, weft, diagonals = (f"{angle:.0f}° along the" for angle in closed[4:])
+        print_lines(f"cut-off angle of light through the gaps: {warp} warp, {weft} weft, {diagonals} diagonals")
     if fabric.colours:
         print_lines(*_colours(fabric.colours))
     print_lines(f"optical thickness {fabric.optical_thickness:g}", fabric.source)
