@@ -10,7 +10,7 @@ thread, around t and along t. theta_h = (theta_i + theta_o)/2, theta_d = (theta_
           / cos^2 theta_d
     M   = (1 - u) m_i m_o + u min(m_i, m_o),   m = max(cos phi, 0),   u = exp(-phi_d^2 / (2 (20 degrees)^2))
 
-P is M with psi in place of phi, and g the normal density. The authors measured threads. Here `fit` finds the k and
+P is M with psi in place of phi, and g the normal density. The authors measured cylinders. Here `fit` finds the k and
 gamma of both families from a fabric's components in footprints of many yarns, and tangents are quantiles of the slopes
 of the visible surface. There is no Fresnel factor, since yarns here have no interface.
 """
@@ -60,29 +60,29 @@ def cylinders_of(fabric: Fabric) -> Cylinders:
     return Cylinders(cover, np.array(tilts), np.ones((2, 2)), np.ones((2, LOBES)))
 
 
-def fit(threads: Cylinders, queries: Queries, components: Float64) -> Cylinders:
-    """Return threads whose widths and scales give N components (N, 4) with least squared error."""
-    widths, scales, least = threads.widths.copy(), threads.scales.copy(), np.full((2, 2), math.inf)
+def fit(cylinders: Cylinders, queries: Queries, components: Float64) -> Cylinders:
+    """Return cylinders whose widths and scales give N components (N, 4) with least squared error."""
+    widths, scales, least = cylinders.widths.copy(), cylinders.scales.copy(), np.full((2, 2), math.inf)
     for width in FITTED_WIDTHS:
-        basis = lobes(threads._replace(widths=np.full((2, 2), width)), queries)
+        basis = lobes(cylinders._replace(widths=np.full((2, 2), width)), queries)
         for family in range(2):
             for kind, columns in enumerate((slice(0, 1), slice(1, LOBES))):
                 chosen, error = nnls(basis[:, family, columns], components[:, 2 * kind + family])
                 if error < least[family, kind]:
                     least[family, kind], widths[family, kind], scales[family, columns] = error, width, chosen
-    return threads._replace(widths=widths, scales=scales)
+    return cylinders._replace(widths=widths, scales=scales)
 
 
-def answer(threads: Cylinders, queries: Queries) -> Float32:
+def answer(cylinders: Cylinders, queries: Queries) -> Float32:
     """Return the components (N, 4); queries are lit from the front."""
-    scaled = lobes(threads, queries) * threads.scales
+    scaled = lobes(cylinders, queries) * cylinders.scales
     return np.concatenate([scaled[:, :, 0], scaled[:, :, 1:].sum(axis=2)], axis=1).astype(np.float32)
 
 
-def lobes(threads: Cylinders, queries: Queries) -> Float64:
+def lobes(cylinders: Cylinders, queries: Queries) -> Float64:
     """Return the lobes of both families with scale 1, (N, 2, LOBES)."""
     result = np.zeros((len(queries.wi), 2, LOBES))
-    _fill(threads.cover, threads.tilts, threads.widths, queries.wi, queries.wo, result)
+    _fill(cylinders.cover, cylinders.tilts, cylinders.widths, queries.wi, queries.wo, result)
     return result
 
 

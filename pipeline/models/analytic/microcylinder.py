@@ -41,7 +41,7 @@ class MicrocylinderOptions(AnalyticOptions):
         from pipeline.analytic.microcylinder import answer
 
         tables = PerFabric(_fitted)
-        return [Analytic(self, None, tables, lambda threads, queries, _: answer(threads, queries))]
+        return [Analytic(self, None, tables, lambda cylinders, queries, _: answer(cylinders, queries))]
 
 
 def _fitted(fabric: Fabric) -> Cylinders:
