@@ -17,7 +17,7 @@ const YARN = { roughness: ["Roughness", 0.05, 1, 0.01, ""], twist: ["Twist", -60
   blend: ["Round shading", 0, 1, 0.01, ""] };
 const TILES = { truth: "Truth", flat: "Truth, flat footprints", map_material: "Texture maps" };
 const FRAME = 1000 / 30; // milliseconds of a coarse picture
-const STRIP = 100; // milliseconds of a strip of the full one
+const STRIP = 250; // milliseconds of a strip of the full one
 const MOST_PIXELS = 1.6e6;
 const ERROR_SIZE = 128;
 
@@ -30,6 +30,7 @@ class Viewer {
     this.usual = this.levels.includes(2) ? 2 : this.levels[0];
     this.scale = 1 / 8;
     this.job = 0;
+    this.first = true; // until a picture is seen; it is of points, because the shader of soft nodes compiles longer
     this.reset();
   }
 
@@ -90,7 +91,7 @@ class Viewer {
     if (this.tiled(name)) {
       return { kind: TILE, view: state.view, tile: name, level: this.usual, label: TILES[name] };
     }
-    if (name === "point" || !this.picture.knows(NODES)) {
+    if (name === "point" || this.first || !this.picture.knows(NODES)) {
       return { kind: POINT, level: this.usual, label: "One point a pixel" };
     }
     const wished = name === "truth" ? Math.max(...this.levels) : Number(name) || this.usual;
@@ -146,6 +147,10 @@ class Viewer {
       const rows = (whole[1] * STRIP * this.scale ** 2) / spent;
       this.scale = within(this.scale * Math.sqrt(FRAME / spent), 0.08, 1);
       this.show("coarse", methods, state);
+      if (this.first) {
+        this.first = false;
+        this.job += 1;
+      }
       if (size[1] < whole[1] && job === this.job) {
         await new Promise((done) => { this.wake = done; setTimeout(done, 150); });
         spent = await this.refine(job, state, ready, whole, columns(whole), rows);
@@ -205,7 +210,8 @@ class Viewer {
       const known = content.views.filter((view) => name in (view.tiles ?? {})).map((view) => view.name);
       return `${TILES[name]}: known at ${known.join(", ")} alone, of the yarns as they are.`;
     });
-    if (names.some((name) => name !== "point" && !this.tiled(name)) && !this.picture.knows(NODES)) {
+    const wished = names.some((name) => name !== "point" && !this.tiled(name));
+    if (wished && !this.first && !this.picture.knows(NODES)) {
       said.push("Soft nodes: their shader does not compile here. One point is shown instead.");
     } else if (said.length) said.push("Soft nodes are shown instead.");
     return said.join(" ");
