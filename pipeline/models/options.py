@@ -131,7 +131,7 @@ class TextureOptions(ComponentLossOptions):
     """Options of textures and perceptrons of one fabric, and of how they are trained."""
 
     of_one_material: ClassVar[bool] = True
-    fixed: ClassVar[tuple[str, ...]] = ("channels", "texture_rate")
+    fixed: ClassVar[tuple[str, ...]] = ("channels", "texture_rate", "blur_halving", "offset_frozen")
 
     texels_per_yarn: int = Field(default=16, ge=1, le=256)
     """Texels of the finest level along one yarn spacing; textures hold one repeat and wrap."""
@@ -143,11 +143,11 @@ class TextureOptions(ComponentLossOptions):
     """Shift the centre along the view by a learnt depth before the look-up, as parallax does."""
     blur: float = Field(default=8.0, ge=0, le=64)
     """Standard deviation, in finest texels, of the Gaussian blur on the textures at the first step; 0 means none."""
-    blur_halving: float = Field(default=0.11, gt=0, le=1)
-    """Share of the training after which the blur has halved (`neumip`: 3,333 of 30,000 iterations)."""
-    offset_frozen: float = Field(default=0.33, ge=0, le=1)
-    """Share of the training after which the offset texture is held fixed (`neumip`: 10,000 of 30,000 iterations)."""
 
     channels: ClassVar[int] = 7  # channels of every texture; `curved` does not say
     texture_rate: ClassVar[float] = 3.0
     """Learning rate of the textures relative to that of the perceptrons: short trainings touch each texel rarely."""
+    blur_halving: ClassVar[float] = 0.11
+    """Share of the training after which the blur has halved (`neumip`: 3,333 of 30,000 iterations)."""
+    offset_frozen: ClassVar[float] = 0.33
+    """Share of the training after which the offset texture is held fixed (`neumip`: 10,000 of 30,000 iterations)."""

@@ -1,8 +1,9 @@
 """Rows of kind `angular_samples`: the texels of one repeat, each seen under the same pairs of directions.
 
-This is the synthetic bidirectional texture (BTF) that `unified_btf` and `btf_autoencoder` encode. One repeat is a grid
-of texels, each a small Gaussian footprint. All texels of a fabric are seen under the same directions, as those of a
-measured texture are; the directions are another random set for every fabric, so that no encoder can memorise them.
+This is the synthetic bidirectional texture (BTF) that `unified_btf`, `btf_autoencoder` and `universal` read. One repeat
+is a grid of texels, each a small Gaussian footprint. All texels of a fabric are seen under the same directions, as
+those of a measured texture are; the directions are another random set for every fabric, so that no encoder can memorise
+them.
 
     row n    sample n // texels, texel n % texels; texel t lies in row t // columns, column t % columns of the grid
 

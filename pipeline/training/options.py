@@ -13,7 +13,7 @@ from pipeline.models.options import Design
 class TrainingOptions(Design):
     """One training run; `device` and `threads` choose where, the rest decides the numbers."""
 
-    fixed: ClassVar[tuple[str, ...]] = ("weight_decay", "gradient_clip")
+    fixed: ClassVar[tuple[str, ...]] = ("weight_decay", "gradient_clip", "held_out_points")
 
     steps: int = Field(default=7000, ge=1, le=10_000_000)
     """Optimiser steps."""
@@ -44,8 +44,6 @@ class TrainingOptions(Design):
     """Steps between checkpoints, from which an interrupted training goes on."""
     curve_points: int = Field(default=40, ge=1, le=10_000)
     """Points of the loss curve on the model card."""
-    held_out_points: int = Field(default=8, ge=1, le=10_000)
-    """Looks at held-out queries along the curve."""
     validation_rows: int = Field(default=16_384, ge=1, le=2**24)
     """Most held-out queries used for the figures on the model card."""
 
@@ -53,3 +51,5 @@ class TrainingOptions(Design):
     """Decoupled weight decay of AdamW."""
     gradient_clip: ClassVar[float] = 1.0
     """Largest Euclidean norm of the gradient."""
+    held_out_points: ClassVar[int] = 8
+    """Looks at held-out queries along the curve."""

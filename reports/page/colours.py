@@ -31,6 +31,7 @@ METHODS: Final[Mapping[str, tuple[Marker, str, str]]] = {
     "curved_grazing": ("d", "#848f0c", "#dde26a"),
     "unified_btf": ("h", "#8a5a2b", "#cf9a66"),
     "btf_autoencoder": ("p", "#a87947", "#e6c6a3"),
+    "universal": ((5, 0, 0), "#7a4a1c", "#dfb07f"),
     "point_sampled": ("s", "#d9622b", "#ff9a5c"),
     "r2_points": ("D", "#a67806", "#e3bf4e"),
     "prefiltered": ("P", "#6f7484", "#a7adbd"),

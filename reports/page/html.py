@@ -58,7 +58,7 @@ def page_html(page: PageInput, frames: Mapping[str, pd.DataFrame], sizes: Mappin
         "sizes": sizes,
         "plot_scale": 108 / DPI,  # most pixels of the page for one of a plot: letters are as large as those of the text
         "plot_words": WORDS["plots"],
-        "alt_texts": alt_texts(ranged),
+        "alt_texts": _alt_texts(ranged),
         "definitions": {row.title: row.definition for row in METRICS.values() if row.definition} | WORDS["definitions"],
         "schemes": schemes(page),
         "display": display,
@@ -170,7 +170,7 @@ def fabric_card(fabric: Fabric, role: str) -> dict[str, Any]:
     }
 
 
-def alt_texts(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
+def _alt_texts(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
     """Return the alternative text of every plot by its name, from the frames of a page.
 
     For screen readers: the words of `tables.toml`, and the lowest and highest values.

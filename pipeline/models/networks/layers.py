@@ -79,7 +79,7 @@ class EncoderDecoder(QueryNetwork):
         return self.counts()["decoder"] + sum(constant.numel() for constant in constants)
 
 
-def to_network(components: Tensor, log_k: float) -> Tensor:
+def _to_network(components: Tensor, log_k: float) -> Tensor:
     """Take components (..., 4) to network space: g(S) = ln(k S + 1), C unchanged."""
     return torch.cat([torch.log1p(log_k * components[..., SPECULAR]), components[..., DIFFUSE]], dim=-1)
 
@@ -94,7 +94,7 @@ def to_components(output: Tensor, log_k: float) -> Tensor:
 
 def component_error(output: Tensor, target: Tensor, options: ComponentLossOptions) -> Tensor:
     """Return the weighted mean squared error of outputs (..., 4), in network space, from target components (..., 4)."""
-    squared = (output - to_network(target, options.log_k)).square()
+    squared = (output - _to_network(target, options.log_k)).square()
     specular, diffuse = squared[..., SPECULAR].mean(), squared[..., DIFFUSE].mean()
     return options.specular_weight * specular + options.diffuse_weight * diffuse
 
@@ -102,4 +102,4 @@ def component_error(output: Tensor, target: Tensor, options: ComponentLossOption
 def start_at_mean(last: nn.Linear, target: Tensor, log_k: float) -> None:
     """Set the biases of a last layer to the mean of target components (M, 4), in network space."""
     with torch.no_grad():
-        last.bias[:4].copy_(to_network(target, log_k).mean(dim=0))
+        last.bias[:4].copy_(_to_network(target, log_k).mean(dim=0))

@@ -1,4 +1,4 @@
-"""`unified_btf` [Rainer2020Unified] and its predecessor `btf_autoencoder` [Rainer2019Neural]; their options."""
+"""`unified_btf` [Rainer2020Unified], its predecessor `btf_autoencoder` [Rainer2019Neural], and `universal`; options."""
 
 from typing import ClassVar, Literal, Self
 
@@ -11,9 +11,9 @@ from pipeline.truth.options import TruthOptions
 
 
 class BtfOptions(ComponentLossOptions):
-    """Options of both encodings of bidirectional textures."""
+    """Options of encodings of bidirectional textures."""
 
-    fixed: ClassVar[tuple[str, ...]] = ("directions", "log_samples")
+    fixed: ClassVar[tuple[str, ...]] = ("directions",)
     any_physics: ClassVar[bool] = True
     prepare_seconds: ClassVar[float] = 4.0
 
@@ -24,8 +24,6 @@ class BtfOptions(ComponentLossOptions):
     samples: int = Field(default=128, ge=1, le=65_536)
     """Angular samples of every texel; shards hold those of trained fabrics, any other fabric's are computed when it is
     added."""
-    fewest_samples: int = Field(default=50, ge=1, le=65_536)
-    """A training step encodes a fabric from a random number of its samples, from this one to all."""
     max_angle: float = Field(default=89.0, gt=0, le=89.9)
     """Largest angle of the samples' directions to the macro normal, in degrees."""
     truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.2, min_count=32, max_count=64)
@@ -33,10 +31,6 @@ class BtfOptions(ComponentLossOptions):
     a latent averages over all samples of a texel."""
     angles: Literal["stereographic", "disc"] = "stereographic"
     """The four numbers of a pair of directions: x and y of each (`disc`), or those over 1 + z; not published."""
-    weights: int = Field(default=32, ge=1, le=512)
-    """Weights m of every sample; not published."""
-    encoder_hidden: int = Field(default=64, ge=4, le=1024)
-    """Width of the encoder's two hidden layers; not published."""
     hidden: int = Field(default=106, ge=4, le=1024)
     """Width of the decoder's four hidden layers."""
 
@@ -45,9 +39,6 @@ class BtfOptions(ComponentLossOptions):
 
     directions: ClassVar[Literal["projected_disc", "hemisphere"]] = "projected_disc"
     """Density of the samples' directions, as in the queries."""
-    log_samples: ClassVar[bool] = False
-    """The encoder reads the specular samples as they are: these average as the cloth does, and trained as well as
-    those in log space."""
 
     @property
     def angular_samples(self) -> AngularSamples:
@@ -59,6 +50,23 @@ class BtfOptions(ComponentLossOptions):
         """The samples of the trained fabrics' texels."""
         return (self.angular_samples,)
 
+
+class EncoderOptions(BtfOptions):
+    """Options of an encoder of angular samples."""
+
+    fixed: ClassVar[tuple[str, ...]] = ("directions", "log_samples")
+
+    fewest_samples: int = Field(default=50, ge=1, le=65_536)
+    """A training step encodes a fabric from a random number of its samples, from this one to all."""
+    weights: int = Field(default=32, ge=1, le=512)
+    """Weights m of every sample; not published."""
+    encoder_hidden: int = Field(default=64, ge=4, le=1024)
+    """Width of the encoder's two hidden layers; not published."""
+
+    log_samples: ClassVar[bool] = False
+    """The encoder reads the specular samples as they are: these average as the cloth does, and trained as well as
+    those in log space."""
+
     @model_validator(mode="after")
     def _enough_samples(self) -> Self:
         if self.fewest_samples > self.samples:
@@ -66,7 +74,7 @@ class BtfOptions(ComponentLossOptions):
         return self
 
 
-class UnifiedBtfOptions(BtfOptions):
+class UnifiedBtfOptions(EncoderOptions):
     """One encoder and decoder of angular samples for all fabrics [Rainer2020Unified]."""
 
     departures: ClassVar[tuple[str, ...]] = ("four components in place of RGB, in samples and answers",)
@@ -76,7 +84,7 @@ class UnifiedBtfOptions(BtfOptions):
     latent: int = Field(default=32, ge=1, le=512)
 
 
-class BtfAutoencoderOptions(BtfOptions):
+class BtfAutoencoderOptions(EncoderOptions):
     """One autoencoder of angular samples for each fabric [Rainer2019Neural]: `unified_btf` with a latent of 8.
 
     With 3 outputs the decoder has the published 35,725 weights. ADAPTED: the encoder is that of 2020, which reads any
@@ -89,3 +97,28 @@ class BtfAutoencoderOptions(BtfOptions):
 
     model: Literal["btf_autoencoder"] = "btf_autoencoder"
     latent: int = Field(default=8, ge=1, le=512)
+
+
+class UniversalOptions(BtfOptions):
+    """The decoder of `unified_btf` without an encoder: the latents of each fabric are found by descent.
+
+    A fabric that was trained with keeps the latents that were learnt from its rows. Those of any other are found from
+    its angular samples, with the decoder as it is.
+    """
+
+    fixed: ClassVar[tuple[str, ...]] = (*BtfOptions.fixed, "batch", "latent_rate", "rate")
+    departures: ClassVar[tuple[str, ...]] = (*UnifiedBtfOptions.departures, "the decoder and the samples of 2020")
+    seconds: ClassVar[tuple[float, float]] = (1.1e-4, 1.5e-6)
+    prepare_seconds: ClassVar[float] = 8.0
+
+    model: Literal["universal"] = "universal"
+    latent: int = Field(default=8, ge=1, le=512)
+    steps: int = Field(default=200, ge=1, le=100_000)
+    """Steps of the descent to the latents of a fabric that was not trained with."""
+
+    batch: ClassVar[int] = 2
+    """Samples of every texel a step, of a training and of a descent."""
+    latent_rate: ClassVar[float] = 3.0
+    """Learning rate of the latents relative to that of the decoder."""
+    rate: ClassVar[float] = 0.05
+    """Learning rate of the descent at its first step; it falls to 0 along half a cosine."""

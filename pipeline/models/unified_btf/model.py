@@ -19,6 +19,10 @@ round footprints only, as published.
 
 A training reads the samples of its fabrics from shards. A fabric that is added to a trained model brings its samples
 with it, as in the paper: computing them is part of the method, and of the time that adding a fabric takes.
+
+`universal` has this decoder and no encoder, as systems of 2026 do: latents are learnt with the decoder, from rows and
+samples [Park2019DeepSDF]. Those of a fabric that is added fit its samples, and means of its samples at all levels of
+the pyramid, by descent from 0; the decoder stays as it is.
 """
 
 from __future__ import annotations
@@ -39,7 +43,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import EncoderDecoder, component_error, perceptron, start_at_mean, to_components
 from pipeline.models.networks.texture import level_shapes, read_pyramid
-from pipeline.models.unified_btf import BtfOptions
+from pipeline.models.unified_btf import BtfOptions, EncoderOptions, UniversalOptions
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.conventions import COMPONENTS
 from weaves.errors import BadInput
@@ -107,7 +111,7 @@ class SetEncoder(nn.Module):
     weights are computed once for all of them.
     """
 
-    def __init__(self, options: BtfOptions) -> None:
+    def __init__(self, options: EncoderOptions) -> None:
         super().__init__()
         self.weigh = perceptron(_DIRECTION_NUMBERS, options.encoder_hidden, _ENCODER_LAYERS, options.weights)
         self.join = nn.Linear(len(COMPONENTS) * options.weights, options.latent)
@@ -123,29 +127,20 @@ class SetEncoder(nn.Module):
         return functional.relu(functional.linear(mean, self.join.weight * scale, self.join.bias))
 
 
-class UnifiedBtfNetwork(EncoderDecoder):
-    """Encoder and decoder, with the samples of the fabrics trained on, by index in batches; none for inference."""
+class BtfNetwork(EncoderDecoder):
+    """A decoder of texels' latents; subclasses say where the latents of a fabric come from."""
 
     options: BtfOptions
-    encoder: SetEncoder
     decoder: nn.Sequential
 
-    def __init__(self, options: BtfOptions, texels: Sequence[Texels] = ()) -> None:
+    def __init__(self, options: BtfOptions) -> None:
         super().__init__()
         self.options = options
-        self.encoder = SetEncoder(options)
         self.decoder = perceptron(options.latent + _DIRECTION_NUMBERS, options.hidden, _DECODER_LAYERS, 4)
-        self._held = tuple(texels)  # kept in use, so that validation finds them
-        self._texels = list(texels)
 
-    def encode(self, texels: Texels, chosen: Index | None = None) -> Tensor:
-        """Return the latents (rows, columns, latent) of a fabric's texels, from all samples or the `chosen` ones."""
-        angles, values = texels.angles, texels.values
-        if chosen is not None:
-            index = torch.from_numpy(chosen).to(values.device)
-            angles, values = angles[index], values[index]
-        latents: Tensor = self.encoder(angles, values.to(torch.float32))
-        return latents.reshape(*texels.shape, -1)
+    def latents_of(self, index: int, random: np.random.Generator) -> Tensor:
+        """Return the latents (rows, columns, latent) of a fabric trained on, for a training step."""
+        raise NotImplementedError
 
     def read(self, pyramid: list[Tensor], u: Tensor, v: Tensor, sigma: Tensor) -> Tensor:
         """Return the latents (n, latent) of footprints: centres as shares of the repeat, sigma in yarn spacings."""
@@ -157,10 +152,6 @@ class UnifiedBtfNetwork(EncoderDecoder):
         """Answer in network space, (n, 4)."""
         output: Tensor = self.decoder(torch.cat([latent, angles_of(wi, wo, self.options.angles)], dim=-1))
         return output
-
-    def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
-        """Compute a fabric's samples and encode them, by one forward pass; return the levels of its pyramid."""
-        return tuple(level.contiguous() for level in averaged(self.encode(texels_of(fabric, self.options))))
 
     def components(self, *inputs: Tensor) -> Tensor:
         """Return components (n, 4) from the columns of queries and the levels of a pyramid."""
@@ -176,50 +167,169 @@ class UnifiedBtfNetwork(EncoderDecoder):
                 "learns front light, round footprints and flat cloth only: leave behind, stretch and curvature out"
             )
             raise BadInput("training", "model", options.model, allowed)
-        latents = []
+        read = []
         for position, index in enumerate(batch.fabric.tolist()):
-            texels = self._texels[index] = self._texels[index].to(batch.u.device)
-            picks, ends = (extent // options.texels_per_yarn for extent in texels.shape)
-            count = len(texels.angles)
-            chosen = random.permutation(count)[: random.integers(options.fewest_samples, count, endpoint=True)]
-            pyramid = averaged(self.encode(texels, chosen))
+            latents = self.latents_of(index, random)
+            picks, ends = (extent // options.texels_per_yarn for extent in latents.shape[:2])
             u, v = batch.u[position] / ends, batch.v[position] / picks
-            latents.append(self.read(pyramid, u, v, batch.sigma[position]))
-        output = self.decode(torch.cat(latents), batch.wi.flatten(0, 1), batch.wo.flatten(0, 1))
+            read.append(self.read(averaged(latents), u, v, batch.sigma[position]))
+        output = self.decode(torch.cat(read), batch.wi.flatten(0, 1), batch.wo.flatten(0, 1))
         return component_error(output, batch.target.flatten(0, 1), options)
 
     def start_at(self, target: Tensor) -> None:
-        """Set the last bias to the mean target, the last weights small, and the scale of samples to that of targets."""
+        """Set the last bias to the mean target, and the last weights small."""
         last = self.decoder[-1]
         assert isinstance(last, nn.Linear)
         start_at_mean(last, target, self.options.log_k)
         with torch.no_grad():
             last.weight.mul_(0.1)
+
+
+class UnifiedBtfNetwork(BtfNetwork):
+    """Encoder and decoder, with the samples of the fabrics trained on, by index in batches; none for inference."""
+
+    options: EncoderOptions
+    encoder: SetEncoder
+
+    def __init__(self, options: EncoderOptions, texels: Sequence[Texels] = ()) -> None:
+        super().__init__(options)
+        self.encoder = SetEncoder(options)
+        self._held = tuple(texels)  # kept in use, so that validation finds them
+        self._texels = list(texels)
+
+    def latents_of(self, index: int, random: np.random.Generator) -> Tensor:
+        """Encode a fabric trained on from a random number of its samples."""
+        device = self.encoder.scale.device
+        texels = self._texels[index] = self._texels[index].to(device)
+        count = len(texels.angles)
+        chosen = random.permutation(count)[: random.integers(self.options.fewest_samples, count, endpoint=True)]
+        return self.encode(texels, chosen)
+
+    def encode(self, texels: Texels, chosen: Index | None = None) -> Tensor:
+        """Return the latents (rows, columns, latent) of a fabric's texels, from all samples or the `chosen` ones."""
+        angles, values = texels.angles, texels.values
+        if chosen is not None:
+            index = torch.from_numpy(chosen).to(values.device)
+            angles, values = angles[index], values[index]
+        latents: Tensor = self.encoder(angles, values.to(torch.float32))
+        return latents.reshape(*texels.shape, -1)
+
+    def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
+        """Compute a fabric's samples and encode them, by one forward pass; return the levels of its pyramid."""
+        return tuple(level.contiguous() for level in averaged(self.encode(texels_of(fabric, self.options))))
+
+    def start_at(self, target: Tensor) -> None:
+        """As the decoder alone does; and set the scale of samples to that of targets."""
+        super().start_at(target)
+        with torch.no_grad():
             self.encoder.scale.copy_(1.0 / target.square().mean(dim=0).sqrt().clamp_min(1e-6))
 
 
+class UniversalNetwork(BtfNetwork):
+    """Decoder, with the latents of fabrics trained on, by the fingerprint of a fabric's optics.
+
+    `grids` are their rows and columns of texels by the same fingerprint, `texels` their samples in the same order; none
+    for inference.
+    """
+
+    options: UniversalOptions
+
+    def __init__(
+        self, options: UniversalOptions, grids: Mapping[str, tuple[int, int]], texels: Sequence[Texels] = ()
+    ) -> None:
+        super().__init__(options)
+        self.encoder = nn.Identity()
+        self.latents = nn.ParameterDict({key: torch.zeros(*grid, options.latent) for key, grid in grids.items()})
+        self._order, self._texels = list(grids), list(texels)
+
+    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
+        """Return two groups: a step touches few latents, so their rate is higher."""
+        latents = {"params": list(self.latents.values()), "lr": self.options.latent_rate * rate}
+        return [{"params": list(self.decoder.parameters()), "lr": rate}, latents]
+
+    def latents_of(self, index: int, random: np.random.Generator) -> Tensor:
+        """Return the latents as they are."""
+        latents: Tensor = self.latents[self._order[index]]
+        return latents
+
+    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the error of the rows, and of some samples of the same fabrics."""
+        total = super().loss(batch, random)
+        for index in batch.fabric.tolist():
+            texels = self._texels[index] = self._texels[index].to(total.device)
+            total = total + self.sample_error(self.latents_of(index, random), texels, random) / len(batch.fabric)
+        return total
+
+    def sample_error(self, latents: Tensor, texels: Texels, random: np.random.Generator) -> Tensor:
+        """Return the error for some samples of all texels, and of the means of texels at all levels of the pyramid."""
+        count = len(texels.angles)
+        chosen = torch.from_numpy(random.choice(count, min(self.options.batch, count), replace=False))
+        values = texels.values[chosen].to(torch.float32).reshape(len(chosen), *texels.shape, -1)
+        levels = averaged(latents), averaged(values)
+        own, targets = (torch.cat([level.flatten(-2).mT for level in pyramid], dim=-2) for pyramid in levels)
+        return component_error(self.samples(own, texels.angles[chosen]), targets, self.options)
+
+    def samples(self, latents: Tensor, angles: Tensor) -> Tensor:
+        """Return samples (n, T, 4), in network space, of latents (T, latent) under n pairs of directions (n, 4)."""
+        pairs = latents.expand(len(angles), -1, -1), angles.unsqueeze(1).expand(-1, len(latents), -1)
+        output: Tensor = self.decoder(torch.cat(pairs, dim=-1))
+        return output
+
+    def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
+        """Return the pyramid of the latents learnt with the decoder, or of those that fit the fabric's samples."""
+        key = fingerprint(fabric.optics())
+        latents = self.latents[key] if key in self.latents else self.fitted(texels_of(fabric, self.options))
+        return tuple(level.detach().contiguous() for level in averaged(latents))
+
+    def fitted(self, texels: Texels) -> Tensor:
+        """Return the latents (rows, columns, latent) by which the decoder gives texels' samples best, by descent."""
+        options, random = self.options, np.random.default_rng(0)
+        latents = torch.zeros(*texels.shape, options.latent, requires_grad=True)
+        optimiser = torch.optim.Adam([latents], lr=options.rate)
+        fall = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, options.steps)
+        for _ in range(options.steps):
+            with torch.enable_grad():
+                (latents.grad,) = torch.autograd.grad(self.sample_error(latents, texels, random), latents)
+            optimiser.step()
+            fall.step()
+        return latents.detach()
+
+
 def averaged(latents: Tensor) -> list[Tensor]:
-    """Return the MIP pyramid (latent, rows, columns) of latents (rows, columns, latent), finest first.
+    """Return the MIP pyramid (..., latent, rows, columns) of latents (..., rows, columns, latent), finest first.
 
     Every level is averaged from the finest, so that the last, one texel, is the mean of all whatever the extents.
     """
-    finest = latents.permute(2, 0, 1)
-    rows, columns = finest.shape[1:]
+    finest = latents.movedim(-1, -3)
+    rows, columns = finest.shape[-2:]
     _, *coarser = level_shapes(1, 0, (columns, rows))
     return [finest, *(functional.adaptive_avg_pool2d(finest, shape) for shape in coarser)]
 
 
 def build(
     options: BtfOptions, fabrics: Sequence[Fabric], samples: Sequence[Mapping[str, npt.NDArray[Any]]]
-) -> UnifiedBtfNetwork:
+) -> BtfNetwork:
     """Return an untrained network for these fabrics, with their angular samples by column."""
-    pairs = zip(fabrics, samples, strict=True)
-    return UnifiedBtfNetwork(options, [read_texels(fabric, options, columns) for fabric, columns in pairs])
+    texels = [read_texels(fabric, options, columns) for fabric, columns in zip(fabrics, samples, strict=True)]
+    if isinstance(options, UniversalOptions):
+        grids = {fingerprint(fabric.optics()): own.shape for fabric, own in zip(fabrics, texels, strict=True)}
+        return UniversalNetwork(options, grids, texels)
+    assert isinstance(options, EncoderOptions)
+    return UnifiedBtfNetwork(options, texels)
 
 
-def restore(options: BtfOptions, trained: Trained) -> list[NetworkMethod[UnifiedBtfNetwork]]:
+def restore(options: BtfOptions, trained: Trained) -> list[NetworkMethod[BtfNetwork]]:
     """Return the method that trained networks are; BadInput if samples are answered by other physics than rows."""
-    networks, domain = restored(options, trained, lambda _: UnifiedBtfNetwork(options))
+
+    def empty(_: tuple[int, int]) -> BtfNetwork:
+        if isinstance(options, UniversalOptions):
+            _card, weights = trained[0]
+            latents = {name.removeprefix("latents."): own for name, own in weights.items() if "latents." in name}
+            return UniversalNetwork(options, {key: (own.shape[0], own.shape[1]) for key, own in latents.items()})
+        assert isinstance(options, EncoderOptions)
+        return UnifiedBtfNetwork(options)
+
+    networks, domain = restored(options, trained, empty)
     if domain is not None:
         domain.refuse_truth(options.truth, options.name)
         # Whatever else the rows held: footprints are read as round, and the cloth as flat.

@@ -165,11 +165,11 @@ def _add(table: ExactNodes, x_axis: Axis, y_axis: Axis, share: np.float32, room:
             end, pick = table.copies[p, c, 0], table.copies[p, c, 1]
             if touched[0, end, piece[EDGES_X]] and touched[1, pick, piece[EDGES_Y]]:
                 along_x, along_y = masses[0, end, piece[EDGES_X]], masses[1, pick, piece[EDGES_Y]]
-                add_product(along_x[:across], along_y[:lines], share, weight[start : start + across * lines])
+                _add_product(along_x[:across], along_y[:lines], share, weight[start : start + across * lines])
 
 
 @fast_kernel
-def add_product(along_x: Float32, along_y: Float32, share: np.float32, weight: Float32) -> None:
+def _add_product(along_x: Float32, along_y: Float32, share: np.float32, weight: Float32) -> None:
     """Add `share` of the products of the shares along x and along y to the nodes of a grid."""
     across = len(along_x)
     for j in range(len(along_y)):
@@ -213,7 +213,7 @@ def fill_displaced(
         for n in range(picks // rows):
             # A point n rows further up stands for itself `slip` further along.
             own_x = along_x[(n * slip * points) % width :]
-            add_product(own_x[: width + 1], along_y[n * height : (n + 1) * height + 1], _1, grid)
+            _add_product(own_x[: width + 1], along_y[n * height : (n + 1) * height + 1], _1, grid)
     wo = columns.wo[row]
     read_density(table.lattice, points, plane, wo[0] / wo[2], wo[1] / wo[2], room, table.places, table.evenly, weight)
     return points

@@ -10,10 +10,11 @@ from pipeline.models.curved import CurvedOptions
 from pipeline.models.network import Batch
 from pipeline.models.neumip import NeumipOptions, TriplePlaneOptions
 from pipeline.models.registry import build_network
-from pipeline.models.unified_btf import BtfAutoencoderOptions, UnifiedBtfOptions
+from pipeline.models.unified_btf import BtfAutoencoderOptions, UnifiedBtfOptions, UniversalOptions
 from pipeline.models.woven import WovenOptions
 
-_BTF = {"texels_per_yarn": 2, "samples": 8, "fewest_samples": 4, "encoder_hidden": 16, "weights": 8, "hidden": 16}
+_SAMPLES = {"texels_per_yarn": 2, "samples": 8, "hidden": 16}
+_BTF = {**_SAMPLES, "fewest_samples": 4, "encoder_hidden": 16, "weights": 8}
 
 SMALL = {
     "woven": WovenOptions(map_texels=16, encoder_channels=4),
@@ -22,6 +23,7 @@ SMALL = {
     "curved": CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_sigma=(0.5, 8.0)),
     "unified_btf": UnifiedBtfOptions(**_BTF),
     "btf_autoencoder": BtfAutoencoderOptions(**_BTF),
+    "universal": UniversalOptions(**_SAMPLES, latent=4, steps=8),
 }
 """A small design of every network."""
 

@@ -176,7 +176,7 @@ def test_the_card_tells_what_was_trained_and_how_well(whole):
 
 def test_the_state_of_the_lowest_held_out_loss_is_shipped(folder, tmp_path, monkeypatch):
     """The rate of learning falls to 0 only in the end: without an average, a high one makes the loss go up and down."""
-    changes = {"learning_rate": 0.3, "warm_up": 0, "average": 0, "curve_points": 20, "held_out_points": 20}
+    changes = {"learning_rate": 0.3, "warm_up": 0, "average": 0, "curve_points": 8}
     training = TrainingOptions(steps=60, batch=64, fabrics=1, device="cpu", **changes)
     monkeypatch.setattr("pipeline.training.loop.rate_factor", lambda step, training: 1.0)
     train(NEUMIP, training, folder, FABRICS["neumip"], tmp_path)

@@ -33,12 +33,11 @@ def test_footprint_chooses_the_levels_offset_shifts_along_the_view_and_blur_halv
     (u, v), depth = seen[1], 0.1 * 1.5
     torch.testing.assert_close(u, torch.tensor([0.5 + depth * 0.6 / 0.8 * 2 / 4, 0.5]))
     torch.testing.assert_close(v, torch.tensor([0.5, 0.5 + depth * 0.96 / 0.6 * 2 / 1]))
-    changes = {"blur": 8.0, "blur_halving": 0.1, "offset_frozen": 0.5}
-    network = NeumipNetwork(NEUMIP.model_copy(update=changes), (2, 2))
-    network.schedule(0.2)
-    assert network._blur == pytest.approx(2.0)
+    network = NeumipNetwork(NEUMIP, (2, 2))
+    network.schedule(0.22)
+    assert network._blur == pytest.approx(8.0 / 4)
     assert network.depth.requires_grad
-    network.schedule(0.5)
+    network.schedule(0.33)
     assert not network.depth.requires_grad
     slow, fast = network.parameter_groups(1e-3)
     assert fast["lr"] == pytest.approx(NEUMIP.texture_rate * 1e-3)

@@ -6,7 +6,7 @@ import torch
 
 from pipeline.models.domain import Domain
 from pipeline.models.network import NetworkMethod
-from pipeline.models.networks.layers import perceptron
+from pipeline.models.networks.layers import perceptron, to_components
 from pipeline.models.unified_btf import UnifiedBtfOptions
 from pipeline.models.unified_btf import model as btf
 from pipeline.models.unified_btf.model import UnifiedBtfNetwork, averaged, restore
@@ -101,15 +101,12 @@ def encoded(model: btf.SetEncoder, samples: btf.Texels, chosen: np.ndarray | sli
     return latents
 
 
-def test_angles_tell_light_from_viewer():
+@torch.inference_mode()
+def test_angles_tell_light_from_viewer_but_order_and_number_of_the_samples_do_not_matter():
+    """Every sample given thrice says nothing new; only the rounding of the sums may differ."""
     wi, wo = torch.tensor([0.6, 0.0, 0.8]), torch.tensor([0.0, -0.8, 0.6])
     torch.testing.assert_close(btf.angles_of(wi, wo, "disc"), torch.tensor([0.6, 0.0, 0.0, -0.8]))
     torch.testing.assert_close(btf.angles_of(wi, wo, "stereographic"), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
-
-
-@torch.inference_mode()
-def test_order_and_number_of_the_samples_do_not_matter():
-    """Every sample given thrice says nothing new; only the rounding of the sums may differ."""
     samples, model = made_up(500), encoder()
     for chosen in (np.random.default_rng(0).permutation(500), np.tile(np.arange(500), 3)):
         torch.testing.assert_close(encoded(model, samples, chosen), encoded(model, samples), rtol=1e-4, atol=1e-6)
@@ -143,7 +140,7 @@ def test_averaged_latents_are_the_latent_of_the_averaged_texel():
         assert (expected > 0).all() == (offset > 0)
 
 
-def test_rows_become_samples_by_texels():
+def test_rows_become_samples_by_texels_which_are_not_computed_again_while_in_use():
     """A 6 x 8 repeat, so that no mistake of order can hide; half precision rounds by 2^-11."""
     columns = FEW.angular_samples.answer(SHANTUNG, 0, FEW.angular_samples.count(SHANTUNG))
     queries, answers = rows_of(columns)
@@ -155,10 +152,27 @@ def test_rows_become_samples_by_texels():
     (found,) = np.flatnonzero((queries.u == column / 2 + 0.25) & (queries.v == row / 2 + 0.25) & alike)
     read = samples.values[sample, row * samples.shape[1] + column]
     np.testing.assert_allclose(read, answers.mean[found], rtol=2**-11, atol=2**-24)
-
-
-def test_samples_in_use_are_not_computed_again():
     held = btf.texels_of(LINING, FEW)
     assert btf.texels_of(LINING.model_copy(update={"name": "other"}), FEW) is held
     assert btf.texels_of(LINING, FEW.model_copy(update={"latent": 4})) is held
     assert btf.texels_of(LINING, FEW.model_copy(update={"max_angle": 60.0})) is not held
+
+
+@torch.no_grad()
+def test_latents_are_found_again_from_the_samples_that_they_give_and_trained_fabrics_keep_theirs():
+    """Without an encoder: a descent from 0 finds most; a random network of ReLUs has minima beside."""
+    options, cloths = SMALL["universal"].model_copy(update={"steps": 300, "hidden": 64}), [SHANTUNG, LINING]
+    torch.manual_seed(3)
+    for order in (cloths, cloths[::-1]):
+        network = untrained(options, *order)
+        for index, cloth in enumerate(order):
+            latents = network.latents_of(index, np.random.default_rng(0)).normal_()
+            torch.testing.assert_close(network.encoded(cloth)[0].movedim(0, -1), latents)
+    network.start_at(torch.ones(2, 4))  # no component is below 0
+    angles, shares = btf.texels_of(LINING, options).angles, []
+    for given in latents.flatten(0, 1)[:5, None]:
+        output = network.samples(given, angles)
+        found = network.fitted(btf.Texels((1, 1), angles, to_components(output, options.log_k))).flatten(0, 1)
+        left, first = (network.samples(own, angles) - output for own in (found, torch.zeros_like(given)))
+        shares.append(float(left.square().mean() / first.square().mean()))
+    assert np.median(shares) < 1e-3
