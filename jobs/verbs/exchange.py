@@ -49,7 +49,7 @@ class ExportFlags:
     model: Annotated[
         str | None, Parameter(help="Of a shader: soft_nodes (default), or the folder of a trained neumip.")
     ] = None
-    level: Annotated[Whole | None, Parameter(help="Of a shader: level of detail, 1, 2, 4 or 8; 2.")] = None
+    level: Annotated[Whole | None, Parameter(help="Of a shader: level of detail, 0, 1, 2, 4 or 8; 2.")] = None
     language: Annotated[
         list[str],
         Parameter(help="Of a shader: cpp, cuda, glsl, glsles, hlsl, metal, wgsl, onnx or all, beside Slang; several."),

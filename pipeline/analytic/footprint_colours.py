@@ -159,8 +159,8 @@ def _weighed_colours(
     found = np.zeros((len(u), 2, 2, 3))
     masses = np.zeros(ends), np.zeros(picks)
     sums = np.zeros((ends, 9)), np.zeros((picks, 9))
-    areas, seen = np.zeros(table.evenly.shape, np.float32), np.empty((len(table.spots), 2, COLUMNS), np.float32)
-    of_lines = areas.reshape(len(seen), COLUMNS)
+    areas, seen = np.zeros(table.evenly.shape, np.float32), np.empty((2, table.evenly.size), np.float32)
+    of_lines = areas.reshape(-1, COLUMNS)
     for row in range(len(u)):
         dx, dy, rho = deviation_x[row], deviation_y[row], correlation[row]
         narrowest = np.float32(narrow_axis(dx, dy, rho))
@@ -207,7 +207,8 @@ def _add_cells(
                     continue
                 for line in range(start, start + group[LINES]):
                     for k in range(COLUMNS):
-                        at_x, at_y = seen[line, 0, k] - middle_x, seen[line, 1, k] - middle_y
+                        at = COLUMNS * line + k
+                        at_x, at_y = seen[0, at] - middle_x, seen[1, at] - middle_y
                         share = table.spots[line, 2, k] * max(areas[line, k], np.float32(_HIDDEN))
                         total += share * density(at_x, at_y, of_xx, of_yy, of_xy)
                 copy, thread = (column, end) if family == WARP else (row, pick)
@@ -230,13 +231,16 @@ def _fold_seen(
     """Write the same for an even footprint along an axis: a thread is the Gaussian of the places of its nodes."""
     threads, first = len(masses), 0 if axis == 0 else table.kinds[0]
     masses[:], sums[:] = 0.0, 0.0
-    shares = table.evenly.reshape(len(seen), COLUMNS)
+    shares = table.evenly.reshape(-1, COLUMNS)
     for thread in range(threads):
         total, mean, square = 0.0, 0.0, 0.0
         a, b = table.starts[first + thread], table.starts[first + thread + 1]
-        for line in range(a * len(seen) // len(table.evenly), b * len(seen) // len(table.evenly)):
+        for line in range(a * len(shares) // len(table.evenly), b * len(shares) // len(table.evenly)):
             for k in range(COLUMNS):
-                share, place = shares[line, k] * max(areas[line, k], np.float32(_HIDDEN)), seen[line, axis, k]
+                share, place = (
+                    shares[line, k] * max(areas[line, k], np.float32(_HIDDEN)),
+                    seen[axis, COLUMNS * line + k],
+                )
                 total += share
                 mean += share * place
                 square += share * place * place

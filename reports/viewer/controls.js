@@ -94,7 +94,7 @@ class Viewer {
     if (name === "point" || this.first || !this.picture.knows(NODES)) {
       return { kind: POINT, level: this.usual, label: "One point a pixel" };
     }
-    const wished = name === "truth" ? Math.max(...this.levels) : Number(name) || this.usual;
+    const wished = name === "truth" ? Math.max(...this.levels) : name in TILES ? this.usual : Number(name);
     const level = this.picture.indexOf(state, wished) === undefined ? this.usual : wished;
     return { kind: NODES, level, label: `Soft nodes, detail ${level}` };
   }

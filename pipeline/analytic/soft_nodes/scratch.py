@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.analytic.soft_nodes.groups import COLUMNS
-from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, SoftNodeTable
+from pipeline.analytic.soft_nodes.nodes import BLOCK_NODES, LINES, SoftNodeTable
 from pipeline.compiled.arrays import Float32, Float64, Index
 
 
@@ -64,7 +64,11 @@ class Scratch(NamedTuple):
     firsts: npt.NDArray[np.uint32]
     """Nodes on view lines, and the first cells of their grids, float32 (K, DRAFT_ROWS, MOST_ON_LINES), uint32
     (K, MOST_ON_LINES)."""
-    seen: Float32  # where the viewer sees the fixed nodes, in x and in y, (lines, 2, COLUMNS)
+    seen: Float32  # where the viewer sees the fixed nodes, in x and in y, (2, nodes)
+    across: Float32
+    along: Float32
+    """Sums of a footprint's density over repeats along x and along y, (ends, nodes), (picks, nodes)."""
+    lines_of_cell: float  # mean number of lines of nodes in a cell
     areas: Float32
     freed: Float32
     walls: Float32
@@ -76,6 +80,7 @@ def scratch_for(table: SoftNodeTable) -> Scratch:
     """Return what the queries of a call need."""
     kinds, fixed, most = table.kinds.sum(), len(table.evenly), MOST_ON_LINES
     weight, areas, freed, walls = np.zeros((4, fixed, BLOCK_NODES), np.float32)
+    across, along = (np.empty((cells, table.evenly.size), np.float32) for cells in table.repeat)
     return Scratch(
         weight, weight.reshape(-1, COLUMNS),
         np.zeros(kinds, np.int64),
@@ -85,6 +90,7 @@ def scratch_for(table: SoftNodeTable) -> Scratch:
         np.zeros((2, fixed, BLOCK_NODES), np.float32),
         np.empty((2, 512)),
         np.empty((kinds, DRAFT_ROWS, most), np.float32), np.empty((kinds, most), np.uint32),
-        np.empty((len(table.spots), 2, COLUMNS), np.float32),
+        np.empty((2, table.evenly.size), np.float32),
+        across, along, float(table.groups[table.cell_groups, LINES].sum() / (len(table.group_starts) - 1)),
         areas, freed, walls,
     )  # fmt: skip

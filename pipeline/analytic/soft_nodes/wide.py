@@ -18,6 +18,7 @@ from pipeline.compiled.float32 import remaining
 RESOLVED: Final = 0.12  # least deviation whose density fixed nodes resolve; narrower footprints are widened to it
 
 _REACH = np.float32(2.6)  # deviations at which a footprint is cut off; 1 % of it lies beyond
+_CHEAPER: Final = 4.0  # time of a line of nodes in a loop over cells, over that in one over all nodes
 _SHORTEST_RUN = np.float32(1e-6)
 _0, _HALF, _1, _2 = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
 
@@ -45,13 +46,13 @@ def sight(ox: np.float32, oy: np.float32, oz: np.float32, bend: np.float32) -> S
 
 @inlined_fast_kernel
 def where_seen(table: SoftNodeTable, of: Sight, seen: Float32) -> None:
-    """Write where the viewer sees the fixed nodes, from the corner of their cell, (lines, 2, COLUMNS).
+    """Write where the viewer sees the fixed nodes, from the corner of their cell, in x and in y, (2, nodes).
 
     A node of height h is displaced by d = 2 g T / (1 + sqrt(1 + 2 kappa T^2 g)) towards the viewer (view_rays).
     """
     plane = np.float32(table.plane)
-    for line in range(len(seen)):
-        spot, own = table.spots[line], seen[line]
+    for line in range(len(table.spots)):
+        spot, own = table.spots[line], seen[:, COLUMNS * line :]
         for k in range(COLUMNS):
             over = spot[3, k] - plane
             shift = over * of.run
@@ -93,7 +94,7 @@ def _add_densities(
     places: Float32, x: np.float32, y: np.float32, of_xx: np.float32, of_yy: np.float32, of_xy: np.float32,
     found: Float32,
 ) -> None:  # fmt: skip
-    """Add the density of a Gaussian around (x, y) at a line of nodes, places (2, COLUMNS)."""
+    """Add the density of a Gaussian around (x, y) at a line of nodes, places (2, nodes from the first on)."""
     # Sums first: a loop that stores what it reads is kept from the vector units.
     d0, d1, d2, d3 = (
         density(places[0, 0] - x, places[1, 0] - y, of_xx, of_yy, of_xy),
@@ -118,6 +119,24 @@ def _add_densities(
 
 
 @inlined_fast_kernel
+def _write_sums_along(places: Float32, centre: float, low: int, high: int, of: np.float32, found: Float32) -> None:
+    """Write sums of exp(-of x^2) over all repeats at nodes, for every cell along an axis, (cells, nodes)."""
+    found[:] = _0
+    for cell in range(low, high + 1):
+        middle, own = np.float32(centre - cell), found[cell % len(found)]
+        for k in range(len(places)):
+            x = places[k] - middle
+            own[k] += remaining(of * x * x)
+
+
+@inlined_fast_kernel
+def _add_products(first: Float32, second: Float32, found: Float32) -> None:
+    """Add the products of as many numbers as `found` has."""
+    for k in range(len(found)):
+        found[k] += first[k] * second[k]
+
+
+@inlined_fast_kernel
 def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -> None:
     """Write the weights of all nodes: the density of a footprint of rays where the viewer sees each of them."""
     of = sight(look.ox, look.oy, look.oz, look.bend_o)
@@ -128,16 +147,33 @@ def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -
     weight[:, :] = _0
     seen = scratch.seen
     where_seen(table, of, seen)
-    for row in range(math.floor(look.y + y_low), math.floor(look.y + y_high) + 1):
-        middle_y = np.float32(look.y - row)
-        for column in range(math.floor(look.x + x_low), math.floor(look.x + x_high) + 1):
-            middle_x = np.float32(look.x - column)
-            cell = (row % picks) * ends + column % ends
-            for c in range(table.group_starts[cell], table.group_starts[cell + 1]):
-                group = groups[table.cell_groups[c]]
-                start = group[START] // np.uint32(COLUMNS)
-                for j in range(group[LINES]):
-                    _add_densities(seen[start + j], middle_x, middle_y, of_xx, of_yy, of_xy, weight[start + j])
+    first_row, last_row = math.floor(look.y + y_low), math.floor(look.y + y_high)
+    first_column, last_column = math.floor(look.x + x_low), math.floor(look.x + x_high)
+    of_nodes = weight.reshape(weight.size)
+    columns, rows = last_column - first_column + 1, last_row - first_row + 1
+    if look.rho == _0 and _CHEAPER * columns * rows * scratch.lines_of_cell > len(weight) * (columns + rows):
+        # The density is a product, and the same cells of all repeats are summed first.
+        _write_sums_along(seen[0], look.x, first_column, last_column, of_xx, scratch.across)
+        _write_sums_along(seen[1], look.y, first_row, last_row, of_yy, scratch.along)
+        for row in range(first_row, min(last_row, first_row + picks - 1) + 1):
+            for column in range(first_column, min(last_column, first_column + ends - 1) + 1):
+                end, pick = column % ends, row % picks
+                cell = pick * ends + end
+                for c in range(table.group_starts[cell], table.group_starts[cell + 1]):
+                    group = groups[table.cell_groups[c]]
+                    first, last = group[START], group[START] + COLUMNS * group[LINES]
+                    _add_products(scratch.across[end, first:], scratch.along[pick, first:], of_nodes[first:last])
+    else:
+        for row in range(first_row, last_row + 1):
+            middle_y = np.float32(look.y - row)
+            for column in range(first_column, last_column + 1):
+                middle_x = np.float32(look.x - column)
+                cell = (row % picks) * ends + column % ends
+                for c in range(table.group_starts[cell], table.group_starts[cell + 1]):
+                    group = groups[table.cell_groups[c]]
+                    start = group[START] // np.uint32(COLUMNS)
+                    for j in range(start, start + group[LINES]):
+                        _add_densities(seen[:, COLUMNS * j :], middle_x, middle_y, of_xx, of_yy, of_xy, weight[j])
     for line in range(len(weight)):
         for k in range(COLUMNS):
             weight[line, k] *= table.spots[line, 2, k]

@@ -25,7 +25,7 @@ from weaves.fabric import Fabric
 if TYPE_CHECKING:
     from pipeline.analytic.soft_nodes.nodes import SoftNodeTable
 
-Level = Literal[1, 2, 4, 8]  # a level of detail
+Level = Literal[0, 1, 2, 4, 8]  # a level of detail
 
 _SHARED: Final[WeakValueDictionary[tuple[object, ...], PerFabric[SoftNodeTable]]] = WeakValueDictionary()
 
@@ -48,8 +48,8 @@ class SoftNodesOptions(AnalyticOptions):
     prepare_seconds: ClassVar[float] = 1.2
 
     model: Literal["soft_nodes"] = "soft_nodes"
-    levels: list[Level] = Field(default=[1, 2, 4, 8], min_length=1, max_length=4)
-    """Levels of detail k, from few nodes to many; each is a row of the tables."""
+    levels: list[Level] = Field(default=[0, 1, 2, 4, 8], min_length=1, max_length=5)
+    """Levels of detail k, from few nodes to many, 0 without nodes of a footprint's own; each is a row of the tables."""
     parallax: Literal[True] = True
     """Footprints are patches of view rays."""
     walls: Walls = "rim"
