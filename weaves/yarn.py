@@ -50,7 +50,7 @@ class Yarn(Frozen):
     roughness: Number = Field(ge=0.01, le=1)  # microflake roughness alpha: small is lustrous
     relief: Number = Field(default=1.0, ge=0.01, le=2)  # scale of the height field, beta
     blend: Number = Field(default=0.5, ge=0, le=1)
-    """Weight w_d of the ply normal in the diffuse cosine; papers that weigh the macro normal mean 1 - w_d."""
+    """Weight of the ply normal in the diffuse cosine: w_d, or 1 - w_d if that of a paper weighs the macro normal."""
     specular: Colour = (0.3, 0.3, 0.3)  # colour k_s of the light scattered once by the fibres
     diffuse: Colour = (0.3, 0.3, 0.3)  # colour k_d of the light scattered many times and sent back
     diffuse_transmission: Colour = (0.0, 0.0, 0.0)

@@ -141,16 +141,16 @@ class Viewer {
       picture.gl.clear(picture.gl.COLOR_BUFFER_BIT);
       whole = [size, size];
       spent = await picture.small(state, ready, whole, wipe, box, false);
+      if (this.first) this.job += 1;
+      this.first = false;
     } else {
       const size = whole.map((length) => Math.max(16, Math.round(length * this.scale)));
       spent = await picture.small(state, ready, size, columns(size), [0, 0, ...whole], true);
       const rows = (whole[1] * STRIP * this.scale ** 2) / spent;
       this.scale = within(this.scale * Math.sqrt(FRAME / spent), 0.08, 1);
       this.show("coarse", methods, state);
-      if (this.first) {
-        this.first = false;
-        this.job += 1;
-      }
+      if (this.first) this.job += 1;
+      this.first = false;
       if (size[1] < whole[1] && job === this.job) {
         await new Promise((done) => { this.wake = done; setTimeout(done, 150); });
         spent = await this.refine(job, state, ready, whole, columns(whole), rows);

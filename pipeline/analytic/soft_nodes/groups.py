@@ -31,7 +31,7 @@ class Detail(NamedTuple):
     most: int  # nodes of all groups of pieces on top above which groups are merged; half as many beneath
     along: float  # nodes along a yarn, as a multiple of those at level 2
     parts: int  # parts of a yarn across, each with nodes of its own
-    lines: float  # deviation, in yarn spacings, below which a footprint places its nodes, on lines
+    lines: float  # deviation, in yarn spacings, below which a footprint places its nodes, on lines; 0: none does
     spacing: float  # distance of these lines and of their nodes, as a multiple of that at level 2
 
 

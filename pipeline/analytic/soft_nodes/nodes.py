@@ -103,7 +103,7 @@ class SoftNodeTable(NamedTuple):
     end_walls: npt.NDArray[np.uint8]
     """Share of that area which is a wall that no light from behind reaches, of LEVELS; of no azimuths without light
     from behind or without rims, uint8 (AZIMUTHS, …)."""
-    view_lines: float  # deviation below which a footprint places its nodes on lines
+    view_lines: float  # deviation below which a footprint places its nodes on lines; 0: none does
     spacing: float  # distance of lines and of their nodes, as a multiple of that at level 2
     rims: bool  # true if view rays that meet a wall see the yarn's rim above it
 
@@ -284,7 +284,7 @@ class _Layout(NamedTuple):
     """As in SoftNodeTable; the walls also where the table has none."""
 
 
-@lru_cache(maxsize=4)  # tables of light from behind and of curved cloth have the same
+@lru_cache(maxsize=len(DETAILS))  # tables of light from behind and of curved cloth have the same
 def _lay_out(fabric: Fabric, by_thread: bool, level: int, rims: bool) -> _Layout:
     front = cloth_side(fabric, TruthOptions()).front
     located, (picks, ends) = _locate(front), front.top.shape

@@ -1,10 +1,9 @@
 """Sums over few nodes with soft shadows; nothing is trained.
 
 A cloth's table holds some tens to hundreds of nodes with normals, tangents and softened horizons
-(pipeline.analytic.soft_nodes); a query becomes one sum over them and costs from half a microsecond to two, by the level
-of detail. The error is one to three per cent of the answer for a wide footprint, and more for a narrow one. Light from
-behind and transparency need the horizons of the back too, and curved cloth those of some curvatures: they are
-tabulated at the first such query.
+(pipeline.analytic.soft_nodes); a query becomes one sum over them. Time and error depend on the level of detail; a wide
+footprint has less of both than a narrow one. Light from behind and transparency need the horizons of the back too, and
+curved cloth those of some curvatures: they are tabulated at the first such query.
 """
 
 from __future__ import annotations

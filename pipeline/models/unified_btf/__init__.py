@@ -54,7 +54,7 @@ class BtfOptions(ComponentLossOptions):
 class EncoderOptions(BtfOptions):
     """Options of an encoder of angular samples."""
 
-    fixed: ClassVar[tuple[str, ...]] = ("directions", "log_samples")
+    fixed: ClassVar[tuple[str, ...]] = (*BtfOptions.fixed, "log_samples")
 
     fewest_samples: int = Field(default=50, ge=1, le=65_536)
     """A training step encodes a fabric from a random number of its samples, from this one to all."""
@@ -102,8 +102,8 @@ class BtfAutoencoderOptions(EncoderOptions):
 class UniversalOptions(BtfOptions):
     """The decoder of `unified_btf` without an encoder: the latents of each fabric are found by descent.
 
-    A fabric that was trained with keeps the latents that were learnt from its rows. Those of any other are found from
-    its angular samples, with the decoder as it is.
+    A fabric that was trained with keeps the latents that were learnt from its rows and angular samples. Those of any
+    other are found from its samples, with the decoder as it is.
     """
 
     fixed: ClassVar[tuple[str, ...]] = (*BtfOptions.fixed, "batch", "latent_rate", "rate")

@@ -20,8 +20,8 @@ round footprints only, as published.
 A training reads the samples of its fabrics from shards. A fabric that is added to a trained model brings its samples
 with it, as in the paper: computing them is part of the method, and of the time that adding a fabric takes.
 
-`universal` has this decoder and no encoder, as systems of 2026 do: latents are learnt with the decoder, from rows and
-samples [Park2019DeepSDF]. Those of a fabric that is added fit its samples, and means of its samples at all levels of
+`universal` has this decoder and no encoder: latents are learnt with the decoder, from rows and samples
+[Park2019DeepSDF]. Those of a fabric that is added fit its samples, and means of its samples at all levels of
 the pyramid, by descent from 0; the decoder stays as it is.
 """
 
@@ -228,19 +228,23 @@ class UnifiedBtfNetwork(BtfNetwork):
 class UniversalNetwork(BtfNetwork):
     """Decoder, with the latents of fabrics trained on, by the fingerprint of a fabric's optics.
 
-    `grids` are their rows and columns of texels by the same fingerprint, `texels` their samples in the same order; none
-    for inference.
+    `keys` are those of the fabrics, by index in batches, and `texels` their samples; none for inference. `grids` are
+    their rows and columns of texels. Fabrics that differ in colour alone share latents.
     """
 
     options: UniversalOptions
 
     def __init__(
-        self, options: UniversalOptions, grids: Mapping[str, tuple[int, int]], texels: Sequence[Texels] = ()
+        self,
+        options: UniversalOptions,
+        grids: Mapping[str, tuple[int, int]],
+        keys: Sequence[str] = (),
+        texels: Sequence[Texels] = (),
     ) -> None:
         super().__init__(options)
         self.encoder = nn.Identity()
         self.latents = nn.ParameterDict({key: torch.zeros(*grid, options.latent) for key, grid in grids.items()})
-        self._order, self._texels = list(grids), list(texels)
+        self._keys, self._texels = list(keys), list(texels)
 
     def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
         """Return two groups: a step touches few latents, so their rate is higher."""
@@ -249,12 +253,14 @@ class UniversalNetwork(BtfNetwork):
 
     def latents_of(self, index: int, random: np.random.Generator) -> Tensor:
         """Return the latents as they are."""
-        latents: Tensor = self.latents[self._order[index]]
+        latents: Tensor = self.latents[self._keys[index]]
         return latents
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
-        """Return the error of the rows, and of some samples of the same fabrics."""
+        """Return the error of the rows and, unless they are held out, of some samples of the same fabrics."""
         total = super().loss(batch, random)
+        if not torch.is_grad_enabled():
+            return total
         for index in batch.fabric.tolist():
             texels = self._texels[index] = self._texels[index].to(total.device)
             total = total + self.sample_error(self.latents_of(index, random), texels, random) / len(batch.fabric)
@@ -312,8 +318,9 @@ def build(
     """Return an untrained network for these fabrics, with their angular samples by column."""
     texels = [read_texels(fabric, options, columns) for fabric, columns in zip(fabrics, samples, strict=True)]
     if isinstance(options, UniversalOptions):
-        grids = {fingerprint(fabric.optics()): own.shape for fabric, own in zip(fabrics, texels, strict=True)}
-        return UniversalNetwork(options, grids, texels)
+        keys = [fingerprint(fabric.optics()) for fabric in fabrics]
+        grids = {key: own.shape for key, own in zip(keys, texels, strict=True)}
+        return UniversalNetwork(options, grids, keys, texels)
     assert isinstance(options, EncoderOptions)
     return UnifiedBtfNetwork(options, texels)
 
@@ -324,8 +331,9 @@ def restore(options: BtfOptions, trained: Trained) -> list[NetworkMethod[BtfNetw
     def empty(_: tuple[int, int]) -> BtfNetwork:
         if isinstance(options, UniversalOptions):
             _card, weights = trained[0]
-            latents = {name.removeprefix("latents."): own for name, own in weights.items() if "latents." in name}
-            return UniversalNetwork(options, {key: (own.shape[0], own.shape[1]) for key, own in latents.items()})
+            shapes = {name: own.shape for name, own in weights.items() if name.startswith("latents.")}
+            grids = {name.removeprefix("latents."): (rows, columns) for name, (rows, columns, _) in shapes.items()}
+            return UniversalNetwork(options, grids)
         assert isinstance(options, EncoderOptions)
         return UnifiedBtfNetwork(options)
 

@@ -24,7 +24,7 @@ def test_regular_weaves_have_few_groups(name, groups):
     assert len(gather(placed(load_fabric(name)), DETAILS[USUAL])) == groups
 
 
-@pytest.mark.parametrize("level", DETAILS)
+@pytest.mark.parametrize("level", list(DETAILS)[1:])  # the first has the groups of the second
 @pytest.mark.parametrize("side", [8, 16])
 def test_many_different_floats_are_merged_and_no_cell_is_lost(side, level):
     pieces, detail = placed(irregular(side, seed=3)), DETAILS[level]

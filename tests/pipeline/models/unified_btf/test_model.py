@@ -20,6 +20,7 @@ BTF, LINING = SMALL["unified_btf"], load_fabric("polyester_lining")
 OPTIONS = UnifiedBtfOptions(encoder_hidden=16, weights=8)
 FEW = UnifiedBtfOptions(texels_per_yarn=2, samples=4, fewest_samples=2)
 SHANTUNG = load_fabric("silk_shantung")
+RED = LINING.model_copy(update={"name": "red", "warp": LINING.warp.model_copy(update={"diffuse": (0.5, 0.1, 0.1)})})
 
 
 @pytest.mark.parametrize(("latent", "published"), [(32, 38_269), (8, 35_725)])
@@ -161,7 +162,7 @@ def test_rows_become_samples_by_texels_which_are_not_computed_again_while_in_use
 @torch.no_grad()
 def test_latents_are_found_again_from_the_samples_that_they_give_and_trained_fabrics_keep_theirs():
     """Without an encoder: a descent from 0 finds most; a random network of ReLUs has minima beside."""
-    options, cloths = SMALL["universal"].model_copy(update={"steps": 300, "hidden": 64}), [SHANTUNG, LINING]
+    options, cloths = SMALL["universal"].model_copy(update={"steps": 300, "hidden": 64}), [SHANTUNG, LINING, RED]
     torch.manual_seed(3)
     for order in (cloths, cloths[::-1]):
         network = untrained(options, *order)
