@@ -19,7 +19,7 @@ UNSEEN = ("gauze", "silk_charmeuse", "crepe")
 
 CASES = [(name, 2, ()) if name in KINDS else slow(name, 2, ()) for name in preset_names()]
 CASES += [(name, 2, (EVERY,)) if name in FEW else slow(name, 2, (EVERY,)) for name in preset_names()]
-CASES += [("gingham", level, ()) for level in (1, 4)]
+CASES += [("gingham", level, ()) for level in (0, 1, 4)]
 CASES += [("tartan", 2, ()), ("gingham", 8, (EVERY,)), ("polyester_lining", 1, (EVERY,)), ("gauze", 2, ())]
 
 
