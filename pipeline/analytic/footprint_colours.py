@@ -237,10 +237,8 @@ def _fold_seen(
         a, b = table.starts[first + thread], table.starts[first + thread + 1]
         for line in range(a * len(shares) // len(table.evenly), b * len(shares) // len(table.evenly)):
             for k in range(COLUMNS):
-                share, place = (
-                    shares[line, k] * max(areas[line, k], np.float32(_HIDDEN)),
-                    seen[axis, COLUMNS * line + k],
-                )
+                share = shares[line, k] * max(areas[line, k], np.float32(_HIDDEN))
+                place = seen[axis, COLUMNS * line + k]
                 total += share
                 mean += share * place
                 square += share * place * place

@@ -69,7 +69,7 @@ class Photograph(NamedTuple):
     irradiance: Float64  # of a surface that faces the lamp, of any scale, (N,)
 
 
-class _Streak(NamedTuple):
+class Streak(NamedTuple):
     """A profile of a streak of light, along it or across it."""
 
     error: float  # RMS difference of photograph and prediction over their mean
@@ -93,7 +93,7 @@ def read_photographs(path: Path) -> dict[str, Photograph]:
     return photographs
 
 
-def streaks(fabric: Fabric, photograph: Photograph) -> list[_Streak]:
+def streaks(fabric: Fabric, photograph: Photograph) -> list[Streak]:
     """Compare a photograph with what a fabric predicts: along the streak and across it."""
     nothing, (wi, wo) = np.zeros(len(photograph.values)), (photograph.wi, photograph.wo)
     queries = Queries.round(nothing, nothing, nothing + max(EVEN_SIGMA, *fabric.weave.repeat), wi, wo)
@@ -109,7 +109,7 @@ def streaks(fabric: Fabric, photograph: Photograph) -> list[_Streak]:
         own, other = (np.bincount(strip, values, _STRIPS) / count for values in (measured, predicted))
         error = float(np.sqrt(np.mean((other - own) ** 2)) / own.mean())
         lit = (np.maximum(values - np.median(values), 0.0) for values in (measured, predicted))
-        result.append(_Streak(error, *(float(np.sqrt(np.cov(coordinate, aweights=weights))) for weights in lit)))
+        result.append(Streak(error, *(float(np.sqrt(np.cov(coordinate, aweights=weights))) for weights in lit)))
     return result
 
 

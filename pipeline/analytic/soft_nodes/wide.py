@@ -120,7 +120,7 @@ def _add_densities(
 
 @inlined_fast_kernel
 def _write_sums_along(places: Float32, centre: float, low: int, high: int, of: np.float32, found: Float32) -> None:
-    """Write sums of exp(-of x^2) over all repeats at nodes, for every cell along an axis, (cells, nodes)."""
+    """Write sums of exp(-of x^2) over all repeats at nodes, for cells in sight along an axis, (cells, nodes)."""
     for cell in range(low, min(high + 1, low + len(found))):
         found[cell % len(found)] = _0
     for cell in range(low, high + 1):

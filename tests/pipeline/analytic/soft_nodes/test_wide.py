@@ -49,7 +49,7 @@ def test_they_are_the_gaussian_over_all_images(name, correlation, theta, bend):
     assert expected.max() > 4.0 * expected.mean()
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=0.04 * expected.max())
     assert np.abs(found - expected).mean() < 2e-3 * expected.max()
-    # Sums along both axes, and those over cells that hardly slanted footprints have, are the same.
+    # A footprint that is not slanted takes sums along both axes, a slightly slanted one sums over cells.
     for wide in ((0.15, 0.2), deviations, (3.0, 4.0)):
         level, slanted = (weights(table, x, y, wide, rho, wo, bend) for rho in (0.0, 1e-6))
         np.testing.assert_allclose(level, slanted, rtol=1e-4, atol=1e-6 * level.max())
