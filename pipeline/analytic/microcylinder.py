@@ -10,44 +10,32 @@ thread, around t and along t. theta_h = (theta_i + theta_o)/2, theta_d = (theta_
           / cos^2 theta_d
     M   = (1 - u) m_i m_o + u min(m_i, m_o),   m = max(cos phi, 0),   u = exp(-phi_d^2 / (2 (20 degrees)^2))
 
-P is M with psi in place of phi, and g the normal density. The authors measured cylinders. Here `fit` finds the k and
+P is M with psi in place of phi, and g the normal density. The authors measured cylinders. Here a fit finds the k and
 gamma of both families from a fabric's components in footprints of many yarns, and tangents are quantiles of the slopes
 of the visible surface. There is no Fresnel factor, since yarns here have no interface.
 """
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
-from scipy.optimize import nnls
 
+from pipeline.analytic.far_field import FarField
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import inlined_kernel, kernel
-from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 from weaves.surface import surface_at
 
-LOBES: Final = 3  # of a family: surface, narrow volume, even volume
-FITTED_WIDTHS: Final = np.radians(np.geomspace(2.0, 60.0, 24))
-"""Standard deviations of lobes that a fit tries, radians."""
-
+_LOBES: Final = 3  # of a family: surface, narrow volume, even volume
 _TANGENTS: Final = 3  # of a family
+_TRIED: Final = tuple(np.radians(np.geomspace(2.0, 60.0, 24)))  # standard deviations of lobes
 _POINTS: Final = 32  # of the surface along a yarn spacing
 _CORRELATED: Final = math.radians(20.0)
 _TINY: Final = 1e-12
 
 
-class Cylinders(NamedTuple):
-    """Cylinders of both families."""
-
-    cover: Float64  # share of the cloth, (2,)
-    tilts: Float64  # of tangents: rise of the normal along the thread, radians, (2, n)
-    widths: Float64  # gamma of surface and volume, radians, (2, 2)
-    scales: Float64  # k of the lobes, (2, LOBES)
-
-
-def cylinders_of(fabric: Fabric) -> Cylinders:
-    """Return the shares and tangents of a fabric's threads; widths and scales are 1."""
+def microcylinder(fabric: Fabric) -> FarField:
+    """Return the cylinders of a fabric; parameters are gamma of surface and volume, radians, and 1 before a fit."""
     x, y = ((np.arange(n * _POINTS) + 0.5) / _POINTS for n in fabric.weave.repeat)
     surface = surface_at(fabric, x[None, :], y[:, None])
     here = [surface.yarn == family for family in range(2)]
@@ -57,33 +45,7 @@ def cylinders_of(fabric: Fabric) -> Cylinders:
         normal = surface.normal[here[family]]
         tilts.append(np.quantile(np.arctan2(normal[:, axis], normal[:, 2]), levels) if len(normal) else 0.0 * levels)
     cover = np.array([seen.mean() for seen in here])
-    return Cylinders(cover, np.array(tilts), np.ones((2, 2)), np.ones((2, LOBES)))
-
-
-def fit(cylinders: Cylinders, queries: Queries, components: Float64) -> Cylinders:
-    """Return cylinders whose widths and scales give N components (N, 4) with least squared error."""
-    widths, scales, least = cylinders.widths.copy(), cylinders.scales.copy(), np.full((2, 2), math.inf)
-    for width in FITTED_WIDTHS:
-        basis = lobes(cylinders._replace(widths=np.full((2, 2), width)), queries)
-        for family in range(2):
-            for kind, columns in enumerate((slice(0, 1), slice(1, LOBES))):
-                chosen, error = nnls(basis[:, family, columns], components[:, 2 * kind + family])
-                if error < least[family, kind]:
-                    least[family, kind], widths[family, kind], scales[family, columns] = error, width, chosen
-    return cylinders._replace(widths=widths, scales=scales)
-
-
-def answer(cylinders: Cylinders, queries: Queries) -> Float32:
-    """Return the components (N, 4); queries are lit from the front."""
-    scaled = lobes(cylinders, queries) * cylinders.scales
-    return np.concatenate([scaled[:, :, 0], scaled[:, :, 1:].sum(axis=2)], axis=1).astype(np.float32)
-
-
-def lobes(cylinders: Cylinders, queries: Queries) -> Float64:
-    """Return the lobes of both families with scale 1, (N, 2, LOBES)."""
-    result = np.zeros((len(queries.wi), 2, LOBES))
-    _fill(cylinders.cover, cylinders.tilts, cylinders.widths, queries.wi, queries.wo, result)
-    return result
+    return FarField(_fill, (cover, np.array(tilts)), 1, _TRIED, np.ones((2, 2)), np.ones((2, _LOBES)))
 
 
 @kernel
@@ -125,7 +87,7 @@ def _fill(cover: Float64, tilts: Float64, widths: Float64, wi: Float32, wo: Floa
                 result[row, family, 2] += weight
         inverse = 1.0 / max(area, _TINY)
         for family in range(2):
-            for lobe in range(LOBES):
+            for lobe in range(_LOBES):
                 result[row, family, lobe] *= inverse
 
 

@@ -36,6 +36,7 @@ METHODS: Final[Mapping[str, tuple[Marker, str, str]]] = {
     "r2_points": ("D", "#a67806", "#e3bf4e"),
     "prefiltered": ("P", "#6f7484", "#a7adbd"),
     "microcylinder": ((7, 0, 0), "#6b4fb3", "#b9a5f0"),
+    "irawan": ((3, 0, 180), "#4a6b2a", "#a9c98a"),
     "map_material": ((8, 1, 0), "#b3263f", "#ff8fa3"),
     "soft_nodes": (">", "#d24fa2", "#f9a8d8"),
 }
