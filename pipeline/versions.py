@@ -20,7 +20,7 @@ BOUND: Final = 4  # how the energy bound changes the answers of a network (`pipe
 FALLBACK: Final = 11
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
-SCENES: Final = 3  # the shipped scenes, and the queries of any scene
+SCENES: Final = 4  # the shipped scenes, and the queries of any scene
 
 SCENE_BENCH: Final = 5  # measurements in scenes and the files they write (`reports.measure.scene`)
 

@@ -102,7 +102,7 @@ def _gbuffer(loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: Mask,
 
 
 def _lit(loaded: Loaded, places: Places) -> tuple[Index, Float64, Float64]:
-    """Return which places each light in sight reaches, from where, and with which irradiance."""
+    """Return the place of each query, sorted, and its light in sight: whence, and with which irradiance."""
     beside = off(places.position)
     index, towards, power = [], [], []
     for light in loaded.lights:
@@ -123,7 +123,9 @@ def _lit(loaded: Loaded, places: Places) -> tuple[Index, Float64, Float64]:
         index.append(lit)
         towards.append(wi[lit])
         power.append(irradiance[lit])
-    return np.concatenate(index), np.concatenate(towards), np.concatenate(power)
+    place = np.concatenate(index)
+    order = np.argsort(place, kind="stable")
+    return place[order], np.concatenate(towards)[order], np.concatenate(power)[order]
 
 
 def _refuse_inside(loaded: Loaded, camera: Camera) -> None:

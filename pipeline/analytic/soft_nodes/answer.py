@@ -90,11 +90,18 @@ def _sum_rows(
             x, y, dx, dy, rho, narrowest, wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2], low_i, high_i,
             turn_i, low_o, high_o, turn_o, bend_i, bend_o,
         )  # fmt: skip
+        # Lights that follow each other at one place share its nodes.
+        again = (
+            n > 0 and u[n] == u[n - 1] and v[n] == v[n - 1] and deviation_x[n] == deviation_x[n - 1]
+            and deviation_y[n] == deviation_y[n - 1] and correlation[n] == correlation[n - 1]
+            and curvature[n] == curvature[n - 1] and wo[n, 0] == wo[n - 1, 0] and wo[n, 1] == wo[n - 1, 1]
+            and wo[n, 2] == wo[n - 1, 2]
+        )  # fmt: skip
         # Where rays rise before they have sunk to the least height that is seen, nodes are far from one another.
         flat, depth = wo[n, 0] * wo[n, 0] + wo[n, 1] * wo[n, 1], np.float32(table.plane) - table.shown[0]
         rises = wo[n, 2] * wo[n, 2] < np.float32(2.0) * bend_o * flat * depth
         lines = table.view_lines * (2.0 if rises else 1.0)
         if narrowest < lines and nodes_on_lines(dx, dy, narrowest, table.spacing) <= MOST_ON_LINES:
-            gaps[n] = sum_view_lines(table, scratch, look, result[n])
+            gaps[n] = sum_view_lines(table, scratch, look, again, result[n])
         else:
-            gaps[n] = sum_fixed(table, scratch, look, result[n])
+            gaps[n] = sum_fixed(table, scratch, look, again, result[n])

@@ -69,6 +69,7 @@ class Scratch(NamedTuple):
     along: Float32
     """Sums of a footprint's density over repeats along x and along y, (ends, nodes), (picks, nodes)."""
     lines_of_cell: float  # mean number of lines of nodes in a cell
+    gaps: Float32  # area seen through gaps, and 1 / deviation along lines, of nodes on lines, (2,)
     areas: Float32
     freed: Float32
     walls: Float32
@@ -92,5 +93,5 @@ def scratch_for(table: SoftNodeTable) -> Scratch:
         np.empty((kinds, DRAFT_ROWS, most), np.float32), np.empty((kinds, most), np.uint32),
         np.empty((2, table.evenly.size), np.float32),
         across, along, float(table.groups[table.cell_groups, LINES].sum() / (len(table.group_starts) - 1)),
-        areas, freed, walls,
+        np.zeros(2, np.float32), areas, freed, walls,
     )  # fmt: skip

@@ -328,8 +328,11 @@ def _place(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, ray: ViewRay
 
 
 @inlined_kernel
-def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: Float32) -> np.float32:
-    """Write the sums of a footprint of view rays (K, NODE_SUMS), and return the area seen through gaps."""
+def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, again: bool, result: Float32) -> np.float32:
+    """Write the sums of a footprint of view rays (K, NODE_SUMS), and return the area seen through gaps.
+
+    With `again` the last query was of the same place: its nodes are there.
+    """
     run = np.hypot(look.ox, look.oy)
     dx, dy = (look.ox / run, look.oy / run) if run > _FROM_ABOVE else (_1, _0)
     run = run / look.oz
@@ -337,7 +340,9 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
     if bend > 0.0 and run > _FROM_ABOVE:
         least = max(least, table.plane - _JUST / (bend * float(run) ** 2))
     ray = ViewRay(float(dx), float(dy), float(run), bend, table.plane, least)
-    gaps, inverse = _place(table, scratch, look, ray)
+    if not again:
+        scratch.gaps[:] = _place(table, scratch, look, ray)
+    inverse = scratch.gaps[1]
     rays = LineRays(run, np.float32(table.plane), np.float32(2.0) * look.bend_o * run * run, inverse)
     back, of_warp, size = look.iz < _0, table.kinds[0], table.grid.shape[2]
     grid = scratch.behind_grid if back else scratch.grid
@@ -360,4 +365,4 @@ def sum_view_lines(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, resu
         else:
             sums = shade_lines(draft, firsts, rays, light, None, sharp, d, yarn, family, thickness, None)
         write_sums(sums, own)
-    return gaps
+    return np.float32(scratch.gaps[0])

@@ -181,30 +181,32 @@ def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -
 
 
 @inlined_kernel
-def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, result: Float32) -> np.float32:
-    """Write the sums of each kind of yarn (K, NODE_SUMS), and return the area seen through gaps."""
-    shares = scratch.weight
-    if look.narrowest >= table.uniform:
-        shares = table.evenly
-    else:
-        displaced_weights(table, scratch, look)
+def sum_fixed(table: SoftNodeTable, scratch: Scratch, look: SoftQuery, again: bool, result: Float32) -> np.float32:
+    """Write the sums of each kind of yarn (K, NODE_SUMS), and return the area seen through gaps.
+
+    With `again` the last query was of the same place: weights and areas are there.
+    """
+    shares = table.evenly if look.narrowest >= table.uniform else scratch.weight
     of_warp, kinds = table.kinds[0], table.kinds[0] + table.kinds[1]
     mean, sharp, low_i, high_i = table.mean, table.sharpness, look.low_i, look.high_i
     near_i = look.high_i if look.turn_i > _HALF else look.low_i
     step, part = angle_of(look.oz)
-    write_areas(table.areas, look.low_o, look.high_o, look.turn_o, step, part, scratch.areas)
-    scratch.freed[:] = _0
+    low_o, high_o, turn_o = look.low_o, look.high_o, look.turn_o
+    if not again:
+        if look.narrowest < table.uniform:
+            displaced_weights(table, scratch, look)
+        write_areas(table.areas, low_o, high_o, turn_o, step, part, scratch.areas)
+        scratch.freed[:] = _0
+        if look.bend_o > _0:
+            bend_rows(mean, table.falls, low_o, high_o, turn_o, bend_of(look.bend_o), scratch.curved[1])
+            sharpness = table.sharpness[high_o if turn_o > _HALF else low_o]
+            bent = NodeHorizons(scratch.curved[1], scratch.curved[1], sharpness, turn_o)
+            write_freed(bent, NodeHorizons(mean[low_o], mean[high_o], sharpness, turn_o), look.oz, scratch.freed)
     if look.iz < _0 and len(table.end_walls) > 0:
-        write_areas(table.end_walls, look.low_o, look.high_o, look.turn_o, step, part, scratch.walls)
-    if look.bend_o > _0:
-        low_o, high_o, turn_o = look.low_o, look.high_o, look.turn_o
-        bend_rows(mean, table.falls, low_o, high_o, turn_o, bend_of(look.bend_o), scratch.curved[1])
-        sharpness = table.sharpness[high_o if turn_o > _HALF else low_o]
-        bent = NodeHorizons(scratch.curved[1], scratch.curved[1], sharpness, turn_o)
-        write_freed(bent, NodeHorizons(mean[low_o], mean[high_o], sharpness, turn_o), look.oz, scratch.freed)
-        if look.iz > _0:
-            bend_rows(mean, table.falls, low_i, high_i, look.turn_i, bend_of(look.bend_i), scratch.curved[0])
-            mean, low_i, high_i = scratch.curved, 0, 0
+        write_areas(table.end_walls, low_o, high_o, turn_o, step, part, scratch.walls)
+    if look.bend_o > _0 and look.iz > _0:
+        bend_rows(mean, table.falls, low_i, high_i, look.turn_i, bend_of(look.bend_i), scratch.curved[0])
+        mean, low_i, high_i = scratch.curved, 0, 0
     if look.iz < _0:
         mean, sharp = table.behind_mean, table.behind_sharpness
     for kind in range(kinds):

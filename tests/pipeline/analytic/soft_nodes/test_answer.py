@@ -18,6 +18,7 @@ from tests.pipeline.truth.cloths import LOPSIDED, drawn, irregular, woven
 from tests.presets import slow
 from weaves.fabric import load_fabric
 
+GAUZE = load_fabric("gauze")
 SIZES = {"narrow": (0.05, 0.2), "middle": (0.3, 1.0), "wide": (3.0, 8.0)}
 
 
@@ -140,11 +141,27 @@ def test_sums_of_threads_add_up_to_those_of_the_families(name, sigma):
     np.testing.assert_allclose(added.mean(axis=0), whole.mean(axis=0), rtol=0.02, atol=1e-4)
 
 
-@pytest.mark.parametrize("sigma", SIZES.values(), ids=SIZES)
-def test_shadows_take_light_away(sigma):
+def test_shadows_take_light_away():
     """No sum exceeds that of what is seen without shadows."""
     fabric = load_fabric("denim")
-    queries = drawn(fabric, 6, 100, sigma=sigma, max_angle=85.0)
-    sums, _ = query_sums(soft_table(fabric), queries)
-    for lit, whole in ((DIFFUSE, OPEN_DIFFUSE), (SPECULAR, OPEN_SPECULAR)):
-        assert (sums[:, :, lit] >= 0.0).all() and (sums[:, :, lit] <= 1.001 * sums[:, :, whole] + 1e-7).all()
+    for sigma in SIZES.values():
+        sums, _ = query_sums(soft_table(fabric), drawn(fabric, 6, 100, sigma=sigma, max_angle=85.0))
+        for lit, whole in ((DIFFUSE, OPEN_DIFFUSE), (SPECULAR, OPEN_SPECULAR)):
+            assert (sums[:, :, lit] >= 0.0).all() and (sums[:, :, lit] <= 1.001 * sums[:, :, whole] + 1e-7).all()
+
+
+def test_lights_of_one_place_answer_as_each_alone():
+    """Lights on both sides follow each other at one place and share its nodes; a change of any column is seen."""
+    table = tabulate(GAUZE, behind=True, curved=True)
+    for sigma in (*SIZES.values(), (30.0, 40.0)):
+        places = drawn(GAUZE, 5, 12, sigma=sigma, stretch=3.0, max_angle=80.0)
+        places = places._replace(curvature=np.tile(np.float32([0.0, 0.05]), 6))
+        place = np.repeat(np.arange(12), 10)
+        lit = places.take(place)._replace(wi=drawn(GAUZE, 6, 120, max_angle=80.0, behind=0.5).wi)
+        for column in ("wi", "wo", "u", "v", "sigma", "sigma_minor", "angle", "curvature"):
+            values = getattr(lit, column).copy()
+            values[::2] = getattr(lit if column == "wi" else places.take(np.roll(place, 10)), column)[::2]
+            asked = lit._replace(**{column: values})
+            alone = [query_sums(table, asked.take([row])) for row in range(0, 120, 3)]
+            for own, by_one in zip(query_sums(table, asked), zip(*alone, strict=True), strict=True):
+                np.testing.assert_array_equal(own[::3], np.concatenate(by_one))
