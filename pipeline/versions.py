@@ -12,7 +12,14 @@ TRUTH: Final = 9
 
 TRAINING: Final = 4  # the training loop and the files that it writes
 
-MODELS: Final[dict[str, int]] = {"curved": 2, "point_sampled": 6, "prefiltered": 2, "selvage": 11, "soft_nodes": 10}
+MODELS: Final[dict[str, int]] = {
+    "curved": 2,
+    "point_sampled": 6,
+    "prefiltered": 2,
+    "selvage": 11,
+    "soft_nodes": 10,
+    "woven": 2,
+}
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
 BOUND: Final = 4  # how the energy bound changes the answers of a network (`pipeline.models.bounded`)

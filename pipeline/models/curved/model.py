@@ -31,7 +31,7 @@ from torch.nn import functional
 from pipeline.compiled.arrays import Float32
 from pipeline.models.curved import CurvedOptions
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import component_error, perceptron, to_components
+from pipeline.models.networks.layers import component_error, once_a_place, perceptron, to_components
 from pipeline.models.networks.texture import LAYERS, TextureNetwork, level_shapes, random_pyramid
 from pipeline.truth.cloth import cloth_side
 from pipeline.truth.geometry.heightfield import has_gaps
@@ -111,10 +111,8 @@ class CurvedNetwork(TextureNetwork):
 
     def forward(self, view: View, wi: Tensor) -> Tensor:
         """Answer in network space, (n, 4), for light from wi (n, 3)."""
-        seen = self._view(view)
-        u, v = self.moved(view.u, view.v, view.sigma, view.wo, seen)
-        features = self.read(list(self.levels), u, v, view.sigma)
-        output: Tensor = self.decoder(torch.cat([features, seen, wi[:, : _axes(self.options)]], dim=-1))
+        features = once_a_place(lambda *columns: self._features(View(*columns)), *view)
+        output: Tensor = self.decoder(torch.cat([features, wi[:, : _axes(self.options)]], dim=-1))
         return output
 
     def components(self, *inputs: Tensor) -> Tensor:
@@ -167,6 +165,12 @@ class CurvedNetwork(TextureNetwork):
             view = view._replace(wo=level)
         output: Tensor = self.opacity(torch.cat([features, self._view(view)], dim=-1))
         return output
+
+    def _features(self, view: View) -> Tensor:
+        """Return the features of places, and the perceptron's inputs for viewer and curvature."""
+        seen = self._view(view)
+        u, v = self.moved(view.u, view.v, view.sigma, view.wo, seen)
+        return torch.cat([self.read(list(self.levels), u, v, view.sigma), seen], dim=-1)
 
     def _view(self, view: View) -> Tensor:
         """Return the perceptrons' inputs for viewer and curvature."""

@@ -5,6 +5,7 @@ squeezes them. The loss is the mean squared error there, with a weight of each p
 """
 
 import itertools
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -48,7 +49,7 @@ def layers_of(network: nn.Sequential) -> list[LinearLayer]:
 
 def activate(x: Tensor) -> Tensor:
     """Apply the leaky ReLU."""
-    return functional.leaky_relu(x, SLOPE)
+    return functional.leaky_relu(x, SLOPE, inplace=not torch.is_grad_enabled())
 
 
 class Residual(nn.Module):
@@ -61,6 +62,21 @@ class Residual(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """Return numbers (..., width) from as many."""
         return activate(x + self.second(activate(self.first(x))))
+
+
+def once_a_place(function: Callable[..., Tensor], *columns: Tensor) -> Tensor:
+    """Return what a function answers row by row, computed once where rows that follow each other are alike.
+
+    So the lights of a place share what does not depend on them. A training or an exported graph computes every row.
+    """
+    if torch.is_grad_enabled() or torch.compiler.is_compiling() or len(columns[0]) < 2:
+        return function(*columns)
+    new = torch.ones(len(columns[0]), dtype=torch.bool, device=columns[0].device)
+    new[1:] = torch.stack([(x[1:] != x[:-1]).reshape(len(x) - 1, -1).any(dim=1) for x in columns]).any(dim=0)
+    rows = new.nonzero()[:, 0]
+    if 2 * len(rows) > len(new):
+        return function(*columns)
+    return function(*(column[rows] for column in columns))[new.cumsum(0) - 1]
 
 
 class EncoderDecoder(QueryNetwork):

@@ -28,7 +28,7 @@ import torch
 from torch import Tensor, nn
 
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import component_error, perceptron, to_components
+from pipeline.models.networks.layers import component_error, once_a_place, perceptron, to_components
 from pipeline.models.networks.texture import LAYERS, TextureNetwork, random_pyramid, read_texture
 from pipeline.models.neumip import NeumipOptions, TriplePlaneOptions
 from weaves.fabric import Fabric
@@ -46,10 +46,14 @@ class NeumipNetwork(TextureNetwork):
 
     def forward(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
         """Answer in network space, (n, 4); u, v (n,) are shares of the repeat, sigma is in yarn spacings."""
-        u, v = self.moved(u, v, sigma, wo, wo[:, :2])
-        features = self.read(list(self.levels), u, v, sigma)
+        features = once_a_place(self.features, u, v, sigma, wo)
         output: Tensor = self.decoder(torch.cat([features, wi[:, :2], wo[:, :2]], dim=-1))
         return output
+
+    def features(self, u: Tensor, v: Tensor, sigma: Tensor, wo: Tensor) -> Tensor:
+        """Return the features (n, channels) of places."""
+        u, v = self.moved(u, v, sigma, wo, wo[:, :2])
+        return self.read(list(self.levels), u, v, sigma)
 
     def components(self, *inputs: Tensor) -> Tensor:
         """Return the components (n, 4); with `ignore_curvature` 0 where the light is behind the tangent plane."""
@@ -92,8 +96,7 @@ class TriplePlaneNetwork(NeumipNetwork):
 
     def forward(self, u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
         """Answer in network space, (n, 4); inputs as for `neumip`."""
-        u, v = self.moved(u, v, sigma, wo, wo[:, :2])
-        features = [self.read(list(self.levels), u, v, sigma)]
+        features = [once_a_place(self.features, u, v, sigma, wo)]
         first = torch.zeros(len(u), dtype=torch.int64, device=u.device)
         # The disc ends at the centres of the outermost texels, so that nothing wraps.
         scale = 0.5 - 0.5 / self.options.direction_texels

@@ -41,7 +41,14 @@ from torch.nn import functional
 from pipeline.compiled.arrays import Index
 from pipeline.fingerprint import fingerprint
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import EncoderDecoder, component_error, perceptron, start_at_mean, to_components
+from pipeline.models.networks.layers import (
+    EncoderDecoder,
+    component_error,
+    once_a_place,
+    perceptron,
+    start_at_mean,
+    to_components,
+)
 from pipeline.models.networks.texture import level_shapes, read_pyramid
 from pipeline.models.unified_btf import BtfOptions, EncoderOptions, UniversalOptions
 from pipeline.shards.queries import QueryOptions
@@ -156,7 +163,8 @@ class BtfNetwork(EncoderDecoder):
     def components(self, *inputs: Tensor) -> Tensor:
         """Return components (n, 4) from the columns of queries and the levels of a pyramid."""
         u, v, sigma, wi, wo, *pyramid = inputs
-        return to_components(self.decode(self.read(pyramid, u, v, sigma), wi, wo), self.options.log_k)
+        latent = once_a_place(lambda *place: self.read(pyramid, *place), u, v, sigma)
+        return to_components(self.decode(latent, wi, wo), self.options.log_k)
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the weighted squared error in network space."""

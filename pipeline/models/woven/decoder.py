@@ -18,6 +18,7 @@ By its Fourier series, which ends at the bins' own resolution,
 """
 
 import math
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -27,6 +28,7 @@ from pipeline.models.networks.layers import Residual, activate
 from pipeline.models.woven import WovenOptions
 
 _DIRECTIONS = 5
+_LIGHT = slice(-5, -2)  # inputs of a layer that are wi; wo follows
 _FUSED = 64
 _SHARPNESS = 0.4  # deviation of the sharpest blob of `local`, in bins
 
@@ -104,8 +106,8 @@ class Decoder(nn.Module):
             step = torch.arange(options.bins)
             around = (step.unsqueeze(-1) + step) % options.bins
             seen = around[:, None, :, None] * options.bins + around[None, :, None, :]
-            self.register_buffer("seen", seen.flatten(2).flatten(0, 1), persistent=False)
-            self.seen: Tensor
+            self.register_buffer("seen_cells", seen.flatten(2).flatten(0, 1), persistent=False)
+            self.seen_cells: Tensor
         self.fusion: nn.ModuleList | None = None
         if options.spatial_fusion:
             deeper = [nn.Linear(hidden, hidden)] if options.extra_layer == "fusion" else []
@@ -114,25 +116,37 @@ class Decoder(nn.Module):
         self.narrow = nn.Linear(hidden, _FUSED)
         self.last = nn.Linear(_FUSED, 5 if options.transmission else 4)
 
-    def forward(self, latent: Tensor, where: Tensor | None, patch: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
-        """Answer in network space, (F, n, 4), transparency appended if `transmission` is learnt.
+    def seen(self, latent: Tensor, where: Tensor | None, patch: Tensor, wo: Tensor) -> Tensor:
+        """Return what the lights of a place share, (F, n, hidden): the layer that reads directions, before wi.
 
         `latent` (F, latent or latent + bins^2) is from the encoder, `where` and `patch` are from `encode_patch`.
         """
-        directions = torch.cat([wi, wo[..., :2]], dim=-1)
-        if self.fusion is None:
-            patch = torch.cat([patch, directions], dim=-1)
         # What all queries of a fabric share is multiplied once.
-        weight = self.first.weight
+        weight, viewer = self.first.weight, wo[..., :2]
+        if self.fusion is None:
+            patch, weight = torch.cat([patch, viewer], dim=-1), self._without_light(weight)
         x = functional.linear(patch, weight[:, self.latent :])
         x = x + functional.linear(latent[:, : self.latent], weight[:, : self.latent], self.first.bias).unsqueeze(1)
         if self.filters is not None and where is not None:
-            responses = self.filters(latent[:, self.latent :][:, self.seen])
+            responses = self.filters(latent[:, self.latent :][:, self.seen_cells])
             x = torch.baddbmm(x, where, responses)
+        if self.fusion is None:
+            return x
         x = activate(x)
-        if self.fusion is not None:
-            *spatial, angular = self.fusion
-            for layer in spatial:
-                x = activate(layer(x))
-            x = activate(angular(torch.cat([x, directions], dim=-1)))
+        for layer in self.fusion[:-1]:
+            x = activate(layer(x))
+        angular = self._angular
+        return functional.linear(torch.cat([x, viewer], dim=-1), self._without_light(angular.weight), angular.bias)
+
+    def lit(self, seen: Tensor, wi: Tensor) -> Tensor:
+        """Answer in network space, (F, n, 4), transparency appended if `transmission` is learnt."""
+        x = activate(seen + functional.linear(wi, self._angular.weight[:, _LIGHT]))
         return activate(self.last(activate(self.narrow(self.mix(x)))))
+
+    @property
+    def _angular(self) -> nn.Linear:
+        """The layer that reads directions."""
+        return self.first if self.fusion is None else cast(nn.Linear, self.fusion[-1])
+
+    def _without_light(self, weight: Tensor) -> Tensor:
+        return torch.cat([weight[:, : _LIGHT.start], weight[:, _LIGHT.stop :]], dim=-1)

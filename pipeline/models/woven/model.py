@@ -27,7 +27,14 @@ from torch import Tensor, nn
 
 from pipeline.compiled.arrays import Float32
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
-from pipeline.models.networks.layers import SLOPE, EncoderDecoder, component_error, start_at_mean, to_components
+from pipeline.models.networks.layers import (
+    SLOPE,
+    EncoderDecoder,
+    component_error,
+    once_a_place,
+    start_at_mean,
+    to_components,
+)
 from pipeline.models.woven import WovenOptions
 from pipeline.models.woven.decoder import Decoder, encode_patch
 from pipeline.models.woven.encoder import Encoder, WovenInputs, read_cloth
@@ -67,10 +74,13 @@ class WovenNetwork(EncoderDecoder):
         `latent` (F, latent) is from `encode`; centres u and v (F, n) are shares of each fabric's own repeat, sigma (F,
         n) in yarn spacings. `placement.swap` gives the fabric's own components.
         """
-        u, v, wi, wo = placement.move(u, v, wi, wo)
+        return self.decoder.lit(self.seen(latent, placement, u, v, sigma, wo), placement.turn(wi))
+
+    def seen(self, latent: Tensor, placement: Placement, u: Tensor, v: Tensor, sigma: Tensor, wo: Tensor) -> Tensor:
+        """Return what the lights of a place share, (F, n, hidden)."""
+        u, v = placement.move(u, v)
         where, patch = encode_patch(self.options, u, v, sigma, placement.repeat)
-        output: Tensor = self.decoder(latent, where, patch, wi, wo)
-        return output
+        return self.decoder.seen(latent, where, patch, placement.turn(wo))
 
     def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
         """Encode a fabric; return its latent and its placement."""
@@ -83,8 +93,13 @@ class WovenNetwork(EncoderDecoder):
 
     def outputs(self, *inputs: Tensor) -> Tensor:
         """Return the outputs of the decoder, (1, n, 4 or 5), from the inputs of `components`."""
-        latent, place = inputs[5], Placement(*inputs[6:])
-        return self.decode(latent, place, *(column.unsqueeze(0) for column in inputs[:5]))
+        (u, v, sigma, wi, wo), latent, placement = inputs[:5], inputs[5], Placement(*inputs[6:])
+
+        def seen(*place: Tensor) -> Tensor:
+            return self.seen(latent, placement, *(column.unsqueeze(0) for column in place))[0]
+
+        shared = once_a_place(seen, u, v, sigma, wo).unsqueeze(0)
+        return self.decoder.lit(shared, placement.turn(wi.unsqueeze(0)))
 
     def stored(self, constants: tuple[Tensor, ...]) -> int:
         """Return the numbers of the decoder and of the fabric's latent."""

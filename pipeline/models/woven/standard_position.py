@@ -42,17 +42,19 @@ class Placement(NamedTuple):
     start: Tensor  # start of the standard repeat after that, as shares of it, float (F, 2)
     repeat: Tensor  # extent of the standard repeat in x and y, in yarn spacings, float (F, 2)
 
-    def move(self, u: Tensor, v: Tensor, wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Return the queries about the fabrics in standard position.
-
-        u and v (F, n) are shares of each fabric's own repeat; the results are shares of the standard one, in [0, 1).
-        """
-        sign = torch.cat([1.0 - 2.0 * self.mirror, torch.ones_like(self.start[:, :1])], dim=-1).unsqueeze(1)
-        u, v, wi, wo = u * sign[..., 0], v * sign[..., 1], wi * sign, wo * sign
+    def move(self, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
+        """Return places u and v (F, n), shares of each fabric's own repeat, as shares in [0, 1) of the standard one."""
+        sign = 1.0 - 2.0 * self.mirror
+        u, v = u * sign[:, :1], v * sign[:, 1:]
         x = torch.where(self.exchange, v, u) - self.start[:, :1]
         y = torch.where(self.exchange, u, v) - self.start[:, 1:]
-        order, swap = [1, 0, 2], self.exchange.unsqueeze(-1)
-        return _share(x), _share(y), torch.where(swap, wi[..., order], wi), torch.where(swap, wo[..., order], wo)
+        return _share(x), _share(y)
+
+    def turn(self, directions: Tensor) -> Tensor:
+        """Return directions (F, n, 3) about the fabrics in standard position."""
+        sign = torch.cat([1.0 - 2.0 * self.mirror, torch.ones_like(self.start[:, :1])], dim=-1).unsqueeze(1)
+        turned = directions * sign
+        return torch.where(self.exchange.unsqueeze(-1), turned[..., [1, 0, 2]], turned)
 
     def swap(self, components: Tensor) -> Tensor:
         """Take components (F, n, 4) from a fabric to its standard position, or back."""

@@ -40,6 +40,11 @@ def test_restored_weights_answer_alike_also_at_extremes(model):
     assert np.ptp(by_centre[0], axis=1).max() > 0
     np.testing.assert_allclose(by_centre[2], by_centre[2][:, :1].repeat(4, 1), rtol=1e-4, atol=1e-6)
     np.testing.assert_array_equal(found, NetworkMethod(network).predict(fabric, queries))
+    # Ten lights at each of six places share what does not depend on them.
+    lit = draw_queries(QueryOptions(), fabric.weave.repeat, 5, 0, 60)
+    together, apart = lit.take(np.repeat(np.arange(6), 10))._replace(wi=lit.wi), np.arange(60).reshape(6, 10).T.ravel()
+    own, alone = method.predict(fabric, together), method.predict(fabric, together.take(apart))
+    np.testing.assert_allclose(own[apart], alone, rtol=1e-5, atol=1e-7)
 
 
 def test_each_fabric_is_answered_by_its_own_network_and_their_domains_are_joined():

@@ -11,7 +11,7 @@ def test_the_picture_is_seen_from_the_place_asked_about_by_blobs_of_a_gaussian()
     """Filters correlated with the picture around the repeat, read at one entry: the sum written out."""
     decoder = Decoder(WovenOptions())
     picture = torch.rand(1, 64, generator=torch.Generator().manual_seed(3))
-    responses = decoder.filters(picture[:, decoder.seen])[0]
+    responses = decoder.filters(picture[:, decoder.seen_cells])[0]
     weights = decoder.filters.weight.detach().reshape(-1, 8, 8).numpy()
     around = np.roll(picture.reshape(8, 8).numpy(), (-2, -7), axis=(0, 1))  # entry (2, 7) comes to (0, 0)
     np.testing.assert_allclose(responses[2 * 8 + 7].detach(), (weights * around).sum(axis=(1, 2)), rtol=1e-5, atol=1e-6)

@@ -66,8 +66,7 @@ def test_standard_position_is_one_of_the_fabric(name):
     random = np.random.default_rng(4)
     ends, picks = fabric.weave.repeat
     u, v = random.random(200), random.random(200)
-    up = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64).expand(1, 200, 3)
-    there_u, there_v, *_ = one.move(torch.from_numpy(u)[None], torch.from_numpy(v)[None], up, up)
+    there_u, there_v = one.move(torch.from_numpy(u)[None], torch.from_numpy(v)[None])
     here = surface_at(fabric, u * ends, v * picks)
     ends, picks = seen.weave.repeat
     there = surface_at(seen, there_u[0].numpy() * ends, there_v[0].numpy() * picks)
