@@ -83,6 +83,6 @@ def printable(text: str) -> str:
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return the end of a sentence: ``"did you mean 'x'? known: a, b, x"``, or only its last part if none is near."""
     names = sorted(known)
-    close = difflib.get_close_matches(word[:60], names, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(word[:60], names, n=1, cutoff=0.6)
     suggestion = f"did you mean {close[0]!r}? " if close else ""
     return f"{suggestion}known: {', '.join(names)}"

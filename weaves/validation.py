@@ -89,7 +89,7 @@ def _bad_input(error: ValidationError, model: type[BaseModel], data: object, whe
     # Unknown keys first: a misspelt key also makes the right one missing, and the former message is more useful.
     errors = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
     first = errors[0]
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    more = f" (one of {len(errors)} errors)" if len(errors) > 1 else ""
     location, value = first["loc"], first["input"]
     key = ".".join(_path(location, data, keep_last=first["type"] in {"missing", "extra_forbidden"}))
     match first["type"]:

@@ -1,1 +1,1 @@
-"""Verbs of the command line, like ones in one file."""
+"""Verbs of the command line; related verbs share a file."""

@@ -80,7 +80,7 @@ def write_recipe(
             {"model": named} | _model(model, chosen, effort, _bent(model, queries) | dict(options)),
             *_baseline(general, method),
         ],
-        "bench": _bench(general, _beside(path, scene)),
+        "bench": _bench(general, set(worn), _beside(path, scene)),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic_write(path, tomli_w.dumps(table).encode())
@@ -171,9 +171,11 @@ def _model(
     return options
 
 
-def _bench(general: Recipe, scene: str) -> dict[str, Any]:
-    """Return the general recipe's measurements, of this scene and of the method as it is."""
-    measurements = _stated(general.bench.model_copy(update={"bounds": False, "runtimes": ()}))
+def _bench(general: Recipe, worn: set[str], scene: str) -> dict[str, Any]:
+    """Return the general recipe's measurements, of this scene, its fabrics and the method as it is."""
+    live = general.bench.live
+    live = live.model_copy(update={"fabrics": tuple(name for name in live.fabrics if name in worn)})
+    measurements = _stated(general.bench.model_copy(update={"bounds": False, "runtimes": (), "live": live}))
     return measurements | {"scenes": measurements.get("scenes", {}) | {"names": [scene]}}
 
 

@@ -26,14 +26,15 @@ def untrained_names() -> list[str]:
 
 def named_method(name: str, where: str, key: str) -> Fallback:
     """Return a method that answers any query; others than its own go to the fallback. As `loaded` otherwise."""
-    return Fallback(*loaded(name, where, key))
+    return Fallback(*loaded(name, where, key, TRUTH))
 
 
-def loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
+def loaded(name: str, where: str, key: str, *others: str) -> tuple[Method, frozenset[str]]:
     """Return a method that answers queries of its own kinds, and these kinds.
 
     `name` is that of a model that learns nothing, with ``:k`` for a setting, or the folder of a trained one; `where`
-    and `key` are the verb or function and its option that name it, for messages. BadInput if there is no such method,
+    and `key` are the verb or function and its option that name it, `others` more names that the caller knows, all for
+    messages. BadInput if there is no such method,
     it must be trained first, it has no such setting, or its files are damaged.
     """
     model, _, setting = name.partition(":")
@@ -42,7 +43,7 @@ def loaded(name: str, where: str, key: str) -> tuple[Method, frozenset[str]]:
         return load_methods(options)[-1], options.kinds
     if name in CLASSES and not (place(name, key) / CARD).is_file():
         raise BadInput(where, key, name, "must be trained first: name the folder of a trained one, out/models/…")
-    (method,) = load_model(model_folder(name, where, key, [TRUTH, *untrained_names()]))
+    (method,) = load_model(model_folder(name, where, key, [*others, *untrained_names()]))
     domain: Domain | None = getattr(method, "domain", None)
     return method, domain.kinds if domain else frozenset()
 

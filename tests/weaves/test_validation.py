@@ -57,7 +57,7 @@ def with_draft(**draft):
         (with_warp(diffuse=[0.1, 0.2]), "warp.diffuse = [0.1, 0.2]: a colour is three numbers"),
         (with_warp(diffuse=[0.1, 0.2, 7]), "warp.diffuse.2 = 7: Input should be less than or equal to 1"),
         (with_warp(diffuse={"wavelengths": [400, 500], "value": [0, 1]}), "warp.diffuse.value = [0, 1]: unknown key; "
-         "did you mean 'values'? known: values, wavelengths (and 1 more)"),
+         "did you mean 'values'? known: values, wavelengths (one of 2 errors)"),
         ({**GOOD, "yarns_per_cm": [float("nan"), 20.0]}, "yarns_per_cm.0 = nan: Input should be a finite number"),
         (counted(tex=25), "warp.tex = 25: sett = [ends per cm, picks per cm] is needed with it"),
         (counted([30, 20], packing=0.5), "warp.packing = 0.5: give exactly one of tex and ne"),
@@ -69,7 +69,7 @@ def with_draft(**draft):
          "with this count the sett may be from 0.846 to 16.9, or more with a larger packing"),
         (counted([30, 20], texx=25), "warp.texx = 25: unknown key; did you mean 'tex'?"),
         ({**GOOD, "sett": [30, 20], "yarns_per_cm": [30, 20]}, "sett = [30, 20]: yarns_per_cm states the same"),
-        ({}, "name is missing: it is required (and 3 more)"),
+        ({}, "name is missing: it is required (one of 4 errors)"),
     ],
 )  # fmt: skip
 def test_sentence(change, sentence):

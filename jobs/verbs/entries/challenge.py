@@ -80,8 +80,10 @@ def reveal(
     content["about"] = f"Round of the seed with the SHA-256 {sha256} and of the text {public}"
     for table, purpose in ((content["dataset"], "queries"), (content["dataset"]["unseen_population"], "cloths")):
         table["seed"] = stream_seed(f"{_WHERE} {purpose}", [text, public]) >> 1  # TOML has signed integers
-    path = to / f"{content['name']}.toml"
-    atomic_write(path, tomli_w.dumps(content).encode())
+    path, recipe = to / f"{content['name']}.toml", tomli_w.dumps(content).encode()
+    if path.exists() and path.read_bytes() != recipe:
+        raise BadInput(_WHERE, "--public", public, f"{path} is the round of another text: take another folder for --to")
+    atomic_write(path, recipe)
     print_lines(f"{path}: `twillight questions {path} --to FOLDER` writes its questions")
 
 

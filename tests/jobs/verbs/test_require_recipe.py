@@ -31,7 +31,11 @@ def narrowed(path, general=QUICK, method="woven", setting="", requirement=None, 
 
 
 def test_truth_and_measurements_are_those_of_the_general_recipe(tmp_path):
-    own = narrowed(tmp_path / "r.toml")
+    # A live page of a fabric that the scene does not wear is left out.
+    live = QUICK.bench.live.model_copy(update={"fabrics": ("polyester_lining", "denim")})
+    general = dataclasses.replace(QUICK, bench=QUICK.bench.model_copy(update={"live": live}))
+    own = narrowed(tmp_path / "r.toml", general)
+    assert own.bench.live.fabrics == ("denim",)
     assert own.dataset.truth == QUICK.dataset.truth and own.dataset.training_truth == QUICK.dataset.training_truth
     # Where the general recipe renders frames, so does this one: the same frames, by the same truth.
     assert own.bench.scenes.model_copy(update={"names": ()}) == QUICK.bench.scenes.model_copy(update={"names": ()})

@@ -43,3 +43,5 @@ def test_seeds_are_never_replaced_nor_written_in_part_and_another_one_is_refused
     assert "--public" in refused(*reveal[:-1], "x" * 81, tmp_path / "seed")
     assert "the seed has the SHA-256" in refused(*reveal, tmp_path / "seed", "--commitment", "0" * 64)
     assert not (tmp_path / "round").exists()
+    assert call(*reveal, tmp_path / "seed")[0] == 0 == call(*reveal, tmp_path / "seed")[0]
+    assert "is the round of another text" in refused(*reveal[:-1], "y", tmp_path / "seed")
