@@ -31,6 +31,6 @@ SCENES: Final = 4  # the shipped scenes, and the queries of any scene
 
 SCENE_BENCH: Final = 5  # measurements in scenes and the files they write (`reports.measure.scene`)
 
-VIEWER: Final = 6  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
+VIEWER: Final = 7  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
 
 EXTREMES: Final = 1  # measurements at extremes (`reports.measure.extremes`)

@@ -72,6 +72,7 @@ their extent across the yarn from how their fibres turn, which they do not witho
 _FLAT, _FLAT_VIEW = "flat", "One yarn"  # tile of the truth with footprints of the fabric plane, and its view
 _PRECISION = TruthOptions(relative_error=0.01)
 _OF_PLANE = TruthOptions(relative_error=0.01, parallax=False)
+_DARK = 0.012  # linear value behind sheer cloth, as in cloth.slang
 _BRIGHT = 0.8  # linear value that few pixels of the still picture exceed
 
 
@@ -286,6 +287,8 @@ def _still(fabric: Fabric) -> tuple[bytes, float]:
     values = coloured(components, colours_of(fabric, picture.queries))
     irradiance = float(_BRIGHT / max(np.percentile(values.max(axis=1), 97.0), 1e-6))
     pixels = np.zeros((*picture.cloth.shape, 4))
-    pixels[picture.cloth, 3] = 1.0
+    if sheer(fabric):
+        pixels[:] = (*[_DARK] * 3, 1.0)
+    pixels[picture.cloth] = (0.0, 0.0, 0.0, 1.0)
     pixels[picture.lit, :3] = np.minimum(irradiance * values, 1.0)
     return png_bytes(pixels, "colour"), irradiance
