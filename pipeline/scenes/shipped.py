@@ -30,6 +30,10 @@ _PLANE_SIDE: Final = 1200.0
 _ROLL_RADIUS, _ROLL_LENGTH = 0.5, 4.0
 _ROLL_AROUND: Final = 128  # yarns: whole repeats, so that there is no seam
 _SPACING: Final = 0.012  # of the dinner table's yarns
+_UPHOLSTERY: Final = (
+    "polyester_lining", "cotton_twill", "silk_charmeuse", "wool_gabardine", "denim", "silk_shantung", "basket",
+    "satin_8",
+)  # fmt: skip
 _NEAR, _FAR, _NAPKIN_RADIUS = (0.05, -0.5, 0.075), (0.62, -0.28, 0.075), 0.07
 
 
@@ -148,6 +152,28 @@ def _dinner_table(mi: Any) -> dict[str, Any]:
         "lamp": {"type": "point", "position": [-0.7, 0.5, 1.5], "intensity": _rgb(5.2, 4.8, 4.3)},
         "room": _sky(0.05, 0.05, 0.06),
         "camera": camera(mi, [0.1, -2.0, 1.25], [0.02, -0.05, 0.0], 37),
+    }
+
+
+def _upholstery(mi: Any) -> dict[str, Any]:
+    """Return a sofa of eight strips, each of another cloth: flat, bent outwards and inwards, upright and level."""
+    arc = np.linspace(0.0, 0.5 * math.pi, 33)
+    # From the floor over the front edge and the seat to the back, and over its top.
+    y = np.concatenate([[-0.5], -0.38 - 0.12 * np.cos(arc), 0.28 + 0.12 * np.sin(arc), 0.48 - 0.08 * np.cos(arc)])
+    z = np.concatenate([[0.0], 0.28 + 0.12 * np.sin(arc), 0.52 - 0.12 * np.cos(arc), 0.95 + 0.08 * np.sin(arc)])
+    length, _ = developed(np.stack([y, z], axis=-1))
+    y, z = (np.interp(np.linspace(0.0, length[-1], 801), length, axis) for axis in (y, z))
+    left = np.linspace(-1.2, 0.9, len(_UPHOLSTERY))
+    strips = {
+        name: _waves(mi, name, np.linspace(x + 0.003, x + 0.297, 3), y, z)
+        for x, name in zip(left, _UPHOLSTERY, strict=True)
+    }
+    return {
+        **strips,
+        "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale([4.0, 4.0, 1])},
+        "sun": sun([-0.6, -0.7, 0.9], 2.6),
+        "sky": _sky(0.25, 0.28, 0.32),
+        "camera": camera(mi, [-0.6, -3.2, 1.6], [0.03, 0.0, 0.5], 46),
     }
 
 
@@ -298,6 +324,7 @@ _SCENES: Final = (
         napkin=Cloth(fabric="denim", yarns=(36.0, math.dist(_NEAR, _FAR) / _SPACING)),
     ),
     _scene(_hem, (0.0001, 0.00005, 0.0), denim=Cloth(yarns=(_HEM_YARNS, _HEM_YARNS), turn=24.0)),
+    _scene(_upholstery, (0.001, 0.0005, 0.0), **{name: Cloth(yarns=(80.0, 80.0)) for name in _UPHOLSTERY}),
     _scene(_swatch, (0.001, 0.0005, 0.0), swatch=Cloth(fabric="herringbone", yarns=(48.0, 48.0))),
 )
 

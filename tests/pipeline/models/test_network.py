@@ -63,14 +63,14 @@ def test_each_fabric_is_answered_by_its_own_network_and_their_domains_are_joined
         assert together.bytes_stored(cloth) == alone.bytes_stored(cloth)
 
 
-@pytest.mark.parametrize("chunk", [1, 10, 37, 100])
-def test_chunks_keep_the_order_of_rows_and_columns(chunk, monkeypatch):
+def test_chunks_keep_the_order_of_rows_and_columns(monkeypatch):
     """Answers are as wide as asked even of no rows."""
-    monkeypatch.setattr("pipeline.models.method.CHUNK_ROWS", chunk)
     queries = draw_queries(QueryOptions(), (4, 4), 0, 0, 37)
     part = PerQuery(lambda queries: None, lambda q: (q.wo, q.u), nn.Identity())
-    found = part.answered(queries, lambda wo, u: torch.cat([u[:, None], wo], dim=-1))
-    np.testing.assert_array_equal(found, np.concatenate([queries.u[:, None], queries.wo], axis=1))
-    for rows in (37, 0):
-        answers = part.answered(queries.take(slice(0, rows)), lambda wo, u: u[:, None], 1)
-        assert answers.shape == (rows, 1) and answers.dtype == np.float32
+    for chunk in (1, 10, 37, 100):
+        monkeypatch.setattr("pipeline.models.method.CHUNK_ROWS", chunk)
+        found = part.answered(queries, lambda wo, u: torch.cat([u[:, None], wo], dim=-1))
+        np.testing.assert_array_equal(found, np.concatenate([queries.u[:, None], queries.wo], axis=1))
+        for rows in (37, 0):
+            answers = part.answered(queries.take(slice(0, rows)), lambda wo, u: u[:, None], 1)
+            assert answers.shape == (rows, 1) and answers.dtype == np.float32
