@@ -21,7 +21,7 @@ import numpy.typing as npt
 from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.groups import COLUMNS, DETAILS, USUAL
 from pipeline.analytic.soft_nodes.nodes import GROUP_FAMILY, LINES, START, SoftNodeTable, tabulate
-from pipeline.atomic import atomic_write
+from pipeline.atomic import atomic_write, refuse_unwritable
 from pipeline.compiled.arrays import Float64
 from pipeline.models.method import Method
 from pipeline.models.named import TRUTH, named_method
@@ -88,6 +88,7 @@ def write_page(
     if truth and not LEAST_TILE <= truth <= MOST_TILE:
         raise BadInput("export", "truth", truth, f"must be from {LEAST_TILE} to {MOST_TILE}, or 0 for none")
     refuse_large_repeat(fabric)
+    refuse_unwritable(path)
     shown = content(fabric, truth, progress)
     page = whole_page(shown)
     atomic_write(path, page.encode())

@@ -36,8 +36,8 @@ class _FarField(AnalyticOptions):
 
     def methods(self) -> list[Analytic[FarField]]:
         """Return the one method."""
-        fitted = PerFabric(self._fitted)
-        return [Analytic(self, None, fitted, lambda far, queries, _: far.answer(queries), _stored)]
+        read, stored = lambda far, queries, _: far.answer(queries), lambda far: nbytes((*far.threads, *far))
+        return [Analytic(self, None, PerFabric(self._fitted), read, stored)]
 
     def _fitted(self, fabric: Fabric) -> FarField:
         from pipeline.analytic.soft_nodes.components import read_queries
@@ -80,7 +80,3 @@ class IrawanOptions(_FarField):
         from pipeline.analytic.irawan import irawan
 
         return irawan(fabric)
-
-
-def _stored(far: FarField) -> int:
-    return nbytes((*far.threads, *far))
