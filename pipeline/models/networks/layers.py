@@ -49,7 +49,7 @@ def layers_of(network: nn.Sequential) -> list[LinearLayer]:
 
 def activate(x: Tensor) -> Tensor:
     """Apply the leaky ReLU."""
-    return functional.leaky_relu(x, SLOPE, inplace=not torch.is_grad_enabled())
+    return functional.leaky_relu(x, SLOPE)
 
 
 class Residual(nn.Module):
