@@ -106,7 +106,7 @@ def network():
 def folder(network, tmp_path):
     """Return a folder with a model as training leaves it, taught on two fabrics."""
     domain = Domain.of({}, [load_fabric("denim"), load_fabric("silk_charmeuse")])
-    card = {"model": "woven", "version": {"model": 1}, "domain": domain.model_dump(mode="json")}
+    card = {"model": "woven", "version": {"model": SMALL.version}, "domain": domain.model_dump(mode="json")}
     card |= {"options": SMALL.model_dump(mode="json", context=IDENTITY)}
     write_model(tmp_path / "model", safetensors.torch.save(network.state_dict()), card)
     return tmp_path / "model"

@@ -72,7 +72,7 @@ def test_a_folder_has_all_that_is_known_of_the_fabrics_a_form_to_be_filled_in_an
     text = (folder / FORM).read_text(encoding="utf-8")
     blank = tomllib.loads(text)
     assert blank.keys() == EntryForm.model_fields.keys() and text.count("\n# ") >= len(blank)
-    with pytest.raises(BadInput, match=r"name.*more"):
+    with pytest.raises(BadInput, match=r"name.*one of"):
         validated(EntryForm, blank, FORM)
 
 
