@@ -146,14 +146,13 @@ class Viewer {
     } else {
       const size = whole.map((length) => Math.max(16, Math.round(length * this.scale)));
       spent = await picture.small(state, ready, size, columns(size), [0, 0, ...whole], true);
-      const rows = (whole[1] * STRIP * this.scale ** 2) / spent;
       this.scale = within(this.scale * Math.sqrt(FRAME / spent), 0.08, 1);
       this.show("coarse", methods, state);
       if (this.first) this.job += 1;
       this.first = false;
       if (size[1] < whole[1] && job === this.job) {
         await new Promise((done) => { this.wake = done; setTimeout(done, 150); });
-        spent = await this.refine(job, state, ready, whole, columns(whole), rows);
+        spent = await this.refine(job, state, ready, whole, columns(whole));
       }
     }
     if (job !== this.job) return;
@@ -162,9 +161,9 @@ class Viewer {
   }
 
   // Draw all pixels over a coarse picture, a strip at a time from above, so that the page keeps answering.
-  async refine(job, state, ready, whole, wipe, rows) {
+  async refine(job, state, ready, whole, wipe) {
     const { picture } = this;
-    let [spent, high] = [0, whole[1]];
+    let [spent, high, rows] = [0, whole[1], whole[1] / 32]; // coarse pictures do not tell the time of a strip
     while (high > 0 && job === this.job) {
       const low = Math.max(0, high - Math.round(within(rows, 4, whole[1])));
       const own = await picture.timed(() => picture.draw(state, ready, whole, [low, high], wipe));
