@@ -1,19 +1,21 @@
 """Woven cloth seen from afar by the highlights of its yarns [Irawan2012Woven], without places or footprints.
 
-A float is a torus, as in weaves.surface: w is the yarn's width, L the float's length, r = w/2, R = L/(2 sin u_max). Its
-fibres t(u, v) reflect where h = i + o has no part along them. In the frame of the float (across, along, up), with the
-normals n:
+A float is a torus: w is the yarn's width, L the float's length, r = w/2, R = L/(2 sin u_max). Its fibres t(u, v)
+reflect where h = i + o has no part along them. In the frame of the float (across, along, up), with the normals n:
 
-    f_P = k_a (k_u + k_f exp(beta (-i . o - 1))) cos_i I + k_d cos_i,   k_a the share of the cloth that the yarns cover
+    f_P = sum over families of k_a ((k_u + k_f exp(beta (-i . o - 1))) cos_i I + k_d cos_i)
     I   = 1/(w L) int int r (R + r cos v) delta(h . t(u, v)) A du dv,   A = (n . i)(n . o) / (n . i + n . o)
 
-For each v there is one u: with h_u = (h . (0, sin u, cos u)), the ends of the float at |u| = u_max,
+k_a is the share of the cloth that the family covers. With u_h = atan2(h_y, h_z), and ends of the float at |u| = u_max,
 
     h . t = sqrt(h_y^2 + h_z^2) (cos psi sin(u_h - u) + sin psi sin v cos(u_h - u)) - h_x sin psi cos v
 
-The authors measured yarns by hand. Here bends, twists and widths are the fabric's, lengths are the mean of 1/L over
-what is seen, and a fit finds beta and the k of both families from components in footprints of many yarns. Not here:
-ends of filaments that are smoothed (the authors' ss), spines that are no circle (kappa), noise.
+so that one u belongs to a v; a second one, where the curve of highlights turns back, is left out.
+
+The authors measured yarns by hand. Here twists and widths are the fabric's; bends are steeper by the relief, and at
+least 1 degree; 1/L is averaged over the cells where the yarn is on top. A fit finds beta and the k of both families
+from components in footprints of many yarns. Not here: ends of filaments that are smoothed (the authors' ss), spines
+that are no circle (kappa), noise.
 """
 
 import math

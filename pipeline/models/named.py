@@ -32,9 +32,9 @@ def named_method(name: str, where: str, key: str) -> Fallback:
 def loaded(name: str, where: str, key: str, *others: str) -> tuple[Method, frozenset[str]]:
     """Return a method that answers queries of its own kinds, and these kinds.
 
-    `name` is that of a model that learns nothing, with ``:k`` for a setting, or the folder of a trained one; `where`
-    and `key` are the verb or function and its option that name it, `others` more names that the caller knows, all for
-    messages. BadInput if there is no such method,
+    `name` is that of a model that learns nothing, with ``:k`` for a setting, or the folder of a trained one. For
+    messages, `where` and `key` are the verb or function and its option that name it, `others` are further names that
+    they list. BadInput if there is no such method,
     it must be trained first, it has no such setting, or its files are damaged.
     """
     model, _, setting = name.partition(":")

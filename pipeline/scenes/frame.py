@@ -102,7 +102,7 @@ def _gbuffer(loaded: Loaded, key: str, cloth: Cloth, camera: Camera, mask: Mask,
 
 
 def _lit(loaded: Loaded, places: Places) -> tuple[Index, Float64, Float64]:
-    """Return the place of each query, sorted, and its light in sight: whence, and with which irradiance."""
+    """Return of each query, sorted by place: the place, the direction to a light in sight, and its irradiance."""
     beside = off(places.position)
     index, towards, power = [], [], []
     for light in loaded.lights:

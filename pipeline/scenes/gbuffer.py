@@ -35,7 +35,7 @@ class GBuffer:
     curvature: Float64  # of the cloth along the view ray, 1/yarn spacings, 0 to 1, float64 (N,)
     wo: Float64  # unit vectors to the viewer, in the local frame, float64 (N, 3)
     place: Index
-    """Which place each query is about, int64 (M,); soft nodes share what lights of a place have in common if these
+    """Which place each query is about, int64 (M,); methods share what lights of a place have in common if these
     queries follow each other."""
     wi: Float64  # unit vectors to the light, in the place's local frame, float64 (M, 3)
     irradiance: Float64  # linear RGB irradiance that the light would bring to a surface facing it there, float64 (M, 3)

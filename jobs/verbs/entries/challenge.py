@@ -81,8 +81,11 @@ def reveal(
     for table, purpose in ((content["dataset"], "queries"), (content["dataset"]["unseen_population"], "cloths")):
         table["seed"] = stream_seed(f"{_WHERE} {purpose}", [text, public]) >> 1  # TOML has signed integers
     path, recipe = to / f"{content['name']}.toml", tomli_w.dumps(content).encode()
-    if path.exists() and path.read_bytes() != recipe:
-        raise BadInput(_WHERE, "--public", public, f"{path} is the round of another text: take another folder for --to")
+    with disk_errors(path):
+        other = path.exists() and path.read_bytes() != recipe
+    if other:
+        allowed = f"{path} is another round, or of another version: take another folder for --to"
+        raise BadInput(_WHERE, "--public", public, allowed)
     atomic_write(path, recipe)
     print_lines(f"{path}: `twillight questions {path} --to FOLDER` writes its questions")
 

@@ -65,9 +65,10 @@ class Residual(nn.Module):
 
 
 def once_a_place(function: Callable[..., Tensor], *columns: Tensor) -> Tensor:
-    """Return what a function answers row by row, computed once where rows that follow each other are alike.
+    """Return what a function answers row by row; of alike rows that follow each other only the first is computed.
 
-    So the lights of a place share what does not depend on them. A training or an exported graph computes every row.
+    So the lights of a place share what does not depend on them. Where more than half of the rows differ from the one
+    before, in a training, and in an exported or compiled graph, every row is computed.
     """
     if torch.is_grad_enabled() or torch.compiler.is_compiling() or len(columns[0]) < 2:
         return function(*columns)

@@ -124,8 +124,9 @@ class Decoder(nn.Module):
         # What all queries of a fabric share is multiplied once.
         weight, viewer = self.first.weight, wo[..., :2]
         if self.fusion is None:
-            patch, weight = torch.cat([patch, viewer], dim=-1), self._without_light(weight)
-        x = functional.linear(patch, weight[:, self.latent :])
+            x = _without_light(weight[:, self.latent :], patch, viewer)
+        else:
+            x = functional.linear(patch, weight[:, self.latent :])
         x = x + functional.linear(latent[:, : self.latent], weight[:, : self.latent], self.first.bias).unsqueeze(1)
         if self.filters is not None and where is not None:
             responses = self.filters(latent[:, self.latent :][:, self.seen_cells])
@@ -135,8 +136,7 @@ class Decoder(nn.Module):
         x = activate(x)
         for layer in self.fusion[:-1]:
             x = activate(layer(x))
-        angular = self._angular
-        return functional.linear(torch.cat([x, viewer], dim=-1), self._without_light(angular.weight), angular.bias)
+        return _without_light(self._angular.weight, x, viewer, self._angular.bias)
 
     def lit(self, seen: Tensor, wi: Tensor) -> Tensor:
         """Answer in network space, (F, n, 4), transparency appended if `transmission` is learnt."""
@@ -148,5 +148,8 @@ class Decoder(nn.Module):
         """The layer that reads directions."""
         return self.first if self.fusion is None else cast(nn.Linear, self.fusion[-1])
 
-    def _without_light(self, weight: Tensor) -> Tensor:
-        return torch.cat([weight[:, : _LIGHT.start], weight[:, _LIGHT.stop :]], dim=-1)
+
+def _without_light(weight: Tensor, x: Tensor, viewer: Tensor, bias: Tensor | None = None) -> Tensor:
+    """Return a layer's product with numbers and viewer, without its inputs wi."""
+    weight = torch.cat([weight[:, : _LIGHT.start], weight[:, _LIGHT.stop :]], dim=-1)
+    return functional.linear(torch.cat([x, viewer], dim=-1), weight, bias)

@@ -44,4 +44,4 @@ def test_seeds_are_never_replaced_nor_written_in_part_and_another_one_is_refused
     assert "the seed has the SHA-256" in refused(*reveal, tmp_path / "seed", "--commitment", "0" * 64)
     assert not (tmp_path / "round").exists()
     assert call(*reveal, tmp_path / "seed")[0] == 0 == call(*reveal, tmp_path / "seed")[0]
-    assert "is the round of another text" in refused(*reveal[:-1], "y", tmp_path / "seed")
+    assert "is another round" in refused(*reveal[:-1], "y", tmp_path / "seed")
