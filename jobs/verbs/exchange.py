@@ -227,6 +227,41 @@ def export_fabric(
         _write("export", fabric, what, path, stated)
 
 
+def encode(
+    samples: Annotated[Local, Parameter(help="Table of samples, .parquet or .csv, or folder of OpenEXR pictures.")],
+    *,
+    model: Annotated[str, Parameter(help='Folder of a trained unified_btf with head = "rgb".')],
+    out: Annotated[Local, Parameter(help="Folder to write.")],
+    size: Annotated[str, Parameter(help="WIDTHxHEIGHT of the measured patch in millimetres, such as 20x15.")],
+    texels: Annotated[str, Parameter(help="COLUMNSxROWS of texels that a table is sorted into, such as 64x48.")] = "",
+    name: Annotated[str, Parameter(help="Name of the fabric; default: that of the folder.")] = "",
+) -> None:
+    """Encode measured samples as a material, and print how to use it.
+
+    BadInput if a sample, the model or a number cannot be used.
+    """
+    from pipeline.models.unified_btf.encode import FABRIC_FILE
+    from pipeline.models.unified_btf.encode import encode as write
+    from pipeline.shards.sample_file import read_samples
+    from pipeline.storage import place
+
+    width, height = _pair("--size", size)
+    columns, rows = _pair("--texels", texels, whole=True) if texels else (0, 0)
+    grid = (int(columns), int(rows)) if texels else None
+    with Terminal().status("encoding"):
+        write(read_samples(samples, grid), place(model, "--model"), name or out.name, (width, height), out)
+    print_lines(f"twillight render plane --fabric {out / FABRIC_FILE} --method {out} --out {out.name}.png")
+
+
+def _pair(flag: str, text: str, whole: bool = False) -> tuple[float, float]:
+    number = r"([0-9]{1,4})" if whole else r"([0-9]{1,5}(?:\.[0-9]{1,6})?)"
+    sides = re.fullmatch(f"{number}x{number}", text)
+    if not sides or not all(map(float, sides.groups())):
+        example = "64x48, whole numbers" if whole else "20x15.5"
+        raise BadInput("encode", flag, text, f"must be two numbers above 0, such as {example}")
+    return float(sides[1]), float(sides[2])
+
+
 def view(
     fabric: FabricName,
     *,

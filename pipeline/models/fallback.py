@@ -129,7 +129,9 @@ class Fallback(Around):
         )
 
     def colours(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
-        """Return the colours of the components of N queries, (N, 4, 3): the mean colours of their footprints."""
+        """Return the colours of the components of N queries, (N, 4, 3): the method's own, or those of footprints."""
+        if own := getattr(self.method, "colours", None):
+            return np.asarray(own(fabric, queries), np.float32)
         return colours_of(fabric, queries).astype(np.float32)
 
     def out_of_domain(self, fabric: Fabric, queries: Queries) -> Mask:

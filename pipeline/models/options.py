@@ -53,6 +53,7 @@ class Options(Design):
     learns: ClassVar[bool] = True  # true if the model is trained
     of_one_material: ClassVar[bool] = False  # true if a trained model knows a single fabric
     blends: ClassVar[bool] = False  # true if blended latents of two fabrics give the fabrics between them
+    encodes: ClassVar[bool] = False  # true if it encodes samples of any fabric
     any_physics: ClassVar[bool] = False
     """True if it can learn any physics of the truth (`pipeline.models.domain.PHYSICS`); else only the default, and what
     it has an option for."""
@@ -113,25 +114,24 @@ class Options(Design):
 class ComponentLossOptions(Options):
     """Options of a network that learns the four components in log space (`pipeline.models.networks.layers`)."""
 
+    fixed: ClassVar[tuple[str, ...]] = ("specular_weight",)
+
     log_k: float = Field(default=3.0, gt=0, le=1e4)
     """k of the specular space g(x) = ln(k x + 1), which compresses highlights in the loss."""
-    specular_weight: Weight = 1.0
-    """Weight of the specular squared error, taken in log space."""
     diffuse_weight: Weight = 2.0
     """Weight of the diffuse squared error; equal weights starve it."""
 
-    @model_validator(mode="after")
-    def _something_to_learn(self) -> Self:
-        if self.specular_weight == 0 and self.diffuse_weight == 0:
-            raise ValueError("specular_weight and diffuse_weight must not both be 0")
-        return self
+    specular_weight: ClassVar[float] = 1.0
+    """Weight of the specular squared error, taken in log space."""
 
 
 class TextureOptions(ComponentLossOptions):
     """Options of textures and perceptrons of one fabric, and of how they are trained."""
 
     of_one_material: ClassVar[bool] = True
-    fixed: ClassVar[tuple[str, ...]] = ("channels", "texture_rate", "blur_halving", "offset_frozen")
+    fixed: ClassVar[tuple[str, ...]] = (
+        *ComponentLossOptions.fixed, "channels", "texture_rate", "blur_halving", "offset_frozen"
+    )  # fmt: skip
 
     texels_per_yarn: int = Field(default=16, ge=1, le=256)
     """Texels of the finest level along one yarn spacing; textures hold one repeat and wrap."""

@@ -7,7 +7,7 @@ Rows have any order, other columns are ignored.
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -70,12 +70,7 @@ def read_answers(path: Path, count: int) -> Float32:
     BadInput for the first fault: columns that are missing or of another type, an id that is no question or is there
     twice, a value that is negative or not finite, a question without an answer.
     """
-    table = _parquet(path, count) if path.suffix == ".parquet" else _csv(path, count)
-    for name in table.column_names:
-        if table[name].null_count:
-            row = int(np.flatnonzero(table[name].is_null().to_numpy())[0])
-            raise BadInput(str(path), f"row {row}, column {name}", None, "a number is needed")
-    given = {name: table[name].to_numpy() for name in table.column_names}
+    given = read_numbers(path, _columns, _MOST_ROWS * count, f"there are {count:,} questions")
     ids = given.pop(ID)
 
     def refuse(bad: npt.NDArray[np.bool_], column: str, values: npt.NDArray[Any], allowed: str) -> None:
@@ -115,29 +110,44 @@ def answers_sha256(answers: Float32) -> str:
     return hashlib.sha256(str(answers.shape).encode() + answers.tobytes()).hexdigest()
 
 
-def _parquet(path: Path, count: int) -> pa.Table:
+def read_numbers(
+    path: Path, columns: Callable[[Path, Sequence[str]], list[str]], most: int, why: str
+) -> dict[str, npt.NDArray[Any]]:
+    """Return columns of numbers of a Parquet or a CSV file, `ID` as integers; those that `columns` chooses by names.
+
+    BadInput if the file cannot be read, has more than `most` rows (`why` says what limits them), or an empty cell.
+    """
+    table = (_parquet if path.suffix == ".parquet" else _csv)(path, columns, most, why)
+    for name in table.column_names:
+        if table[name].null_count:
+            row = int(np.flatnonzero(table[name].is_null().to_numpy())[0])
+            raise BadInput(str(path), f"row {row}, column {name}", None, "a number is needed")
+    return {name: table[name].to_numpy() for name in table.column_names}
+
+
+def _parquet(path: Path, columns: Callable[[Path, Sequence[str]], list[str]], most: int, why: str) -> pa.Table:
     with open_queries(path) as file:
-        names, rows = _columns(path, file.schema_arrow.names), file.metadata.num_rows
+        names, rows = columns(path, file.schema_arrow.names), file.metadata.num_rows
         for name in names:
             kind = file.schema_arrow.field(name).type
             if not (pa.types.is_integer(kind) if name == ID else kind in (pa.float32(), pa.float64())):
                 allowed = "must be an integer" if name == ID else "must be float (32 bits) or double (64 bits)"
                 raise BadInput(str(path), f"type of column {name}", str(kind), allowed)
-        if rows > _MOST_ROWS * count:
-            raise BadInput(str(path), "", f"has {rows:,} rows", f"there are {count:,} questions")
+        if rows > most:
+            raise BadInput(str(path), "", f"has {rows:,} rows", why)
         read = (block.select(names) for block in blocks(path, file, names))
         return pa.concat_tables([file.schema_arrow.empty_table().select(names), *read])
 
 
-def _csv(path: Path, count: int) -> pa.Table:
+def _csv(path: Path, columns: Callable[[Path, Sequence[str]], list[str]], most: int, why: str) -> pa.Table:
     refuse_irregular(path, "a file of CSV")
-    most = _MOST_BYTES * (_MOST_ROWS * count + 1)
+    most_bytes = _MOST_BYTES * (most + 1)
     try:
-        if (size := path.stat().st_size) > most:
-            raise BadInput(str(path), "", f"has {size:,} bytes", f"at most {most:,} are read for {count:,} questions")
+        if (size := path.stat().st_size) > most_bytes:
+            raise BadInput(str(path), "", f"has {size:,} bytes", f"at most {most_bytes:,} are read: {why}")
         with csv.open_csv(path) as reader:
-            names = _columns(path, reader.schema.names)
-        types = dict.fromkeys(names, pa.float64()) | {ID: pa.int64()}
+            names = columns(path, reader.schema.names)
+        types = dict.fromkeys(names, pa.float64()) | ({ID: pa.int64()} if ID in names else {})
         return csv.read_csv(path, convert_options=csv.ConvertOptions(column_types=types, include_columns=names))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = f"cannot be read ({one_line(error, 120)})"

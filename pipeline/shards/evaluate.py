@@ -24,6 +24,7 @@ from pipeline.atomic import atomic_path
 from pipeline.compiled.arrays import Mask
 from pipeline.fingerprint import file_sha256
 from pipeline.shards import query_file
+from pipeline.shards.entry_files import RGB_COLUMNS
 from pipeline.shards.schema import SCHEMA_VERSION
 from pipeline.shards.store import FACTS, ROW_GROUP, columns_of, parquet_writer
 from pipeline.truth.estimator import estimate
@@ -45,6 +46,7 @@ class Answerer(NamedTuple):
     prepare: Callable[[Queries], None] = lambda queries: None
     """Takes the queries of a block before threads begin with them."""
     errors: bool = False  # true if it states errors; else their columns are null
+    rgb: bool = False  # true if its answers are red, green, blue and 0 in place of components
 
 
 def truth_answerer(fabric: Fabric, options: TruthOptions, seed: int) -> Answerer:
@@ -131,7 +133,10 @@ def evaluate_file(
             "queries_sha256": file_sha256(queries),
             "left_out": {name: value for name, value in query_file.OPTIONAL.items() if name not in carried.names},
         }
-        fields = [field.with_nullable(skip_bad or not answerer.errors) for field in query_file.ANSWERS]
+        fields = query_file.ANSWERS
+        if answerer.rgb:
+            fields = [pa.field(name, pa.float32()) for name in RGB_COLUMNS]
+        fields = [field.with_nullable(skip_bad or not answerer.errors) for field in fields]
         facts = {FACTS: json.dumps(about, sort_keys=True).encode()}
         schema = pa.schema([*carried, *fields]).with_metadata((carried.metadata or {}) | facts)
         result = stack.enter_context(atomic_path(out))
@@ -151,7 +156,7 @@ def evaluate_file(
             good = np.ones(len(batch.u), np.bool_)
             good[list(bad)] = False
             answers = _answers(pool, answerer, batch, good, summary, lambda rows: progress(rows / total))
-            columns = [*block.columns, *_arrays(batch, answers, good, answerer.errors)]
+            columns = [*block.columns, *_arrays(batch, answers, good, answerer)]
             writer.write_table(pa.table(columns, schema=schema), ROW_GROUP)
         return summary
 
@@ -190,11 +195,13 @@ def _answers(
     return whole
 
 
-def _arrays(batch: Queries, answers: Answers, good: Mask, errors: bool) -> list[pa.Array]:
+def _arrays(batch: Queries, answers: Answers, good: Mask, answerer: Answerer) -> list[pa.Array]:
     """Return the columns of answers; those of bad rows are null, and errors that are not stated."""
     columns = columns_of(batch, answers)
     hidden = None if good.all() else ~good
-    unstated = hidden if errors else np.ones(len(good), np.bool_)
+    if answerer.rgb:
+        return [pa.array(np.ascontiguousarray(answers.mean[:, i]), mask=hidden) for i in range(len(RGB_COLUMNS))]
+    unstated = hidden if answerer.errors else np.ones(len(good), np.bool_)
     names = [field.name for field in query_file.ANSWERS]
     masks = {name: unstated if name.endswith(("_error", "_bound")) else hidden for name in names}
     return [pa.array(np.ascontiguousarray(columns[name]), mask=mask) for name, mask in masks.items()]

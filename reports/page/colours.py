@@ -26,6 +26,7 @@ METHODS: Final[Mapping[str, tuple[Marker, str, str]]] = {
     "woven": ("o", "#3d55cc", "#8fa2ff"),
     "neumip": ("v", "#0b8f77", "#45d0b0"),
     "triple_plane": ((3, 0, 0), "#2f7f9e", "#7cc8e6"),
+    "hierarchical": ((4, 0, 45), "#14707a", "#5fd0dc"),
     "selvage": ("*", "#1a86bd", "#62c3f5"),
     "curved": ("<", "#5a7d1f", "#b3d46a"),
     "curved_grazing": ("d", "#848f0c", "#dde26a"),

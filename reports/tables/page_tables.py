@@ -293,6 +293,14 @@ def _latents(records: Sequence[Record], frames: Frames, values: Values) -> list[
             lines.append(method_row(method, setting, map(TableCell, path)))
         shares = [f"t = {share:g}" for share in dict.fromkeys(frame["share"])]
         tables.append(table("between", ["method", "from → to", "way", *shares], lines, values))
+    encodings = [record for record in records if record.metric == "encoding_error"]
+    if encodings:
+        lines = []
+        for record in encodings:
+            points = ", ".join(f"{x:g}: {percent(y)}" for x, y in record.curve)
+            cells = plain(record.fabric), record.note, points
+            lines.append(method_row(record.method, record.setting, map(TableCell, cells)))
+        tables.append(table("encodings", ["method", "fabric", "samples or latents", "errors"], lines, values))
     edits = to_table(record for record in records if record.metric == "encode_time")
     columns = {
         "note": text("edit", lambda row: str(row.note)),

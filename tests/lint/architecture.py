@@ -19,7 +19,7 @@ ORDER = [
 LIBRARIES = {
     "weaves": ["colour", "dtx_to_wif"],
     "pipeline.compiled": ["numba"],
-    "pipeline.shards": ["pyarrow"],
+    "pipeline.shards": ["pyarrow", "OpenEXR"],
     "pipeline.storage": ["upath", "fsspec", "s3fs"],
     "pipeline.scenes": ["mitsuba", "drjit", "trimesh"],
     "pipeline.mitsuba": ["mitsuba", "drjit"],

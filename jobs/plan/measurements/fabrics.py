@@ -341,7 +341,7 @@ class AtExtremes(Measurement):
 
 
 class Latents(Measurement):
-    """Answers of a model between pairs of presets, and the time of edits."""
+    """Answers of a model between pairs of presets, and the time of edits; or of an encoder by its samples."""
 
     kind: Literal["latents"] = "latents"
     timed: ClassVar = True
@@ -354,19 +354,24 @@ class Latents(Measurement):
 
     @classmethod
     def planned(cls, subjects: Subjects) -> Iterator[Measurement]:
-        """Yield one a model that blends latents, trained with its first seed."""
+        """Yield one a model that blends latents or encodes samples, trained with its first seed."""
         names = sorted({name for first, second, _ in options.LATENT_PAIRS for name in (first, second)})
-        dataset = subjects.recipe.dataset
+        dataset, (*_, (last, _)) = subjects.recipe.dataset, subjects.fabrics
         for model in subjects.models if subjects.recipe.bench.latents else ():
-            if model.is_first and model.options.blends:
-                presets = tuple(map(load_fabric, names))
+            if model.is_first and (model.options.blends or model.options.encodes):
+                presets = tuple(map(load_fabric, names)) if model.options.blends else (last, subjects.fabrics[0][0])
                 yield cls(model=model, presets=presets, queries=dataset.queries, truth=dataset.truth)
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
-        """Measure edits, then one pair after the other."""
+        """Measure edits, then one pair after the other; or an encoder."""
+        from reports.measure.encodings import measure_encodings
         from reports.measure.latents import measure_edits, measure_paths, pairs
 
         (method,) = self.model.methods(out)
+        if self.model.options.encodes:
+            encoder: Any = method
+            fabric, other = self.presets
+            return measure_encodings(encoder, fabric, other, self.truth)
         chosen = pairs()
         records = measure_edits(method, chosen[0].first)
         for index, pair in enumerate(chosen, start=1):

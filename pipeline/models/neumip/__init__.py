@@ -1,10 +1,12 @@
-"""`neumip` [Kuznetsov2021NeuMIP] and `triple_plane` [Xu2025Comprehensive], textures of one fabric; their options."""
+"""`neumip` [Kuznetsov2021NeuMIP] and its successors, textures of one fabric; their options."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from pipeline.models.options import TextureOptions
+
+_Octaves = Annotated[int, Field(ge=0, le=16)]
 
 
 class NeumipOptions(TextureOptions):
@@ -43,3 +45,20 @@ class TriplePlaneOptions(NeumipOptions):
     def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
         return (*super().departures, "no silhouettes and no synthesis of larger cloth", "sizes are our own")
+
+
+class HierarchicalOptions(NeumipOptions):
+    """`neumip` with inception blocks and Fourier inputs [Xue2024Hierarchical]."""
+
+    seconds: ClassVar[tuple[float, float]] = (2.2e-5, 3e-6)
+
+    model: Literal["hierarchical"] = "hierarchical"  # type: ignore[assignment]
+    octaves: tuple[_Octaves, _Octaves] = (4, 10)
+    """Octaves of sines and cosines of directions and of places that the decoder reads; 0 means none."""
+
+    @property
+    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Deviations from the published method, for the page."""
+        changes = "blocks of one query in place of a picture", "sines of a place averaged over footprints"
+        octaves = () if self.octaves == (4, 10) else (f"Fourier inputs of {self.octaves} octaves",)
+        return (*super().departures, *changes, "no loss of gradients", *octaves)

@@ -1,6 +1,6 @@
 """`unified_btf` [Rainer2020Unified], its predecessor `btf_autoencoder` [Rainer2019Neural], and `universal`; options."""
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -9,11 +9,13 @@ from pipeline.shards.angular_samples import AngularSamples
 from pipeline.shards.generate import ExtraRows
 from pipeline.truth.options import TruthOptions
 
+IN_COMPONENTS: Final = "four components in place of RGB, in samples and answers"
+
 
 class BtfOptions(ComponentLossOptions):
     """Options of encodings of bidirectional textures."""
 
-    fixed: ClassVar[tuple[str, ...]] = ("directions",)
+    fixed: ClassVar[tuple[str, ...]] = (*ComponentLossOptions.fixed, "angles", "directions")
     any_physics: ClassVar[bool] = True
     prepare_seconds: ClassVar[float] = 4.0
 
@@ -29,14 +31,16 @@ class BtfOptions(ComponentLossOptions):
     truth: TruthOptions = TruthOptions(estimator="auto", relative_error=0.2, min_count=32, max_count=64)
     """Options of the truth for the samples. Its physics must be that of the data set; its errors may be large, because
     a latent averages over all samples of a texel."""
-    angles: Literal["stereographic", "disc"] = "stereographic"
-    """The four numbers of a pair of directions: x and y of each (`disc`), or those over 1 + z; not published."""
     hidden: int = Field(default=106, ge=4, le=1024)
     """Width of the decoder's four hidden layers."""
 
     latent: int
     """Numbers that a texel is known by."""
 
+    channels: ClassVar[int] = 4  # of samples and answers: the components
+
+    angles: ClassVar[str] = "stereographic"
+    """The four numbers of a pair of directions: x and y of each over 1 + z; not published."""
     directions: ClassVar[Literal["projected_disc", "hemisphere"]] = "projected_disc"
     """Density of the samples' directions, as in the queries."""
 
@@ -54,18 +58,33 @@ class BtfOptions(ComponentLossOptions):
 class EncoderOptions(BtfOptions):
     """Options of an encoder of angular samples."""
 
-    fixed: ClassVar[tuple[str, ...]] = (*BtfOptions.fixed, "log_samples")
+    fixed: ClassVar[tuple[str, ...]] = (*BtfOptions.fixed, "encoder_hidden", "log_samples")
 
     fewest_samples: int = Field(default=50, ge=1, le=65_536)
     """A training step encodes a fabric from a random number of its samples, from this one to all."""
     weights: int = Field(default=32, ge=1, le=512)
     """Weights m of every sample; not published."""
-    encoder_hidden: int = Field(default=64, ge=4, le=1024)
-    """Width of the encoder's two hidden layers; not published."""
+    head: Literal["components", "rgb"] = "components"
+    """Values of samples and answers: the four components, or linear RGB, as published, in random colours. A network of
+    RGB encodes measured samples too."""
 
+    encoder_hidden: ClassVar[int] = 64
+    """Width of the encoder's two hidden layers; not published."""
     log_samples: ClassVar[bool] = False
     """The encoder reads the specular samples as they are: these average as the cloth does, and trained as well as
     those in log space."""
+
+    later: ClassVar[tuple[str, ...]] = ()  # parts of a later method
+
+    @property
+    def channels(self) -> int:  # type: ignore[override]
+        """Numbers of a sample or an answer."""
+        return 3 if self.head == "rgb" else 4
+
+    @property
+    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Deviations from the published method, for the page."""
+        return (*((IN_COMPONENTS,) if self.head == "components" else ()), *self.later)
 
     @model_validator(mode="after")
     def _enough_samples(self) -> Self:
@@ -77,7 +96,8 @@ class EncoderOptions(BtfOptions):
 class UnifiedBtfOptions(EncoderOptions):
     """One encoder and decoder of angular samples for all fabrics [Rainer2020Unified]."""
 
-    departures: ClassVar[tuple[str, ...]] = ("four components in place of RGB, in samples and answers",)
+    encodes: ClassVar[bool] = True
+
     seconds: ClassVar[tuple[float, float]] = (4e-5, 1.5e-6)
 
     model: Literal["unified_btf"] = "unified_btf"
@@ -92,7 +112,7 @@ class BtfAutoencoderOptions(EncoderOptions):
     """
 
     of_one_material: ClassVar[bool] = True
-    departures: ClassVar[tuple[str, ...]] = (*UnifiedBtfOptions.departures, "the encoder of 2020")
+    later: ClassVar[tuple[str, ...]] = ("the encoder of 2020",)
     seconds: ClassVar[tuple[float, float]] = (1.5e-5, 1.5e-6)
 
     model: Literal["btf_autoencoder"] = "btf_autoencoder"
@@ -107,7 +127,7 @@ class UniversalOptions(BtfOptions):
     """
 
     fixed: ClassVar[tuple[str, ...]] = (*BtfOptions.fixed, "batch", "latent_rate", "rate")
-    departures: ClassVar[tuple[str, ...]] = (*UnifiedBtfOptions.departures, "the decoder and the samples of 2020")
+    departures: ClassVar[tuple[str, ...]] = (IN_COMPONENTS, "the decoder and the samples of 2020")
     seconds: ClassVar[tuple[float, float]] = (1.1e-4, 1.5e-6)
     prepare_seconds: ClassVar[float] = 8.0
 

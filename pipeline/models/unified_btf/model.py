@@ -27,6 +27,7 @@ the pyramid, by descent from 0; the decoder stays as it is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -38,7 +39,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.compiled.arrays import Index
+from pipeline.compiled.arrays import Float32, Index
 from pipeline.fingerprint import fingerprint
 from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import (
@@ -51,12 +52,18 @@ from pipeline.models.networks.layers import (
 )
 from pipeline.models.networks.texture import level_shapes, read_pyramid
 from pipeline.models.unified_btf import BtfOptions, EncoderOptions, UniversalOptions
+from pipeline.models.unified_btf.measured import MEASURED, MeasuredCloth
 from pipeline.shards.queries import QueryOptions
 from pipeline.truth.conventions import COMPONENTS
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
+LATENTS: Final = "latents"  # weights of a material of measured samples: those of its texels, (rows, columns, latent)
 _DIRECTION_NUMBERS = 4  # that a pair of directions is given as
+_ROWS = 65_536  # rows that are encoded at a time
+_PAINTED = 0.5  # share of the entries of random colours that are not 0, so that pure components are among them
+# Two sets of colours, (components, RGB), that show a network of RGB the four components: three of them, and the last.
+_PAINTS: Final = (((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)), ((0, 0, 0), (0, 0, 0), (0, 0, 0), (1, 1, 1)))
 _ENCODER_LAYERS, _DECODER_LAYERS = 2, 4  # hidden ones; those of the encoder come before the weights
 
 
@@ -82,7 +89,7 @@ def read_texels(fabric: Fabric, options: BtfOptions, columns: Mapping[str, npt.N
     texels = shape[0] * shape[1]
     wi, wo = (np.stack([columns[f"{name}_{axis}"][::texels] for axis in "xyz"], axis=-1) for name in ("wi", "wo"))
     values = np.stack([columns[name].reshape(len(wi), texels).astype(np.float16) for name in COMPONENTS], axis=-1)
-    angles = angles_of(torch.from_numpy(wi), torch.from_numpy(wo), options.angles)
+    angles = angles_of(torch.from_numpy(wi), torch.from_numpy(wo))
     result = _held[_key(fabric, options)] = Texels(shape, angles, torch.from_numpy(values))
     return result
 
@@ -97,16 +104,14 @@ def texels_of(fabric: Fabric, options: BtfOptions) -> Texels:
 
 
 def _key(fabric: Fabric, options: BtfOptions) -> str:
-    return fingerprint([fabric.optics(), options.angular_samples.model_dump(mode="json"), options.angles])
+    return fingerprint([fabric.optics(), options.angular_samples.model_dump(mode="json")])
 
 
-def angles_of(wi: Tensor, wo: Tensor, kind: str) -> Tensor:
-    """Return directions (..., 3), above the cloth, as four numbers (..., 4).
+def angles_of(wi: Tensor, wo: Tensor) -> Tensor:
+    """Return directions (..., 3), above the cloth, as four numbers (..., 4): x and y over 1 + z of each.
 
-    ``disc``: x and y. ``stereographic``: x and y over 1 + z, which stays smooth at grazing angles.
+    These stay smooth at grazing angles.
     """
-    if kind == "disc":
-        return torch.cat([wi[..., :2], wo[..., :2]], dim=-1)
     return torch.cat([w[..., :2] / (1.0 + w[..., 2:]) for w in (wi, wo)], dim=-1)
 
 
@@ -121,16 +126,32 @@ class SetEncoder(nn.Module):
     def __init__(self, options: EncoderOptions) -> None:
         super().__init__()
         self.weigh = perceptron(_DIRECTION_NUMBERS, options.encoder_hidden, _ENCODER_LAYERS, options.weights)
-        self.join = nn.Linear(len(COMPONENTS) * options.weights, options.latent)
-        self.register_buffer("scale", torch.ones(len(COMPONENTS)))
+        self.join = nn.Linear(options.channels * options.weights, options.latent)
+        self.register_buffer("scale", torch.ones(options.channels))
         self.scale: Tensor
 
     def forward(self, angles: Tensor, values: Tensor) -> Tensor:
-        """Encode T texels, (T, latent), from values (n, T, 4) under the same n pairs of directions, angles (n, 4)."""
+        """Encode T texels, (T, latent), from values (n, T, c) under the same n pairs of directions, angles (n, 4)."""
         count, texels, _ = values.shape
         weights = self.weigh(angles) / count
-        mean = (values.flatten(1).t() @ weights).reshape(texels, -1)  # component by component, m numbers each
-        scale = self.scale.repeat_interleave(weights.shape[1])
+        return self._joined((values.flatten(1).t() @ weights).reshape(texels, -1))
+
+    def of_rows(self, texel: Tensor, angles: Tensor, values: Tensor, texels: int) -> Tensor:
+        """Encode T texels, (T, latent), from N rows, each a texel's number, angles (N, 4) and values (N, c).
+
+        Every texel has any number of rows, at least one.
+        """
+        counts = torch.bincount(texel, minlength=texels).to(values.dtype)
+        sums = values.new_zeros(texels, self.join.in_features)
+        for start in range(0, len(texel), _ROWS):
+            rows = slice(start, start + _ROWS)
+            products = values[rows].unsqueeze(-1) * self.weigh(angles[rows]).unsqueeze(1)
+            sums.index_add_(0, texel[rows], products.flatten(1))
+        return self._joined(sums / counts.unsqueeze(-1))
+
+    def _joined(self, mean: Tensor) -> Tensor:
+        """Return latents of mean products, (T, c m): channel by channel, m numbers each."""
+        scale = self.scale.repeat_interleave(mean.shape[1] // len(self.scale))
         return functional.relu(functional.linear(mean, self.join.weight * scale, self.join.bias))
 
 
@@ -143,7 +164,8 @@ class BtfNetwork(EncoderDecoder):
     def __init__(self, options: BtfOptions) -> None:
         super().__init__()
         self.options = options
-        self.decoder = perceptron(options.latent + _DIRECTION_NUMBERS, options.hidden, _DECODER_LAYERS, 4)
+        inputs = options.latent + _DIRECTION_NUMBERS
+        self.decoder = perceptron(inputs, options.hidden, _DECODER_LAYERS, options.channels)
 
     def latents_of(self, index: int, random: np.random.Generator) -> Tensor:
         """Return the latents (rows, columns, latent) of a fabric trained on, for a training step."""
@@ -155,19 +177,28 @@ class BtfNetwork(EncoderDecoder):
         # The pyramid takes a texel's footprint to be half a texel.
         return read_pyramid(pyramid, u, v, sigma * (0.5 / options.texel_sigma), options.texels_per_yarn)
 
-    def decode(self, latent: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
-        """Answer in network space, (n, 4)."""
-        output: Tensor = self.decoder(torch.cat([latent, angles_of(wi, wo, self.options.angles)], dim=-1))
+    def decode(self, latents: Tensor, angles: Tensor) -> Tensor:
+        """Answer in network space, (..., channels), under pairs of directions (..., 4) (`angles_of`)."""
+        output: Tensor = self.decoder(torch.cat([latents, angles], dim=-1))
         return output
 
     def components(self, *inputs: Tensor) -> Tensor:
         """Return components (n, 4) from the columns of queries and the levels of a pyramid."""
         u, v, sigma, wi, wo, *pyramid = inputs
         latent = once_a_place(lambda *place: self.read(pyramid, *place), u, v, sigma)
-        return to_components(self.decode(latent, wi, wo), self.options.log_k)
+        return self.answers(latent, angles_of(wi, wo))
+
+    def answers(self, latents: Tensor, angles: Tensor) -> Tensor:
+        """Return components (..., 4) of latents of a fabric (..., latent) under pairs of directions (..., 4)."""
+        return to_components(self.decode(latents, angles), self.options.log_k)
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the weighted squared error in network space."""
+        latents = [self.latents_of(index, random) for index in batch.fabric.tolist()]
+        return component_error(self.decoded(latents, batch), batch.target.flatten(0, 1), self.options)
+
+    def decoded(self, latents: Sequence[Tensor], batch: Batch) -> Tensor:
+        """Answer a batch in network space, (F n, channels), by the latents (rows, columns, latent) of its fabrics."""
         options = self.options
         strange = (batch.wi[..., 2] < 0) | (batch.curvature > 0) | (batch.sigma_minor != batch.sigma)
         if bool(strange.any()):
@@ -176,13 +207,11 @@ class BtfNetwork(EncoderDecoder):
             )
             raise BadInput("training", "model", options.model, allowed)
         read = []
-        for position, index in enumerate(batch.fabric.tolist()):
-            latents = self.latents_of(index, random)
-            picks, ends = (extent // options.texels_per_yarn for extent in latents.shape[:2])
+        for position, own in enumerate(latents):
+            picks, ends = (extent // options.texels_per_yarn for extent in own.shape[:2])
             u, v = batch.u[position] / ends, batch.v[position] / picks
-            read.append(self.read(averaged(latents), u, v, batch.sigma[position]))
-        output = self.decode(torch.cat(read), batch.wi.flatten(0, 1), batch.wo.flatten(0, 1))
-        return component_error(output, batch.target.flatten(0, 1), options)
+            read.append(self.read(averaged(own), u, v, batch.sigma[position]))
+        return self.decode(torch.cat(read), angles_of(batch.wi, batch.wo).flatten(0, 1))
 
     def start_at(self, target: Tensor) -> None:
         """Set the last bias to the mean target, and the last weights small."""
@@ -205,32 +234,81 @@ class UnifiedBtfNetwork(BtfNetwork):
         self._held = tuple(texels)  # kept in use, so that validation finds them
         self._texels = list(texels)
 
-    def latents_of(self, index: int, random: np.random.Generator) -> Tensor:
-        """Encode a fabric trained on from a random number of its samples."""
+    def latents_of(self, index: int, random: np.random.Generator, paint: Tensor | None = None) -> Tensor:
+        """Encode a fabric trained on from a random number of its samples, in the colours `paint` (4, 3) if given."""
         device = self.encoder.scale.device
         texels = self._texels[index] = self._texels[index].to(device)
         count = len(texels.angles)
         chosen = random.permutation(count)[: random.integers(self.options.fewest_samples, count, endpoint=True)]
-        return self.encode(texels, chosen)
+        return self.encode(texels, chosen, paint)
 
-    def encode(self, texels: Texels, chosen: Index | None = None) -> Tensor:
+    def encode(self, texels: Texels, chosen: Index | None = None, paint: Tensor | None = None) -> Tensor:
         """Return the latents (rows, columns, latent) of a fabric's texels, from all samples or the `chosen` ones."""
         angles, values = texels.angles, texels.values
         if chosen is not None:
             index = torch.from_numpy(chosen).to(values.device)
             angles, values = angles[index], values[index]
-        latents: Tensor = self.encoder(angles, values.to(torch.float32))
+        values = values.to(torch.float32)
+        latents: Tensor = self.encoder(angles, values if paint is None else values @ paint)
         return latents.reshape(*texels.shape, -1)
 
     def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
         """Compute a fabric's samples and encode them, by one forward pass; return the levels of its pyramid."""
-        return tuple(level.contiguous() for level in averaged(self.encode(texels_of(fabric, self.options))))
+        texels = texels_of(fabric, self.options)
+        latents = self.latents(texels.angles, texels.values.to(torch.float32))
+        return tuple(level.contiguous() for level in averaged(latents.reshape(*texels.shape, -1)))
+
+    def latents(self, angles: Tensor, values: Tensor) -> Tensor:
+        """Return what `answers` reads of T texels of a fabric, (T, numbers); arguments as of `SetEncoder`."""
+        latents: Tensor = self.encoder(angles, values)
+        return latents
 
     def start_at(self, target: Tensor) -> None:
         """As the decoder alone does; and set the scale of samples to that of targets."""
         super().start_at(target)
         with torch.no_grad():
             self.encoder.scale.copy_(1.0 / target.square().mean(dim=0).sqrt().clamp_min(1e-6))
+
+
+class RgbBtfNetwork(UnifiedBtfNetwork):
+    """Encoder and decoder of RGB, whatever the material: fabrics are trained on in random colours.
+
+    Components are answered as colours: latents are those of two sets of them.
+    """
+
+    def latents(self, angles: Tensor, values: Tensor) -> Tensor:
+        """Return the latents of T texels in both sets of colours, (T, 2 latent)."""
+        paints = (torch.tensor(paint, dtype=torch.float32) for paint in _PAINTS)
+        return torch.cat([self.encoder(angles, values @ paint) for paint in paints], dim=-1)
+
+    def answers(self, latents: Tensor, angles: Tensor) -> Tensor:
+        """Return components (..., 4): RGB in one set of colours, and the mean of RGB in the other."""
+        first, second = (self.to_rgb(part, angles) for part in latents.chunk(2, dim=-1))
+        return torch.cat([first, second.mean(dim=-1, keepdim=True)], dim=-1)
+
+    def to_rgb(self, latents: Tensor, angles: Tensor) -> Tensor:
+        """Return linear RGB, at least 0, (..., 3)."""
+        output = self.decode(latents, angles)
+        return (torch.expm1(output.to(torch.float32)) / self.options.log_k).clamp_min_(0.0)
+
+    def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
+        """Return the squared error of RGB in log space, each fabric in colours of its own."""
+        shape = len(batch.fabric), len(COMPONENTS), 3
+        drawn = random.random(shape) * (random.random(shape) < _PAINTED)
+        paints = torch.from_numpy(drawn.astype(np.float32)).to(batch.target.device)
+        pairs = zip(batch.fabric.tolist(), paints, strict=True)
+        output = self.decoded([self.latents_of(index, random, paint) for index, paint in pairs], batch)
+        return (output - torch.log1p(self.options.log_k * (batch.target @ paints)).flatten(0, 1)).square().mean()
+
+    def start_at(self, target: Tensor) -> None:
+        """Set the last bias to the mean of painted targets, the last weights small, and the scale of samples."""
+        painted = 0.5 * _PAINTED * target.sum(dim=1)
+        last = self.decoder[-1]
+        assert isinstance(last, nn.Linear)
+        with torch.no_grad():
+            last.bias.fill_(torch.log1p(self.options.log_k * painted).mean())
+            last.weight.mul_(0.1)
+            self.encoder.scale.fill_(1.0 / painted.square().mean().sqrt().clamp_min(1e-6))
 
 
 class UniversalNetwork(BtfNetwork):
@@ -285,9 +363,7 @@ class UniversalNetwork(BtfNetwork):
 
     def samples(self, latents: Tensor, angles: Tensor) -> Tensor:
         """Return samples (n, T, 4), in network space, of latents (T, latent) under n pairs of directions (n, 4)."""
-        pairs = latents.expand(len(angles), -1, -1), angles.unsqueeze(1).expand(-1, len(latents), -1)
-        output: Tensor = self.decoder(torch.cat(pairs, dim=-1))
-        return output
+        return self.decode(latents.expand(len(angles), -1, -1), angles.unsqueeze(1).expand(-1, len(latents), -1))
 
     def encoded(self, fabric: Fabric) -> tuple[Tensor, ...]:
         """Return the pyramid of the latents learnt with the decoder, or of those that fit the fabric's samples."""
@@ -307,6 +383,31 @@ class UniversalNetwork(BtfNetwork):
             optimiser.step()
             fall.step()
         return latents.detach()
+
+
+class SampleEncoder(NetworkMethod[BtfNetwork]):
+    """A trained encoder of samples of any fabric, with its decoder."""
+
+    def encode(self, wi: Float32, wo: Float32, values: Float32) -> Float32:
+        """Return latents (T, numbers) of components (n, T, 4) under n pairs of directions, (n, 3) each."""
+        with torch.inference_mode():
+            return self._network.latents(_angles(wi, wo), torch.from_numpy(values)).numpy()
+
+    def decode(self, latents: Float32, wi: Float32, wo: Float32) -> Float32:
+        """Return the components (n, T, 4) of latents under n pairs of directions."""
+        angles, own = _angles(wi, wo).unsqueeze(1).expand(-1, len(latents), -1), torch.from_numpy(latents)
+        with torch.inference_mode():
+            return self._network.answers(own.expand(len(angles), -1, -1), angles).numpy()
+
+    @property
+    def _network(self) -> UnifiedBtfNetwork:
+        (network,) = self._networks.values()
+        assert isinstance(network, UnifiedBtfNetwork)
+        return network
+
+
+def _angles(wi: Float32, wo: Float32) -> Tensor:
+    return angles_of(torch.from_numpy(wi), torch.from_numpy(wo))
 
 
 def averaged(latents: Tensor) -> list[Tensor]:
@@ -330,20 +431,26 @@ def build(
         grids = {key: own.shape for key, own in zip(keys, texels, strict=True)}
         return UniversalNetwork(options, grids, keys, texels)
     assert isinstance(options, EncoderOptions)
-    return UnifiedBtfNetwork(options, texels)
+    return _encoding(options, texels)
 
 
-def restore(options: BtfOptions, trained: Trained) -> list[NetworkMethod[BtfNetwork]]:
-    """Return the method that trained networks are; BadInput if samples are answered by other physics than rows."""
+def restore(options: BtfOptions, trained: Trained) -> list[NetworkMethod[BtfNetwork]] | list[MeasuredCloth]:
+    """Return the method that trained networks are, or a material of measured samples is.
+
+    BadInput if samples are answered by other physics than rows.
+    """
+    card, weights = trained[0]
+    if MEASURED in card:
+        assert isinstance(options, EncoderOptions)
+        return [_measured(options, card[MEASURED], weights)]
 
     def empty(_: tuple[int, int]) -> BtfNetwork:
         if isinstance(options, UniversalOptions):
-            _card, weights = trained[0]
             shapes = {name: own.shape for name, own in weights.items() if name.startswith("latents.")}
             grids = {name.removeprefix("latents."): (rows, columns) for name, (rows, columns, _) in shapes.items()}
             return UniversalNetwork(options, grids)
         assert isinstance(options, EncoderOptions)
-        return UnifiedBtfNetwork(options)
+        return _encoding(options)
 
     networks, domain = restored(options, trained, empty)
     if domain is not None:
@@ -351,4 +458,25 @@ def restore(options: BtfOptions, trained: Trained) -> list[NetworkMethod[BtfNetw
         # Whatever else the rows held: footprints are read as round, and the cloth as flat.
         plain = QueryOptions(**domain.queries.model_dump(include={"sigma", "directions", "max_angle"}))
         domain = domain.model_copy(update={"queries": plain})
-    return [NetworkMethod(networks, domain)]
+    return [(SampleEncoder if options.encodes else NetworkMethod)(networks, domain)]
+
+
+def _measured(options: EncoderOptions, about: dict[str, Any], weights: Mapping[str, Tensor]) -> MeasuredCloth:
+    """Return the material that latents and a decoder are."""
+    network = RgbBtfNetwork(options).eval()
+    decoder = {key: values for key, values in weights.items() if key != LATENTS}
+    network.decoder.load_state_dict({key.removeprefix("decoder."): values for key, values in decoder.items()})
+    (rows, columns, _), (width, height) = weights[LATENTS].shape, about["size"]
+    pyramid = [level.contiguous() for level in averaged(weights[LATENTS])]
+    # The network has footprints in yarn spacings, of so many texels each.
+    spacing = options.texels_per_yarn * math.sqrt(width * height / (rows * columns))
+
+    def rgb(u: Tensor, v: Tensor, sigma: Tensor, wi: Tensor, wo: Tensor) -> Tensor:
+        latent = once_a_place(lambda *place: network.read(pyramid, *place), u, v, sigma / spacing)
+        return network.to_rgb(latent, angles_of(wi, wo))
+
+    return MeasuredCloth(about, rgb, network.stored(tuple(pyramid)))
+
+
+def _encoding(options: EncoderOptions, texels: Sequence[Texels] = ()) -> UnifiedBtfNetwork:
+    return (RgbBtfNetwork if options.head == "rgb" else UnifiedBtfNetwork)(options, texels)

@@ -12,7 +12,9 @@ from pipeline.models.options import ComponentLossOptions
 class WovenOptions(ComponentLossOptions):
     """One network for many fabrics and scales [Chen2024Woven]."""
 
-    fixed: ClassVar[tuple[str, ...]] = ("smallest_size", "largest_size", "transparency_weight")
+    fixed: ClassVar[tuple[str, ...]] = (
+        *ComponentLossOptions.fixed, "smallest_size", "largest_size", "transparency_weight"
+    )  # fmt: skip
     any_physics: ClassVar[bool] = True
     blends: ClassVar[bool] = True
 

@@ -8,18 +8,19 @@ from pipeline.models.added.added_code import AddedMethod
 from pipeline.models.added.source import locate
 from pipeline.models.curved import CurvedOptions
 from pipeline.models.network import Batch
-from pipeline.models.neumip import NeumipOptions, TriplePlaneOptions
+from pipeline.models.neumip import HierarchicalOptions, NeumipOptions, TriplePlaneOptions
 from pipeline.models.registry import build_network
 from pipeline.models.unified_btf import BtfAutoencoderOptions, UnifiedBtfOptions, UniversalOptions
 from pipeline.models.woven import WovenOptions
 
 _SAMPLES = {"texels_per_yarn": 2, "samples": 8, "hidden": 16}
-_BTF = {**_SAMPLES, "fewest_samples": 4, "encoder_hidden": 16, "weights": 8}
+_BTF = {**_SAMPLES, "fewest_samples": 4, "weights": 8}
 
 SMALL = {
     "woven": WovenOptions(map_texels=16, encoder_channels=4),
     "neumip": NeumipOptions(texels_per_yarn=4),
     "triple_plane": TriplePlaneOptions(texels_per_yarn=4, direction_texels=4),
+    "hierarchical": HierarchicalOptions(texels_per_yarn=4),
     "curved": CurvedOptions(texels_per_yarn=4, silhouette_rows=512, silhouette_sigma=(0.5, 8.0)),
     "unified_btf": UnifiedBtfOptions(**_BTF),
     "btf_autoencoder": BtfAutoencoderOptions(**_BTF),

@@ -25,7 +25,7 @@ def test_identities_state_all_choices_of_the_design(model):
     "table",
     [
         {"model": "woven", "log_k": float("nan")},
-        {"model": "woven", "specular_weight": 0, "diffuse_weight": 0},
+        {"model": "neumip", "specular_weight": 0.5},
         {"model": "woven", "map_texels": 65},
         {"model": "woven", "latent": 3},
         {"model": "woven", "spatial_fusion": False},
@@ -41,6 +41,6 @@ def test_bad_model_options_are_refused(table):
 
 
 def test_errors_are_weighed_by_kind_of_component():
-    options = ComponentLossOptions(specular_weight=3.0, diffuse_weight=5.0)
+    options = ComponentLossOptions(diffuse_weight=5.0)
     output, target = torch.tensor([[1.0, 0.0, 2.0, 0.0]]), torch.zeros(1, 4)
-    assert component_error(output, target, options).item() == pytest.approx(3 * 1 / 2 + 5 * 4 / 2)
+    assert component_error(output, target, options).item() == pytest.approx(1 / 2 + 5 * 4 / 2)

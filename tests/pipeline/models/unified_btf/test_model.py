@@ -17,7 +17,7 @@ from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 BTF, LINING = SMALL["unified_btf"], load_fabric("polyester_lining")
-OPTIONS = UnifiedBtfOptions(encoder_hidden=16, weights=8)
+OPTIONS = UnifiedBtfOptions(weights=8)
 FEW = UnifiedBtfOptions(texels_per_yarn=2, samples=4, fewest_samples=2)
 SHANTUNG = load_fabric("silk_shantung")
 RED = LINING.model_copy(update={"name": "red", "warp": LINING.warp.model_copy(update={"diffuse": (0.5, 0.1, 0.1)})})
@@ -85,7 +85,7 @@ def made_up(count: int, seed: int = 0) -> btf.Texels:
     drawn = draw_queries(QueryOptions(), (1, 1), seed, 0, count)
     phase = np.arange(24).reshape(6, 4)
     wave = 2.0 * drawn.wi[:, 0] + drawn.wo[:, 1] - drawn.wi[:, 2] * drawn.wo[:, 0]
-    angles = btf.angles_of(torch.from_numpy(drawn.wi), torch.from_numpy(drawn.wo), OPTIONS.angles)
+    angles = btf.angles_of(torch.from_numpy(drawn.wi), torch.from_numpy(drawn.wo))
     values = 0.1 * (1.1 + np.sin(wave[:, None, None] + phase))
     return btf.Texels((1, 6), angles, torch.from_numpy(values.astype(np.float16)))
 
@@ -106,8 +106,7 @@ def encoded(model: btf.SetEncoder, samples: btf.Texels, chosen: np.ndarray | sli
 def test_angles_tell_light_from_viewer_but_order_and_number_of_the_samples_do_not_matter():
     """Every sample given thrice says nothing new; only the rounding of the sums may differ."""
     wi, wo = torch.tensor([0.6, 0.0, 0.8]), torch.tensor([0.0, -0.8, 0.6])
-    torch.testing.assert_close(btf.angles_of(wi, wo, "disc"), torch.tensor([0.6, 0.0, 0.0, -0.8]))
-    torch.testing.assert_close(btf.angles_of(wi, wo, "stereographic"), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
+    torch.testing.assert_close(btf.angles_of(wi, wo), torch.tensor([1 / 3, 0.0, 0.0, -0.5]))
     samples, model = made_up(500), encoder()
     for chosen in (np.random.default_rng(0).permutation(500), np.tile(np.arange(500), 3)):
         torch.testing.assert_close(encoded(model, samples, chosen), encoded(model, samples), rtol=1e-4, atol=1e-6)
@@ -148,7 +147,7 @@ def test_rows_become_samples_by_texels_which_are_not_computed_again_while_in_use
     samples = btf.read_texels(SHANTUNG, FEW, columns)
     assert samples.shape == (2 * SHANTUNG.weave.repeat[1], 2 * SHANTUNG.weave.repeat[0])
     sample, row, column = 2, 3, 9
-    angles = btf.angles_of(torch.from_numpy(queries.wi), torch.from_numpy(queries.wo), FEW.angles)
+    angles = btf.angles_of(torch.from_numpy(queries.wi), torch.from_numpy(queries.wo))
     alike = (angles == samples.angles[sample]).all(dim=1).numpy()
     (found,) = np.flatnonzero((queries.u == column / 2 + 0.25) & (queries.v == row / 2 + 0.25) & alike)
     read = samples.values[sample, row * samples.shape[1] + column]
