@@ -88,6 +88,7 @@ pictures: $(READY)
 	TWILLIGHT_WRITE_PICTURES=1 $(BIN)/pytest -q tests/test_task_pages.py tests/test_twillight_mitsuba.py tests/jobs/verbs/exchange/test_engines.py
 	$(BIN)/twillight list --pictures docs/pictures/presets --size 256x192
 	$(BIN)/python docs/pictures/cover.py
+	$(BIN)/python docs/pictures/papers.py
 
 # The package as one file in dist/, for `pip install dist/*.whl` elsewhere; nothing is compiled at install.
 wheel: $(READY)

@@ -18,19 +18,19 @@ By its Fourier series, which ends at the bins' own resolution,
 """
 
 import math
-from typing import cast
+from typing import Final, cast
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pipeline.models.networks.layers import Residual, activate
+from pipeline.models.networks.layers import LinearLayer, Residual, activate
 from pipeline.models.woven import WovenOptions
 
 _DIRECTIONS = 5
 _LIGHT = slice(-5, -2)  # inputs of a layer that are wi; wo follows
 _FUSED = 64
-_SHARPNESS = 0.4  # deviation of the sharpest blob of `local`, in bins
+SHARPNESS: Final = 0.4  # deviation of the sharpest blob of `local`, in bins
 
 
 def one_blob(x: Tensor, bins: int) -> Tensor:
@@ -51,11 +51,15 @@ def periodic_blob(x: Tensor, deviation: Tensor | float, bins: int) -> Tensor:
         deviation = deviation.unsqueeze(-1)
     decay = torch.exp(-2.0 * (math.pi * m * deviation) ** 2)
     harmonics = torch.cat([phase.cos() * decay, phase.sin() * decay], dim=-1)
+    return 1.0 / bins + harmonics @ harmonic_weights(m, bins)
 
-    centres = (torch.arange(bins, dtype=x.dtype, device=x.device) + 0.5) / bins
+
+def harmonic_weights(m: Tensor, bins: int) -> Tensor:
+    """Return the weights of cosines and sines of 1 to bins - 1 periods, `m`, in each bin, (2 bins - 2, bins)."""
+    centres = (torch.arange(bins, dtype=m.dtype, device=m.device) + 0.5) / bins
     angle = 2.0 * math.pi * m.unsqueeze(-1) * centres
     weight = (2.0 / bins) * torch.sinc(m / bins).unsqueeze(-1)
-    return 1.0 / bins + harmonics @ torch.cat([weight * angle.cos(), weight * angle.sin()])
+    return torch.cat([weight * angle.cos(), weight * angle.sin()])
 
 
 def encoded_size(sigma: Tensor, smallest: float, largest: float) -> Tensor:
@@ -84,7 +88,7 @@ def encode_patch(
     elif options.one_blob == "periodic":
         blobs = [periodic_blob(u, 1.0 / bins, bins), periodic_blob(v, 1.0 / bins, bins)]
     else:
-        sharp, places = (_SHARPNESS / bins) ** 2, ((u, repeat[:, :1]), (v, repeat[:, 1:]))
+        sharp, places = (SHARPNESS / bins) ** 2, ((u, repeat[:, :1]), (v, repeat[:, 1:]))
         column, row = (periodic_blob(x, (sharp + (sigma / period) ** 2).sqrt(), bins) for x, period in places)
         where = (row.unsqueeze(-1) * column.unsqueeze(-2)).flatten(-2)
         spread = (sharp + sigma.square()).sqrt()
@@ -98,7 +102,7 @@ class Decoder(nn.Module):
     def __init__(self, options: WovenOptions) -> None:
         super().__init__()
         hidden, patch = options.hidden, 3 if options.one_blob == "none" else 3 * options.bins
-        self.latent = options.latent
+        self.options, self.latent = options, options.latent
         self.first = nn.Linear(options.latent + patch + (0 if options.spatial_fusion else _DIRECTIONS), hidden)
         self.filters: nn.Linear | None = None
         if options.one_blob == "local":
@@ -142,6 +146,26 @@ class Decoder(nn.Module):
         """Answer in network space, (F, n, 4), transparency appended if `transmission` is learnt."""
         x = activate(seen + functional.linear(wi, self._angular.weight[:, _LIGHT]))
         return activate(self.last(activate(self.narrow(self.mix(x)))))
+
+    def layers_of(self, latent: Tensor) -> dict[str, LinearLayer]:
+        """Return the layers for a fabric with a latent (1, latent or latent + bins^2), in their order, by name.
+
+        The first reads shares of the picture, if any, and blobs; its bias has what it reads of the latent. A residual
+        block is ``mix_first`` and ``mix_second``; ``harmonics`` makes periodic blobs of cosines and sines.
+        """
+        assert self.fusion is not None
+        weight, bins = self.first.weight, self.options.bins
+        rows = [weight[:, self.latent :].t()]
+        if self.filters is not None:
+            rows.insert(0, self.filters(latent[0, self.latent :][self.seen_cells]))
+        bias = self.first.bias + weight[:, : self.latent] @ latent[0, : self.latent]
+        names = ("fusion", "fused", "angular")[-len(self.fusion) :]
+        layers: dict[str, nn.Module] = dict(zip(names, self.fusion, strict=True))
+        layers |= {"mix_first": self.mix.first, "mix_second": self.mix.second, "narrow": self.narrow, "last": self.last}
+        parts = {"first": (torch.cat(rows), bias)}
+        parts |= {name: (own.weight.t(), own.bias) for name, own in layers.items() if isinstance(own, nn.Linear)}
+        parts["harmonics"] = harmonic_weights(torch.arange(1.0, bins), bins), torch.full((bins,), 1.0 / bins)
+        return {name: LinearLayer(*(values.numpy(force=True) for values in own)) for name, own in parts.items()}
 
     @property
     def _angular(self) -> nn.Linear:

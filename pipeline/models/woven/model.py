@@ -30,6 +30,7 @@ from pipeline.models.network import Batch, NetworkMethod, Trained, restored
 from pipeline.models.networks.layers import (
     SLOPE,
     EncoderDecoder,
+    LinearLayer,
     component_error,
     once_a_place,
     start_at_mean,
@@ -130,6 +131,13 @@ class WovenNetwork(EncoderDecoder):
 
 class Woven(NetworkMethod[WovenNetwork]):
     """A trained network that answers for any fabric; it encodes each once."""
+
+    def layers_of(self, fabric: Fabric) -> tuple[dict[str, LinearLayer], Placement]:
+        """Return the layers of the decoder for a fabric (`Decoder.layers_of`), and its placement."""
+        network = self.network_of(fabric)
+        with torch.no_grad():
+            latent, *placement = network.encoded(fabric)
+            return network.decoder.layers_of(latent), Placement(*placement)
 
     def predict_between(self, first: Fabric, second: Fabric, share: float, queries: Queries) -> Float32:
         """Answer, (N, 4), for a blend of two fabrics: their latents are blended, no intermediate fabric is encoded.

@@ -21,6 +21,8 @@ from pipeline.fingerprint import IDENTITY, fingerprint
 from pipeline.models.card import write_model
 from pipeline.models.neumip import NeumipOptions
 from pipeline.models.neumip.model import NeumipNetwork
+from pipeline.models.woven import WovenOptions
+from pipeline.models.woven.model import WovenNetwork
 from pipeline.shader.export_shader import write_shader
 from pipeline.shader.languages import Program, compile_program, slangc
 from tests.browser import opened
@@ -238,3 +240,21 @@ def neumip_folder(folder, fabric, version=1, domain=None, **options):
 def neumip(tmp_path_factory):
     """The folder of a trained `neumip`: a repeat of odd sides at the coarser levels, channels that fill no element."""
     return neumip_folder(tmp_path_factory.mktemp("models") / "neumip", load_fabric(CLOTH), texels_per_yarn=5, hidden=18)
+
+
+def woven_folder(folder, **options):
+    """Write a random `woven` whose answers differ by place and direction."""
+    design = WovenOptions(map_texels=16, encoder_channels=4, **options)
+    with torch.random.fork_rng():
+        torch.manual_seed(5)
+        network = WovenNetwork(design)
+        with torch.no_grad():
+            network.decoder.last.weight.mul_(0.1)
+            network.decoder.last.bias[:4] = torch.tensor([1.0, 0.8, 1.2, 1.1])
+    card = {
+        "options": design.model_dump(mode="json", context=IDENTITY),
+        "version": {"model": design.version},
+        "fabrics": [{"optics": "", "repeat": [1, 1]}],
+    }
+    write_model(folder, safetensors.torch.save(network.state_dict()), card)
+    return str(folder)
