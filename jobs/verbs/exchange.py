@@ -47,7 +47,7 @@ class ExportFlags:
     repeats: Annotated[Whole | None, Parameter(help="Of a mesh: copies of the repeat in each direction; 1.")] = None
     size: Annotated[Whole | None, Parameter(help="Of maps: texels of the longer side, a power of two; 2048.")] = None
     model: Annotated[
-        str | None, Parameter(help="Of a shader: soft_nodes (default), or the folder of a trained neumip or woven.")
+        str | None, Parameter(help="Of a shader: soft_nodes (default), or folder of a trained neumip, curved or woven.")
     ] = None
     level: Annotated[Whole | None, Parameter(help="Of a shader: level of detail, 0, 1, 2, 4 or 8; 2.")] = None
     language: Annotated[

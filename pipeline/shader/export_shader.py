@@ -6,13 +6,14 @@ from pathlib import Path
 
 from pipeline.analytic.soft_nodes.groups import DETAILS
 from pipeline.folders import own_files
+from pipeline.models.curved.model import Curved
 from pipeline.models.neumip.model import Neumip
 from pipeline.models.registry import load_model, model_folder
 from pipeline.models.runtimes import no_onnx
 from pipeline.models.woven.model import Woven
 from pipeline.shader.descriptor import GOLDEN, Shader, vectors
 from pipeline.shader.languages import ALL, LANGUAGES, ONNX, SOURCE, compiler_for, refuse_unknown, translate
-from pipeline.shader.neumip import NEUMIP, neumip_shader
+from pipeline.shader.neumip import BENT, NEUMIP, texture_shader
 from pipeline.shader.soft_nodes import SOFT_NODES, soft_nodes_shader
 from pipeline.shader.tables import wanted_kinds
 from pipeline.shader.woven import WOVEN, woven_shader
@@ -86,9 +87,10 @@ def _source(shader: Shader) -> dict[str, bytes]:
 def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Collection[str]) -> Shader:
     """Return a model of a fabric, ready to be written.
 
-    `model` is `soft_nodes`, which is meant if it is left out, or the folder of a trained `neumip` or `woven`; `level`
-    the level of detail of the soft nodes; `kinds` are of QUERY_KINDS. BadInput if there is no such model, its files are
-    damaged or of another version, it was not trained on the fabric, it has no shader, or has no such level or kinds.
+    `model` is `soft_nodes`, which is meant if it is left out, or the folder of a trained `neumip`, `curved` or `woven`;
+    `level` the level of detail of the soft nodes; `kinds` are of QUERY_KINDS. BadInput if there is no such model, its
+    files are damaged or of another version, it was not trained on the fabric, it has no shader, or has no such level or
+    kinds.
     """
     if model is None or model == SOFT_NODES:
         return soft_nodes_shader(fabric, level, kinds)
@@ -97,11 +99,11 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
         allowed = f"chooses a level for each query and has no shader: export {SOFT_NODES} at one --level of {levels}"
         raise BadInput("export", "model", model, allowed)
     (method,) = load_model(model_folder(model, "export", "model", [SOFT_NODES]))
-    if not isinstance(method, Neumip | Woven):
-        allowed = f"has no shader; {SOFT_NODES} and the folders of a trained {NEUMIP} or {WOVEN} have one"
+    if not isinstance(method, Neumip | Curved | Woven):
+        allowed = f"has no shader; {SOFT_NODES} and the folders of a trained {NEUMIP}, {BENT} or {WOVEN} have one"
         raise BadInput("export", "model", model, allowed)
     if not method.covers(fabric):
         raise BadInput("export", "model", model, f"this model was not trained on {fabric.name}")
     if isinstance(method, Woven):
         return woven_shader(method, fabric, level, kinds)
-    return neumip_shader(method, fabric, level, kinds)
+    return texture_shader(method, fabric, level, kinds)

@@ -1,4 +1,4 @@
-"""Networks as shaders: what the models `neumip` and `woven` share.
+"""Networks as shaders: what the models `neumip`, `curved` and `woven` share.
 
 All numbers fill one buffer, `weights`, in elements of four. A layer has its biases first, then its weights row after
 row, one row an input. Rows are filled up with zeros to whole elements, and inputs to a multiple of four, so that the
@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from pipeline.compiled.arrays import Float32
 from pipeline.models.domain import Domain
 from pipeline.models.network import NetworkMethod
 from pipeline.models.networks.layers import LinearLayer
@@ -21,6 +22,7 @@ from pipeline.shader.constants import TEXTURE_WIDTH, shared_constants
 from pipeline.shader.golden import GROUPS, golden_of
 from pipeline.shader.limits import MOST_HEIGHT
 from pipeline.shader.tables import PlacedArrays, constants_slang, encoded
+from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
@@ -35,16 +37,19 @@ _ONNX: Final = {
     "sigma": "standard deviation of the round footprint, yarn spacings, (N,)",
     "wi": "unit vector to the light, (N, 3)",
     "wo": "unit vector to the viewer, (N, 3)",
+    "curvature": "of the cloth in the viewer's plane, 1/yarn spacings, (N,)",
 }
 
 
 class Packed(NamedTuple):
     """A network in the buffer `weights`, the constants of its source, and what the descriptor says of it."""
 
+    sources: tuple[str, ...]  # files of the source beside those that all share
     constants: dict[str, bool | int | float]
     layers: list[descriptor.PlacedLayer]
     inputs: dict[str, list[str]]  # of each network, in their order
     outputs: dict[str, str]
+    curvature: float = 0.0  # largest that it knows
 
 
 def add_layers(
@@ -69,9 +74,11 @@ def coloured_weights(fabric: Fabric) -> PlacedArrays:
 
 
 def refuse_wishes(method: NetworkMethod[Any], level: int | None, kinds: Collection[str]) -> None:
-    """Refuse a level of detail, and kinds of queries."""
-    if kinds:
-        raise BadInput("export", "kind", ", ".join(sorted(kinds)), f"{method.name} answers in front of flat cloth only")
+    """Refuse a level of detail, and kinds of queries that the shader of a method does not know."""
+    known = {"curvature"} & method.options.kinds
+    if wrong := sorted(set(kinds) - known):
+        where = "in front of cloth" if known else "in front of flat cloth"
+        raise BadInput("export", "kind", ", ".join(wrong), f"{method.name} answers {where} only")
     if level is not None:
         raise BadInput("export", "level", level, f"leave it out: {method.name} has no soft nodes")
 
@@ -84,6 +91,9 @@ def network_shader(
         allowed = f"the shader takes at most {MOST_ELEMENTS:,} elements of weights"
         raise BadInput("export", "shader", f"{weights.count:,} elements", allowed)
     trained_on, outside = _training(method.domain, fabric)
+    bent = f"a curvature above {packed.curvature:g} as that" if packed.curvature else "curved cloth as flat"
+    groups = ("front", "curved") if packed.curvature else ("front",)
+    names = method.network_of(fabric).columns
     ends, picks = fabric.thread_colours()
     files = {"float32": "tables/weights.f32", "float16": "tables/weights.f16"}
     buffer = descriptor.Buffer(files=files, channels=4, elements=weights.count, arrays=weights.places)
@@ -91,7 +101,8 @@ def network_shader(
         model=model,
         fabric=fabric.name,
         outputs=descriptor.OUTPUTS | {"bounds": "the components: the network knows no bound of energy"},
-        conventions=[*descriptor.CONVENTIONS, "An ellipse counts as the circle of its area, curved cloth as flat."],
+        conventions=[*descriptor.CONVENTIONS, f"An ellipse counts as the circle of its area, {bent}."],
+        kinds=["curvature"] if packed.curvature else [],
         colours=descriptor.colours(fabric),
         repeat=fabric.weave.repeat,
         threads=(len(ends.diffuse), len(picks.diffuse)),
@@ -104,10 +115,15 @@ def network_shader(
             inputs=packed.inputs,
             outputs=packed.outputs,
             layers=packed.layers,
-            onnx=_ONNX,
+            onnx={name: _ONNX[name] for name in names},
         ),
     )
     ends_picks = dict(zip(("ENDS", "PICKS"), fabric.weave.repeat, strict=True))
+
+    def read(queries: Queries) -> Float32:
+        bend = np.minimum(queries.curvature, np.float32(packed.curvature))
+        return np.tile(method.predict(fabric, queries._replace(curvature=bend)), 2)  # components are their own bounds
+
     constants: Mapping[str, bool | int | float] = {
         "COLOURS": weights.places["colours"].offset,
         **ends_picks,
@@ -115,7 +131,7 @@ def network_shader(
         "LOG_K": float(method.options.log_k),
     }
     return descriptor.Shader(
-        (*SHARED_SOURCES, f"{model}.slang"),
+        (*SHARED_SOURCES, *packed.sources, f"{model}.slang"),
         {
             "layout.slang": constants_slang(shared_constants(), "pipeline.analytic.soft_nodes"),
             "network.slang": constants_slang(dict(constants), f"pipeline.models.{model}"),
@@ -123,15 +139,15 @@ def network_shader(
         {path: encoded(np.concatenate(weights.parts), kind) for kind, path in files.items()},
         described,
         golden_of(
-            {"front": GROUPS["front"]},
+            {name: GROUPS[name] for name in groups},
             fabric.weave.repeat,
-            lambda queries: np.tile(method.predict(fabric, queries), 2),  # components are their own bounds
+            read,
             lambda queries: np.tile(colours(fabric), (len(queries.u), 1, 1)),
             stretched=False,
         ),
         f"{weights.count:,} elements",
         False,
-        partial(as_onnx, method, fabric, tuple(_ONNX)),
+        partial(as_onnx, method, fabric, names),
     )
 
 

@@ -54,6 +54,7 @@ def _pack(method: Woven, fabric: Fabric, weights: PlacedArrays) -> Packed:
     picture = [f"share of cell {n}" for n in range(bins**2)] if options.one_blob == "local" else []
     blobs = [f"{name} blob {n}" for name in ("x", "y", "size") for n in range(bins)]
     return Packed(
+        (),
         {
             **starts,
             "BINS": bins,

@@ -20,7 +20,7 @@ four components, specular ones in log space, counts of texels and steps. The pap
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -40,7 +40,7 @@ from pipeline.truth.query import Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
 
-_SHARPEST = 0.02  # least deviation of the grazing cosine, in units of sqrt(kappa): a step of no width cannot be learnt
+SHARPEST: Final = 0.02  # least deviation of the grazing cosine, in units of sqrt(kappa): no step can be learnt
 _NO_FALL = -1.0  # finite, because weights are averaged
 
 
@@ -135,7 +135,7 @@ class CurvedNetwork(TextureNetwork):
     def grazing(self, view: View) -> tuple[Tensor, Tensor]:
         """Return mean and deviation (n,) of the cosine at which a ray just touches, in units of sqrt(kappa)."""
         mean, width = self._silhouette(view).unbind(dim=-1)
-        return mean, _SHARPEST + functional.softplus(width)
+        return mean, SHARPEST + functional.softplus(width)
 
     def loss(self, batch: Batch, random: np.random.Generator) -> Tensor:
         """Return the weighted squared error of the components, and the silhouette's own loss at random rows."""
@@ -154,7 +154,7 @@ class CurvedNetwork(TextureNetwork):
             return functional.binary_cross_entropy_with_logits(self._silhouette(view)[:, 0], target[:, 0])
         mean, deviation = self.grazing(view)
         square = (target[:, 0] - mean).square() + target[:, 1]
-        return ((deviation / _SHARPEST).log() + 0.5 * square / deviation.square()).mean()
+        return ((deviation / SHARPEST).log() + 0.5 * square / deviation.square()).mean()
 
     def _silhouette(self, view: View) -> Tensor:
         texels = self.options.silhouette_texels_per_yarn

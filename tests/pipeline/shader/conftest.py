@@ -130,7 +130,7 @@ class _Groups(ctypes.Structure):
 
 
 @pytest.fixture(scope="session")
-def programs(exported, tmp_path_factory):
+def programs(exported, compiled):
     """A function that compiles the C++ form of a model, of a fabric, once, and returns a function that runs it on rows.
 
     That one returns components and bounds, (N, 8), of queries, (N, 12). With the entry point `scatter` it takes random
@@ -139,7 +139,16 @@ def programs(exported, tmp_path_factory):
 
     @cache
     def program(model=None, fabric=CLOTH):
-        source = exported(fabric, 2, "cpp", model=model) / "cpp" / "evaluate.cpp"
+        return compiled(exported(fabric, 2, "cpp", model=model) / "cpp" / "evaluate.cpp")
+
+    return program
+
+
+@pytest.fixture(scope="session")
+def compiled(tmp_path_factory):
+    """A function that compiles C++ and returns the function of `programs`."""
+
+    def compile_source(source):
         if shutil.which("g++") is None:
             pytest.skip("g++ is not installed")
         library = tmp_path_factory.mktemp("cpp") / "evaluate.so"
@@ -156,7 +165,7 @@ def programs(exported, tmp_path_factory):
 
         return call
 
-    return program
+    return compile_source
 
 
 @pytest.fixture(scope="session")
@@ -242,19 +251,24 @@ def neumip(tmp_path_factory):
     return neumip_folder(tmp_path_factory.mktemp("models") / "neumip", load_fabric(CLOTH), texels_per_yarn=5, hidden=18)
 
 
+def random_folder(folder, network, bias, fabric=None):
+    """Write a random network whose answers differ by place and direction; `bias` names that of the last layer."""
+    design = network.options
+    with torch.no_grad():
+        weights = network.state_dict()
+        weights[bias][:4] = torch.tensor([1.0, 0.8, 1.2, 1.1])
+    about = {"optics": fingerprint(fabric.optics()), "repeat": list(fabric.weave.repeat)} if fabric else {"optics": ""}
+    options = design.model_dump(mode="json", context=IDENTITY)
+    card = {"options": options, "version": {"model": design.version}, "fabrics": [about]}
+    write_model(folder, safetensors.torch.save(weights), card)
+    return str(folder)
+
+
 def woven_folder(folder, **options):
-    """Write a random `woven` whose answers differ by place and direction."""
-    design = WovenOptions(map_texels=16, encoder_channels=4, **options)
+    """Write a random `woven`."""
     with torch.random.fork_rng():
         torch.manual_seed(5)
-        network = WovenNetwork(design)
-        with torch.no_grad():
-            network.decoder.last.weight.mul_(0.1)
-            network.decoder.last.bias[:4] = torch.tensor([1.0, 0.8, 1.2, 1.1])
-    card = {
-        "options": design.model_dump(mode="json", context=IDENTITY),
-        "version": {"model": design.version},
-        "fabrics": [{"optics": "", "repeat": [1, 1]}],
-    }
-    write_model(folder, safetensors.torch.save(network.state_dict()), card)
-    return str(folder)
+        network = WovenNetwork(WovenOptions(map_texels=16, encoder_channels=4, **options))
+    with torch.no_grad():
+        network.decoder.last.weight.mul_(0.1)
+    return random_folder(folder, network, "decoder.last.bias")
