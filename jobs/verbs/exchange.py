@@ -122,6 +122,8 @@ def fit(
     if out is not None and (held_out or compare):
         other = "--compare" if compare else "--held-out"
         raise BadInput("fit", "--out", str(out), f"is not written with {other}: leave one of them out")
+    if compare and held_out:
+        raise BadInput("fit", "--held-out", "", "goes with a measured BSDF or data sheets: leave it or --compare out")
     if compare:
         _photographs(path, compare)
         return
@@ -304,7 +306,7 @@ def gallery(
         with named_flags("gallery", "export"):
             cards.append(write_fabric(cloth, out, size, language))
         write_swatch(cloth, out / cloth.name, _PICTURE_SIZE).replace(out / cloth.name / PICTURE)
-    atomic_write(out / INDEX, gallery_page(cards).encode())
+        atomic_write(out / INDEX, gallery_page(cards).encode())  # of what is finished, if it is stopped
     print_lines(f"{out / INDEX}: {len(cards)} fabrics; open it in a browser")
 
 

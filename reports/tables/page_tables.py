@@ -105,7 +105,7 @@ def ranged_frames(frames: Frames) -> dict[str, pd.DataFrame]:
     ranged = {**frames, "errors_by_fabric": frames["errors_by_fabric"].copy()}
     for name in ("errors", "aliasing"):
         keys = zip(*(frames[name].get(key, ()) for key in ("role", "method", "setting")), strict=True)
-        ranged[name] = frames[name][[key not in left_out for key in keys]]
+        ranged[name] = frames[name].loc[[key not in left_out for key in keys]]
     for role, method, setting in left_out:
         of_role = ranged["errors_by_fabric"]["role"] == role
         ranged["errors_by_fabric"].loc[of_role, f"{method} {setting}".strip()] = math.nan

@@ -38,6 +38,16 @@ def test_the_site_has_every_file_that_it_names(twillight, refused, monkeypatch, 
     shutil.copyfile("own.toml", "two.toml")
     assert "same name" in refused("gallery", "two.toml", "own.toml", "--out", "x")
 
+    def stopped(fabric, folder, size):
+        if fabric.name == "own":
+            raise KeyboardInterrupt
+        return swatch(fabric, folder, size)
+
+    monkeypatch.setattr(jobs.verbs.show, "write_swatch", stopped)
+    assert twillight("gallery", "voile", "own.toml", "--out", "part", "--size", "64")[0] != 0
+    page = (tmp_path / "part" / "index.html").read_text(encoding="utf-8")
+    assert "voile/voile.toml" in page and "own/own.toml" not in page
+
 
 @pytest.mark.external
 def test_the_page_searches_by_weave_and_fibre_and_opens_from_a_folder(tmp_path):
