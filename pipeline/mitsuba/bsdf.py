@@ -7,7 +7,7 @@ Properties are the fields of `pipeline.mitsuba.worn.ClothOptions`. A footprint i
 bounce; the property `pixel_angle`. Components: 0 reflection, 1 transmission, 2 light straight through gaps and yarns
 and past silhouettes, which neither `eval` nor `pdf` knows, because it is a delta lobe (Null). Cloth curves along the
 view ray as the shading normal's derivatives say (`si.dn_du`, `si.dn_dv`), which that integrator sets; it counts as flat
-where they are 0.
+where they are 0. `mi.traverse` offers the colours of the yarns.
 """
 
 from contextvars import ContextVar
@@ -94,8 +94,19 @@ def bsdf_class() -> type[Any]:
             mi.BSDF.__init__(self, props)
             given = {name: props[name] for name in props.keys()}  # noqa: SIM118, not a mapping
             self._worn = Worn(validated(ClothOptions, given, f"bsdf {BSDF}"))
+            self._colours = {name: mi.Color3f(*rgb) for name, rgb in self._worn.colours().items()}
             self.m_components = [reduce(or_, kind, everywhere) for kind in kinds]
             self.m_flags = reduce(or_, self.m_components)
+
+        def traverse(self, callback: Any) -> None:
+            """Offer the colours of the yarns, linear RGB, to `mi.traverse`."""
+            for name, colour in self._colours.items():
+                callback.put(name, colour, mi.ParamFlags.NonDifferentiable)
+
+        def parameters_changed(self, keys: Any = ()) -> None:
+            """Take edited colours; BadInput if yarns would make light."""
+            edited = {name: np.asarray(colour, np.float64).ravel().tolist() for name, colour in self._colours.items()}
+            self._worn = self._worn.dyed(edited)
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             """Return the BSDF times the cosine to wo."""

@@ -14,9 +14,10 @@ Rows are answered in runs of fixed length, on all cores. A method that draws poi
 from the run's own directions: a picture depends on the seed of its rays alone.
 """
 
+import itertools
 import math
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any, Final, NamedTuple
 
@@ -39,7 +40,7 @@ from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import STEEPEST_CURVATURE, Queries
 from weaves.errors import BadInput
 from weaves.fabric import Fabric, load_fabric
-from weaves.validation import Frozen
+from weaves.validation import Frozen, validated
 
 RUN: Final = 2**14  # rows that a thread answers at a time
 
@@ -48,6 +49,7 @@ PIXEL: Final = SceneOptions().pixel_sigma  # standard deviation of a pixel's Gau
 LARGEST_FOOTPRINT: Final = SceneOptions().largest_sigma
 """Both axes of a footprint are cut here, in yarn spacings; where derivatives are not finite, they are this long."""
 
+_COLOURS = ("specular", "diffuse", "diffuse_transmission")
 _KEPT = 2**20  # rows of lobes that are kept for the next call: 250 megabytes
 _TRUTH = TruthOptions(estimator="auto", relative_error=0.1, min_count=64, max_count=256)  # many rays share a pixel
 _LARGEST_ANGLE = SceneOptions().largest_angle
@@ -118,15 +120,31 @@ class RayHits(NamedTuple):
 
 
 class Worn:
-    """A cloth on a shape; BadInput if there is no such fabric or method."""
+    """A cloth on a shape, of a fabric in place of that of the options if one is given.
 
-    def __init__(self, options: ClothOptions) -> None:
+    BadInput if there is no such fabric or method.
+    """
+
+    def __init__(self, options: ClothOptions, fabric: Fabric | None = None) -> None:
         self.options = options
-        self._bsdf = _bsdf(load_fabric(options.fabric), options.method, options.bounces)
+        self._bsdf = _bsdf(fabric or load_fabric(options.fabric), options.method, options.bounces)
         self.fabric = self._bsdf.fabric
         turn = math.radians(options.turn)
         self._turn = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
         self._known: tuple[Queries, list[Lobes]] | None = None
+
+    def colours(self) -> dict[str, Sequence[float]]:
+        """Return the colours of the yarns, linear RGB, by names such as ``warp_diffuse``; none if threads have some."""
+        names = itertools.product(("warp", "weft"), _COLOURS) if self.fabric.colours is None else ()
+        return {f"{yarn}_{kind}": getattr(getattr(self.fabric, yarn), f"{kind}_rgb") for yarn, kind in names}
+
+    def dyed(self, colours: Mapping[str, Sequence[float]]) -> "Worn":
+        """Return the cloth with other colours of its yarns, named as in `colours`; BadInput if they make light."""
+        table = self.fabric.model_dump(mode="json")
+        for name, rgb in colours.items():
+            yarn, _, kind = name.partition("_")
+            table[yarn][kind] = list(rgb)
+        return Worn(self.options, validated(Fabric, table, self.fabric.name))
 
     def eval(self, hits: RayHits, light: Float64) -> Float64:
         """Return the BSDF times the cosine to N lights, linear RGB (N, 3), 1/sr."""

@@ -7,6 +7,7 @@ from pipeline.truth.query import Queries
 from tests.directions import unit
 from tests.pipeline.mitsuba.conftest import CONFIGURATIONS, NEEDS_LLVM, UV, hits_of, worn_of
 from tests.presets import slow
+from weaves.errors import BadInput
 from weaves.fabric import load_fabric
 
 LEVEL = 0.01
@@ -63,6 +64,25 @@ def test_all_bounces_are_added_to_the_values_and_leave_the_density(mi):
 
 
 @pytest.mark.slow
+def test_colours_are_edited_without_a_restart(mi, tmp_path):
+    fabric, sigma, theta, phi = CONFIGURATIONS["front"]
+    bsdf = mi.load_dict({"type": "twillight", "fabric": fabric, "sigma": sigma})
+    parameters, cloth = mi.traverse(bsdf), load_fabric(fabric)
+    assert {"warp_specular", "weft_diffuse", "weft_diffuse_transmission"} < set(parameters.keys())
+    parameters["warp_diffuse"] = mi.Color3f(0.1, 0.3, 0.05)
+    parameters.update()
+    own = cloth.model_copy(update={"name": "own", "warp": cloth.warp.model_copy(update={"diffuse": (0.1, 0.3, 0.05)})})
+    (tmp_path / "own.toml").write_text(own.to_toml(), encoding="utf-8")
+    other = mi.load_dict({"type": "twillight", "fabric": str(tmp_path / "own.toml"), "sigma": sigma})
+    si, context, light = interaction(mi, unit(theta, phi).tolist()), mi.BSDFContext(), unit(40.0, 200.0).tolist()
+    edited, expected = (number(each.eval(context, si, light)) for each in (bsdf, other))
+    np.testing.assert_allclose(edited, expected, rtol=1e-5)
+    assert edited[1] > 1.5 * edited[2]
+    parameters["warp_diffuse"] = mi.Color3f(1.0, 1.0, 1.0)
+    with pytest.raises(BadInput, match="no yarn makes light"):
+        parameters.update()
+
+
 def test_samples_name_their_lobe(mi):
     """Voile at numbers that reach each lobe; the gap's light goes straight on, and has its probability as density."""
     bsdf = mi.load_dict({"type": "twillight", "fabric": "voile", "sigma": 0.5})
