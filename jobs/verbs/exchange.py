@@ -7,6 +7,7 @@ from those of photographs. `export`, `view` and `gallery` write fabrics for othe
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -244,15 +245,15 @@ def encode(
     """
     from pipeline.models.unified_btf.encode import FABRIC_FILE
     from pipeline.models.unified_btf.encode import encode as write
-    from pipeline.shards.sample_file import read_samples
-    from pipeline.storage import place
 
     width, height = _pair("--size", size)
     columns, rows = _pair("--texels", texels, whole=True) if texels else (0, 0)
     grid = (int(columns), int(rows)) if texels else None
-    with Terminal().status("encoding"):
-        write(read_samples(samples, grid), place(model, "--model"), name or out.name, (width, height), out)
-    print_lines(f"twillight render plane --fabric {out / FABRIC_FILE} --method {out} --out {out.name}.png")
+    with Terminal().status("encoding"), named_flags("encode", "encode"):
+        write(samples, grid, Path(model), name or out.name, (width, height), out)
+    folder = str(out) if out.is_absolute() else f"./{out}"
+    shown = shlex.join(["--fabric", f"{folder}/{FABRIC_FILE}", "--method", folder, "--out", f"{out.name}.png"])
+    print_lines(f"twillight render plane {shown}")
 
 
 def _pair(flag: str, text: str, whole: bool = False) -> tuple[float, float]:

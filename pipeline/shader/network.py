@@ -91,7 +91,7 @@ def network_shader(
         allowed = f"the shader takes at most {MOST_ELEMENTS:,} elements of weights"
         raise BadInput("export", "shader", f"{weights.count:,} elements", allowed)
     trained_on, outside = _training(method.domain, fabric)
-    bent = f"a curvature above {packed.curvature:g} as that" if packed.curvature else "curved cloth as flat"
+    bent = f"a larger curvature than {packed.curvature:g} as this one" if packed.curvature else "curved cloth as flat"
     groups = ("front", "curved") if packed.curvature else ("front",)
     names = method.network_of(fabric).columns
     ends, picks = fabric.thread_colours()

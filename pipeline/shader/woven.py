@@ -18,6 +18,7 @@ from weaves.fabric import Fabric
 
 WOVEN: Final = "woven"
 
+_ANGULAR: Final = ("wi.x", "wi.y", "wi.z", "wo.x", "wo.y")
 _LEAKY: Final = f"leaky ReLU, {SLOPE:g}"
 
 
@@ -71,6 +72,13 @@ def _pack(method: Woven, fabric: Fabric, weights: PlacedArrays) -> Packed:
             "OCTAVES": math.log2(options.largest_size / options.smallest_size),
         },
         described,
-        {"first": picture + blobs, "angular": ["fused", "wi.x", "wi.y", "wi.z", "wo.x", "wo.y"]},
-        {"last": f"(exp(x) - 1) / {options.log_k:g} of the specular ones, x of the diffuse; at least 0"},
+        {
+            "first": picture + blobs,
+            "angular": [*(f"fused {n}" for n in range(len(layers["last"].weights))), *_ANGULAR],
+            "harmonics": [f"{wave} of {m} periods" for wave in ("cosine", "sine") for m in range(1, bins)],
+        },
+        {
+            "harmonics": "shares of a periodic Gaussian in the bins, of its cosines and sines times their decay",
+            "last": f"(exp(x) - 1) / {options.log_k:g} of the specular ones, x of the diffuse; at least 0",
+        },
     )

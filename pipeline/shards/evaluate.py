@@ -111,8 +111,8 @@ def evaluate_file(
     """Answer every row of a Parquet file; the result appears whole or not at all.
 
     The file of `queries` has `QUERY_COLUMNS` as float32 or float64, less any of `OPTIONAL`; its other columns are
-    carried along. `out` gets all of them and the answers, named as in a shard. `skip_bad` leaves the answers of bad
-    rows null and lists these beside it (`bad_list`). `progress` receives the finished share.
+    carried along. `out` gets all of them and the answers, named as in a shard; or red, green and blue. `skip_bad`
+    leaves the answers of bad rows null and lists these beside it (`bad_list`). `progress` receives the finished share.
 
     BadInput if a file or folder cannot be used, a column is missing, odd or named as an answer, or a row is bad.
     """
@@ -122,7 +122,10 @@ def evaluate_file(
         raise BadInput("evaluate", "--out", str(out), "must not be the file of the queries")
     with query_file.open_queries(queries) as file, ExitStack() as stack:
         carried, total, repeat = file.schema_arrow, file.metadata.num_rows, fabric.weave.repeat
-        query_file.check_columns(queries, carried)
+        fields = query_file.ANSWERS
+        if answerer.rgb:
+            fields = [pa.field(name, pa.float32()) for name in RGB_COLUMNS]
+        query_file.check_columns(queries, carried, [field.name for field in fields])
         if not skip_bad:
             query_file.refuse_bad(queries, file, repeat, answerer.faults)
         about = {
@@ -133,9 +136,6 @@ def evaluate_file(
             "queries_sha256": file_sha256(queries),
             "left_out": {name: value for name, value in query_file.OPTIONAL.items() if name not in carried.names},
         }
-        fields = query_file.ANSWERS
-        if answerer.rgb:
-            fields = [pa.field(name, pa.float32()) for name in RGB_COLUMNS]
         fields = [field.with_nullable(skip_bad or not answerer.errors) for field in fields]
         facts = {FACTS: json.dumps(about, sort_keys=True).encode()}
         schema = pa.schema([*carried, *fields]).with_metadata((carried.metadata or {}) | facts)

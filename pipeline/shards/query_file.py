@@ -1,7 +1,7 @@
 """Files of a user's queries: read in blocks of bounded size; each fault is one sentence."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -61,10 +61,9 @@ def blocks(path: Path, file: pq.ParquetFile, columns: list[str] | None = None) -
         yield block.combine_chunks()
 
 
-def check_columns(path: Path, schema: pa.Schema) -> None:
-    """Refuse columns that are missing, of another type, there twice, or named as an answer."""
+def check_columns(path: Path, schema: pa.Schema, answers: Collection[str]) -> None:
+    """Refuse columns that are missing, of another type, there twice, or named as one of the answers."""
     where, names = str(path), Counter(schema.names)
-    answers = {field.name for field in ANSWERS}
     if missing := [name for name in QUERY_COLUMNS if name not in names and name not in OPTIONAL]:
         found = f"column{'s' if len(missing) > 1 else ''} {', '.join(missing)} missing"
         needed = ", ".join(name for name in QUERY_COLUMNS if name not in OPTIONAL)

@@ -8,9 +8,8 @@ out, and errors are the relative RMSE of the colour measure (`reports.error`) un
     noise                    by the relative standard deviation of a number of random samples
     interpolation            of the samples themselves, without a network, by their number: the mean of the `_NEAREST`
                              samples whose directions are nearest, weighted by the inverse of their squared distance
-    averaged latents         by the side of a square of texels whose latents are averaged; and, for comparison, the
-                             latent of the averaged samples
-    blended latents          by the share of another fabric; and, for comparison, the latent of the blended samples
+    averaged latents         of squares of texels, by their side; for comparison, latents of averaged samples
+    blended latents          of two fabrics, by the share of the second; for comparison, latents of blended samples
 """
 
 from typing import Any, Final, Protocol

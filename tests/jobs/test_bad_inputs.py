@@ -337,7 +337,7 @@ def test_a_file_with_any_value_at_any_key_is_read_or_one_sentence(place, subject
 
 def read_queries(path):
     with open_queries(path) as file:
-        check_columns(path, file.schema_arrow)
+        check_columns(path, file.schema_arrow, ())
         refuse_bad(path, file, (2, 2))
 
 

@@ -341,7 +341,7 @@ class AtExtremes(Measurement):
 
 
 class Latents(Measurement):
-    """Answers of a model between pairs of presets, and the time of edits; or of an encoder by its samples."""
+    """Answers between pairs of presets, and the time of edits; of an encoder, its errors by the samples it is given."""
 
     kind: Literal["latents"] = "latents"
     timed: ClassVar = True

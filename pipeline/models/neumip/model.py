@@ -25,7 +25,7 @@ the authors' code:
 
     decoder   features 7 + wi.xyz + wo.xyz, 4 octaves of their sines and cosines, 10 of the place's -> 25 -> block ->
               block -> 4
-    block     25 -> 10 | 25 -> 12 -> 12 | 25 -> 3 -> 3, ReLU after each layer
+    block     25 -> 10 | 25 -> 12 -> 12 | 25 -> 3 -> 3, ReLU after each layer; as in their code none before the blocks
 
 ADAPTED: the authors train on pictures, and the kernels of the two longer branches span 3 x 3 and 5 x 5 neighbouring
 queries, those of a 1-layer branch the maximum of 3 x 3. Here a query is answered by itself, so that kernels have their

@@ -64,27 +64,11 @@ class EncoderOptions(BtfOptions):
     """A training step encodes a fabric from a random number of its samples, from this one to all."""
     weights: int = Field(default=32, ge=1, le=512)
     """Weights m of every sample; not published."""
-    head: Literal["components", "rgb"] = "components"
-    """Values of samples and answers: the four components, or linear RGB, as published, in random colours. A network of
-    RGB encodes measured samples too."""
-
     encoder_hidden: ClassVar[int] = 64
     """Width of the encoder's two hidden layers; not published."""
     log_samples: ClassVar[bool] = False
     """The encoder reads the specular samples as they are: these average as the cloth does, and trained as well as
     those in log space."""
-
-    later: ClassVar[tuple[str, ...]] = ()  # parts of a later method
-
-    @property
-    def channels(self) -> int:  # type: ignore[override]
-        """Numbers of a sample or an answer."""
-        return 3 if self.head == "rgb" else 4
-
-    @property
-    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Deviations from the published method, for the page."""
-        return (*((IN_COMPONENTS,) if self.head == "components" else ()), *self.later)
 
     @model_validator(mode="after")
     def _enough_samples(self) -> Self:
@@ -102,6 +86,25 @@ class UnifiedBtfOptions(EncoderOptions):
 
     model: Literal["unified_btf"] = "unified_btf"
     latent: int = Field(default=32, ge=1, le=512)
+    head: Literal["components", "rgb"] = "components"
+    """Values of samples and answers: the four components; or linear RGB, as published, trained in random colours. A
+    network of RGB encodes measured samples too; it has no use for `diffuse_weight`."""
+
+    @property
+    def channels(self) -> int:  # type: ignore[override]
+        """Numbers of a sample or an answer."""
+        return 3 if self.head == "rgb" else 4
+
+    @property
+    def departures(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Deviations from the published method, for the page."""
+        return ("random colours in training, components as colours",) if self.head == "rgb" else (IN_COMPONENTS,)
+
+    @model_validator(mode="after")
+    def _weighs_components(self) -> Self:
+        if self.head == "rgb" and self.diffuse_weight != type(self).model_fields["diffuse_weight"].default:
+            raise ValueError('diffuse_weight needs head = "components": RGB has no diffuse part of its own')
+        return self
 
 
 class BtfAutoencoderOptions(EncoderOptions):
@@ -112,7 +115,7 @@ class BtfAutoencoderOptions(EncoderOptions):
     """
 
     of_one_material: ClassVar[bool] = True
-    later: ClassVar[tuple[str, ...]] = ("the encoder of 2020",)
+    departures: ClassVar[tuple[str, ...]] = (IN_COMPONENTS, "the encoder of 2020")
     seconds: ClassVar[tuple[float, float]] = (1.5e-5, 1.5e-6)
 
     model: Literal["btf_autoencoder"] = "btf_autoencoder"

@@ -1,8 +1,9 @@
 """A material of measured samples as a method: latents that an encoder of RGB made of them, and its decoder.
 
-A black plain weave of two yarns tells renderers where it lies: one yarn spacing is a millimetre of the patch. The
-method answers for that fabric alone, from both sides alike, as flat cloth with round footprints: red, green, blue and
-0, in colours of their own. Light from behind gives 0.
+A black plain weave carries it: its repeat is the patch, in at most `_YARNS` yarns along a side, of about a millimetre
+where that is enough. The method answers for that fabric alone, as flat cloth with round footprints: red, green, blue
+and 0, in colours of their own. With light or viewer behind it answers 0; renderers take a viewer behind for one in
+front.
 """
 
 from collections.abc import Callable
@@ -13,12 +14,13 @@ import torch
 from torch import Tensor
 
 from pipeline.compiled.arrays import Float32
-from pipeline.models.method import in_chunks
+from pipeline.models.method import in_chunks, in_repeat
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 from weaves.validation import validated
 
 MEASURED: Final = "measured"  # key of a card
+_YARNS: Final = 16
 _BLACK: Final = {"bend": 0.0, "roughness": 0.5, "specular": (0.0, 0.0, 0.0), "diffuse": (0.0, 0.0, 0.0)}
 
 
@@ -31,8 +33,10 @@ class MeasuredCloth:
     setting, turns = "", True
 
     def __init__(self, about: dict[str, Any], rgb: Callable[..., Tensor], numbers: int) -> None:
-        self.name, self.size = about["name"], tuple(map(float, about["size"]))
-        self._fabric, self._to_rgb, self._numbers = carrier(self.name), rgb, numbers
+        self.name, (width, height) = about["name"], map(float, about["size"])
+        self._fabric, self._to_rgb, self._numbers = carrier(self.name, (width, height)), rgb, numbers
+        ends, picks = self._fabric.weave.repeat
+        self._spacing = np.float32((width / ends * height / picks) ** 0.5)  # of yarns, millimetres
 
     def covers(self, fabric: Fabric) -> bool:
         """Return whether a fabric is the one that carries the patch."""
@@ -42,7 +46,7 @@ class MeasuredCloth:
         """Do nothing: the samples are encoded."""
 
     def predict(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
-        """Return red, green, blue and 0 of N queries, float32 (N, 4); 0 for light from behind."""
+        """Return red, green, blue and 0 of N queries, float32 (N, 4); 0 if light or viewer is behind."""
         result = np.zeros((len(queries.u), 4), np.float32)
         lit = (queries.wi[:, 2] > 0.0) & (queries.wo[:, 2] > 0.0)
         if lit.any():
@@ -50,10 +54,10 @@ class MeasuredCloth:
         return result
 
     def _rgb(self, queries: Queries) -> Float32:
-        places = zip((queries.u, queries.v), self.size, strict=True)
-        u, v = (np.mod(place.astype(np.float64) / side, 1.0).astype(np.float32) for place, side in places)
+        near = in_repeat(queries, self._fabric.weave.repeat)
+        columns = near.u, near.v, near.sigma * self._spacing, near.wi, near.wo
         with torch.inference_mode():
-            return self._to_rgb(*map(torch.from_numpy, (u, v, queries.sigma, queries.wi, queries.wo))).numpy()
+            return self._to_rgb(*map(torch.from_numpy, columns)).numpy()
 
     def colours(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the colours of its answers, (N, 4, 3)."""
@@ -72,8 +76,11 @@ class MeasuredCloth:
         return 4 * self._numbers
 
 
-def carrier(name: str) -> Fabric:
-    """Return the fabric that carries a measured patch; BadInput if it cannot have this name."""
+def carrier(name: str, size: tuple[float, float]) -> Fabric:
+    """Return the fabric whose repeat is a patch of a width and height in mm; BadInput if it cannot have this name."""
     source = "Measured samples; their model answers in colours of its own, and the weave only gives the scale."
-    table = {"name": name, "source": source, "yarns_per_cm": (10.0, 10.0), "draft": {"family": "plain"}}
+    ends, picks = (2 * min(max(round(side / 2), 1), _YARNS // 2) for side in size)
+    rows = tuple(("#." if pick % 2 else ".#") * (ends // 2) for pick in range(picks))
+    sett = (10.0 * ends / size[0], 10.0 * picks / size[1])
+    table = {"name": name, "source": source, "yarns_per_cm": sett, "draft": {"family": "matrix", "rows": rows}}
     return validated(Fabric, table | {"warp": _BLACK, "weft": _BLACK}, "encode")

@@ -13,7 +13,8 @@ read the same pyramid. In training all texels of a step's fabrics are encoded, e
 samples in random order, and the rows of the data set are the targets.
 
 ADAPTED: values are the four components of unit colour in place of RGB, in and out, the specular ones in log space, so
-that every model is measured alike. With 3 outputs the decoder has the published 38,269 weights. Not published, so
+that every model is measured alike. With 3 outputs, `head = "rgb"`, the decoder has the published 38,269 weights
+(`RgbBtfNetwork`); then measured samples can be encoded (pipeline.models.unified_btf.encode). Not published, so
 chosen here: m, the widths of the encoder, the activations, the loss, the parameterisation of directions. Reflection of
 round footprints only, as published.
 
@@ -479,4 +480,4 @@ def _measured(options: EncoderOptions, about: dict[str, Any], weights: Mapping[s
 
 
 def _encoding(options: EncoderOptions, texels: Sequence[Texels] = ()) -> UnifiedBtfNetwork:
-    return (RgbBtfNetwork if options.head == "rgb" else UnifiedBtfNetwork)(options, texels)
+    return (UnifiedBtfNetwork if options.channels == len(COMPONENTS) else RgbBtfNetwork)(options, texels)

@@ -49,6 +49,17 @@ def write_exr(path, picture):
         file.write(str(path))
 
 
+def test_a_place_on_the_edge_of_a_texel_is_of_the_one_above(tmp_path):
+    columns, _ = samples()
+    for count in (47, 49, 98, 100, 200):
+        for kind in (np.float32, np.float64):
+            u = (np.arange(count) / count).astype(kind)
+            rows = np.resize(np.arange(len(columns["u"])), count)
+            table = {name: values[rows] for name, values in columns.items()} | {"u": u, "v": np.zeros(count)}
+            read = read_samples(write(tmp_path / "a.parquet", table), (count, 1))
+            np.testing.assert_array_equal(read.texel, np.arange(count))
+
+
 def test_pictures_are_the_same_samples_as_their_table(tmp_path):
     """The top row of a picture has the largest v."""
     random, pairs = np.random.default_rng(1), FRONT[::37][:6].reshape(3, 2, 3)
@@ -58,7 +69,7 @@ def test_pictures_are_the_same_samples_as_their_table(tmp_path):
     for number, (picture, pair) in enumerate(zip(pictures, pairs, strict=True)):
         write_exr(tmp_path / f"{number}.exr", picture)
         lines.append(",".join([f"{number}.exr", *map(repr, pair.ravel().tolist())]))
-    (tmp_path / LIST_FILE).write_text("\n".join(lines))
+    (tmp_path / LIST_FILE).write_text("\ufeff" + "\n".join(lines).replace(",", ", "))
     read = read_samples(tmp_path)
     assert read.shape == SHAPE
     sample, row, column = 2, 0, 3
@@ -70,8 +81,16 @@ def test_pictures_are_the_same_samples_as_their_table(tmp_path):
     assert "must be 4 x 3" in refusal(read_samples, tmp_path)
     (tmp_path / "1.exr").write_bytes(b"no picture")
     assert "1.exr" in (sentence := refusal(read_samples, tmp_path)) and "OpenEXR" in sentence
-    (tmp_path / LIST_FILE).write_text("file,wi_x\n0.exr,up")
-    assert "row 0" in refusal(read_samples, tmp_path)
+    listed = (tmp_path / LIST_FILE).read_text()
+    for text, said in (
+        ("file,wi_x\n0.exr,up", "row 0"),
+        (lines[0], "pictures = '0'"),
+        (listed.replace("1.exr", "../1.exr"), "of the same folder"),
+        (listed.replace("1.exr", "9.exr"), "9.exr: does not exist"),
+        ("x" * 200_000, "cannot be read"),
+    ):
+        (tmp_path / LIST_FILE).write_text(text)
+        assert said in refusal(read_samples, tmp_path), said
     (tmp_path / LIST_FILE).unlink()
     assert f"{LIST_FILE}: does not exist" in refusal(read_samples, tmp_path)
 
