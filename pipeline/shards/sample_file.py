@@ -61,9 +61,9 @@ def read_samples(path: Path, texels: tuple[int, int] | None = None) -> MeasuredS
         return _refuse_bad(path, _read_pictures(path))
     if texels is None:
         raise BadInput(str(path), "texels", None, "a table needs the number of texels, such as 64x64")
-    given = read_numbers(path, _columns, _MOST_ROWS, f"at most {_MOST_ROWS:,} samples are read")
     columns, rows = texels
     _refuse_many(path, rows * columns, _MOST_TEXELS, "texels")
+    given = read_numbers(path, _columns, _MOST_ROWS, f"at most {_MOST_ROWS:,} samples are read")
     cells = []
     for name, count in zip(_PLACE, texels, strict=True):
         place = given[name]
