@@ -81,13 +81,13 @@ class OneColour(Fallback):
         return super().colours(fabric, queries.take(first), seed)[back.ravel()]
 
 
-def rendered() -> Any:
+def rendered(size: tuple[int, int] = SIZE) -> Any:
     """Return the picture in linear RGB."""
     loaded = load(SCENE, SceneOptions(environment_directions=9, environment_samples=256, largest_sigma=4.0))
     method = OneColour(*named.loaded("soft_nodes:2", "cover", "method"))
-    rgb = np.empty((*SIZE[::-1], 3), np.float32)
+    rgb = np.empty((*size[::-1], 3), np.float32)
     with ThreadPoolExecutor(cores()) as pool:
-        for part in picture(loaded, method, pool, SIZE):
+        for part in picture(loaded, method, pool, size):
             rgb[shown_at(part)] = part.planes["rgb"]
     return rgb
 
