@@ -63,7 +63,6 @@ def test_all_bounces_are_added_to_the_values_and_leave_the_density(mi):
     np.testing.assert_allclose(number(weight), number(value) / number(density), rtol=1e-3)
 
 
-@pytest.mark.slow
 def test_colours_are_edited_without_a_restart(mi, tmp_path):
     fabric, sigma, theta, phi = CONFIGURATIONS["front"]
     bsdf = mi.load_dict({"type": "twillight", "fabric": fabric, "sigma": sigma})
@@ -83,6 +82,7 @@ def test_colours_are_edited_without_a_restart(mi, tmp_path):
         parameters.update()
 
 
+@pytest.mark.slow
 def test_samples_name_their_lobe(mi):
     """Voile at numbers that reach each lobe; the gap's light goes straight on, and has its probability as density."""
     bsdf = mi.load_dict({"type": "twillight", "fabric": "voile", "sigma": 0.5})
