@@ -297,10 +297,10 @@ def _latents(records: Sequence[Record], frames: Frames, values: Values) -> list[
     if encodings:
         lines = []
         for record in encodings:
-            points = ", ".join(f"{x:g}: {percent(y)}" for x, y in record.curve)
+            points = ", ".join(f"{x:g}: {100.0 * y:.3g}" for x, y in record.curve)
             cells = plain(record.fabric), record.note, points
             lines.append(method_row(record.method, record.setting, map(TableCell, cells)))
-        tables.append(table("encodings", ["method", "fabric", "samples or latents", "errors"], lines, values))
+        tables.append(table("encodings", ["method", "fabric", "samples or latents", "errors, %"], lines, values))
     edits = to_table(record for record in records if record.metric == "encode_time")
     columns = {
         "note": text("edit", lambda row: str(row.note)),

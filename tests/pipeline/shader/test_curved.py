@@ -19,7 +19,7 @@ from weaves.fabric import load_fabric
 FABRIC = load_fabric(CLOTH)
 DESIGNS = {
     "opacity": {"hidden": 18},
-    "grazing": {"silhouette": "grazing", "curvature_input": "root", "directions": "projected", "levels": 1},
+    "grazing": {"silhouette": "grazing", "curvature_input": "linear", "directions": "projected", "levels": 1},
 }
 COVERED = """#include "model.slang"
 StructuredBuffer<float> queries;

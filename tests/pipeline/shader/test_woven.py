@@ -12,7 +12,7 @@ from weaves.fabric import load_fabric
 
 DESIGNS = {
     "local": {"hidden": 24},
-    "published": {"hidden": 20, "one_blob": "plain", "standard": False, "extra_layer": "encoder"},
+    "published": {"hidden": 22, "bins": 4, "one_blob": "plain", "standard": False, "extra_layer": "encoder"},
 }
 # In standard position both are exchanged, the first is mirrored along both axes; the second repeats after 6 x 8 yarns.
 FABRICS = ("cotton_twill", "silk_shantung")

@@ -67,6 +67,8 @@ def of_methods():
     path = denim.model_copy(update={"note": "yarns of satin_8"})
     curve = tuple(zip(SHARES, (0.01, 0.15, 0.2, 0.1, 0.02), strict=True))
     records += [path.of("path_error", 0.2, 64, curve=curve), path.of("reencode_error", 0.2, 64, curve=curve[::-1])]
+    encoded = denim.model_copy(update={"note": "random samples"})
+    records.append(encoded.of("encoding_error", 0.17, 9, curve=((5.0, 0.303), (500.0, 0.17))))
     records.append(denim.model_copy(update={"note": "a colour"}).of("encode_time", 0.25, 25, low=0.24, high=0.31))
     half = Record(method="woven", setting="eager-bf16")
     records.append(half.of("extreme_error", 0.5, 90, curve=((1e-4, 0.5), (1.0, 0.125))))

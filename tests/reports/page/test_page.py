@@ -100,6 +100,7 @@ def test_every_section_shows_its_numbers_and_what_they_are_made_of(folder, page,
     texts = (
         "woven≤16k1,5005.0kB3002a<fast>laptop", "woven.125−0.0300.2501", "50.0%–12.5%––––4.0e-03––3of180✗0",
         "denim→yarnsofsatin8latentsblended1.0%15.0%20.0%10.0%2.0%",
+        "denimrandomsamples5:30.3,500:17",
         "denim→yarnsofsatin8encodedanew2.0%10.0%20.0%15.0%1.0%", "acolour0.25ms0.24…0.31",
         "float32σnear<the>axis0.00e01.00e−61.00e−3000ok", "float64f_tequalΛ5.00e−11.00e−150.00e0001worsterror",
         "denimowen,64points5.00%4.00%3.00%645,0004.2×0.07%", "specularwarp−0.10%0.05%✓", "diffusewarp0.25%0.05%",
