@@ -124,7 +124,7 @@ def _model_answerer(model: str, fabric: Fabric, extrapolate: bool) -> Answerer:
 
     about = {"model": method.name, "setting": method.setting}
     if domain is None:
-        who, rgb = f"the method {method.name} answers", hasattr(method, "colours")
+        who, rgb = f"the method {method.name} answers", hasattr(method, "own_colours")
         return Answerer(answer, about, lambda queries: faults_of(queries, who, kinds) | faults(queries), rgb=rgb)
     about["card"] = read_text(place(model, "--model") / CARD, 8 * MIB, "a model card")
     return Answerer(answer, about, lambda queries: domain.faults(queries, method.name) | faults(queries))

@@ -130,7 +130,7 @@ class Fallback(Around):
 
     def colours(self, fabric: Fabric, queries: Queries, seed: int = 0) -> Float32:
         """Return the colours of the components of N queries, (N, 4, 3): the method's own, or those of footprints."""
-        if own := getattr(self.method, "colours", None):
+        if own := getattr(self.method, "own_colours", None):
             return np.asarray(own(fabric, queries), np.float32)
         return colours_of(fabric, queries).astype(np.float32)
 

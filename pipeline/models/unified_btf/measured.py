@@ -59,7 +59,7 @@ class MeasuredCloth:
         with torch.inference_mode():
             return self._to_rgb(*map(torch.from_numpy, columns)).numpy()
 
-    def colours(self, fabric: Fabric, queries: Queries) -> Float32:
+    def own_colours(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the colours of its answers, (N, 4, 3)."""
         return np.broadcast_to(np.eye(4, 3, dtype=np.float32), (len(queries.u), 4, 3))
 
