@@ -13,9 +13,9 @@ from pipeline.models.runtimes import no_onnx
 from pipeline.models.woven.model import Woven
 from pipeline.shader.descriptor import GOLDEN, Shader, vectors
 from pipeline.shader.languages import ALL, LANGUAGES, ONNX, SOURCE, compiler_for, refuse_unknown, translate
-from pipeline.shader.neumip import BENT, NEUMIP, texture_shader
 from pipeline.shader.soft_nodes import SOFT_NODES, soft_nodes_shader
 from pipeline.shader.tables import wanted_kinds
+from pipeline.shader.textures import CURVED_MODEL, NEUMIP, texture_shader
 from pipeline.shader.woven import WOVEN, woven_shader
 from weaves.errors import BadInput
 from weaves.fabric import Fabric
@@ -100,7 +100,9 @@ def shader_of(model: str | None, fabric: Fabric, level: int | None, kinds: Colle
         raise BadInput("export", "model", model, allowed)
     (method,) = load_model(model_folder(model, "export", "model", [SOFT_NODES]))
     if not isinstance(method, Neumip | Curved | Woven):
-        allowed = f"has no shader; {SOFT_NODES} and the folders of a trained {NEUMIP}, {BENT} or {WOVEN} have one"
+        allowed = (
+            f"has no shader; {SOFT_NODES} and the folders of a trained {NEUMIP}, {CURVED_MODEL} or {WOVEN} have one"
+        )
         raise BadInput("export", "model", model, allowed)
     if not method.covers(fabric):
         raise BadInput("export", "model", model, f"this model was not trained on {fabric.name}")

@@ -346,7 +346,6 @@ class Latents(Measurement):
     kind: Literal["latents"] = "latents"
     timed: ClassVar = True
     code: ClassVar = ("truth", "bench")
-    cost: ClassVar = 10.0
     model: Trained
     presets: tuple[Uncoloured, ...]  # presets of the pairs
     queries: QueryOptions
@@ -361,6 +360,11 @@ class Latents(Measurement):
             if model.is_first and (model.options.blends or model.options.encodes):
                 presets = tuple(map(load_fabric, names)) if model.options.blends else (last, subjects.fabrics[0][0])
                 yield cls(model=model, presets=presets, queries=dataset.queries, truth=dataset.truth)
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one core."""
+        return 60.0 if self.model.options.encodes else 10.0
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure edits, then one pair after the other; or an encoder."""

@@ -15,7 +15,7 @@ from pipeline.shader.tables import PlacedArrays
 from weaves.fabric import Fabric
 
 NEUMIP: Final = "neumip"
-BENT: Final = "curved"
+CURVED_MODEL: Final = "curved"
 
 
 def texture_shader(
@@ -24,7 +24,7 @@ def texture_shader(
     """Return the model for its fabric; BadInput if a level or kinds are wished, or its textures are too large."""
     refuse_wishes(method, level, kinds)
     weights, network = coloured_weights(fabric), method.network_of(fabric)
-    name = BENT if isinstance(network, CurvedNetwork) else NEUMIP
+    name = CURVED_MODEL if isinstance(network, CurvedNetwork) else NEUMIP
     return network_shader(name, method, fabric, weights, _pack(network, weights))
 
 
