@@ -1,7 +1,7 @@
 """Nodes that a footprint of view rays places itself: on lines in the viewer's azimuth, with nothing hidden among them.
 
 A footprint is cut into lines in that azimuth, and what is seen of each piece along a line is one interval (view_rays).
-Gauss's rule is used in it, with the density where the viewer sees each node; across the lines the trapezoidal rule.
+Gauss's rule is used in it, with the density where the viewer sees each node; across the lines the midpoint rule.
 Rays between what is covered and the near end of a piece meet the wall below it: with `SoftNodeTable.rims` they see the
 surface at this end, which is one node.
 """
@@ -63,11 +63,11 @@ def _lines_across(
     along_x = abs(ray.dy) < abs(ray.dx)
     distance = spacing * min(_BETWEEN, _COARSEST * sigma)
     if reach * min(abs(ray.dx), abs(ray.dy)) >= _SMEARED:
-        count = math.ceil(FOOTPRINT_ENDS * sigma / distance)
-        apart = FOOTPRINT_ENDS * sigma / count
-        for j in range(2 * count + 1):
-            lines[0, j], lines[1, j] = (j - count) * apart, apart
-        return 2 * count + 1
+        count = math.ceil(2.0 * FOOTPRINT_ENDS * sigma / distance)
+        apart = 2.0 * FOOTPRINT_ENDS * sigma / count
+        for j in range(count):
+            lines[0, j], lines[1, j] = (j - 0.5 * (count - 1)) * apart, apart
+        return count
     # Along yarns, by Gauss's rule between borders. At w across the azimuth the line has x - w dy, or y + w dx.
     centre, factor, radius = (y, ray.dx, radii[WEFT]) if along_x else (x, -ray.dy, radii[WARP])
     place, stop, n = centre - FOOTPRINT_ENDS * sigma, centre + FOOTPRINT_ENDS * sigma, 0

@@ -32,11 +32,12 @@ NEVER: Final = 1e9  # place that no ray reaches
 NEAREST: Final = 1e-5  # least length between cuts, in yarn spacings
 
 _CREST_STEPS: Final = 8
-_CREST_CLOSE: Final = 1e-2
+_CREST_CLOSE: Final = 0.05  # of a yarn spacing
+_LEAST_LEVEL: Final = 1e-6  # keeps slopes finite
 _ROOT_STEPS: Final = 8
 _THIRDS, _HALVINGS = 16, 24
-_CLOSE: Final = 0.02  # of a deviation: how near the end of an interval is found where something hides the rest,
-_WHERE_IT_ENDS: Final = 0.3  # and where the footprint ends
+_CLOSE: Final = 0.2  # of a deviation: from how near Newton's step finds the end of an interval where it is hidden,
+_WHERE_IT_ENDS: Final = 3.0  # and where the footprint ends
 _0, _HALF = np.float32(0.0), np.float32(0.5)
 _INVERSE_PI = np.float32(1.0 / math.pi)
 
@@ -145,11 +146,14 @@ def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
 
 
 @inlined_fast_kernel
-def seen_at(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float]:
-    """Return to where the point at s is displaced, and a number with the sign of n.o."""
+def seen_at(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float, float]:
+    """Return to where the point at s is displaced, q, and two numbers whose quotient is dq / ds.
+
+    The first has the sign of n.o, the second falls to 0 at the border of the yarn.
+    """
     height, slope, upright = _height_and_slope(curve, s)
     distance, steep = sunk(ray, height)
-    return s - distance, upright * steep + ray.run * slope
+    return s - distance, upright * steep + ray.run * slope, upright * steep
 
 
 @inlined_fast_kernel
@@ -236,14 +240,19 @@ def place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: fl
 
 @inlined_fast_kernel
 def _crest(
-    curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, q_high: float
+    curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, enough: float
 ) -> tuple[float, float]:  # fmt: skip
-    """Return where the displaced place is least (Illinois' method, an error of second order), and this place."""
-    kept, q = 0, q_high
+    """Return where the displaced place is least (Illinois' method), and this place.
+
+    A place behind the crest will do that is displaced to `enough` or farther.
+    """
+    kept, s, q = 0, high, enough
     for _ in range(_CREST_STEPS):
         s = low + (high - low) * at_low / (at_low - at_high)
-        q, at = seen_at(curve, ray, s)
+        q, at, level = seen_at(curve, ray, s)
         if at > 0.0:
+            if q <= enough:
+                break
             high, at_high = s, at
             at_low *= 0.5 if kept > 0 else 1.0
             kept = 1
@@ -251,8 +260,10 @@ def _crest(
             low, at_low = s, at
             at_high *= 0.5 if kept < 0 else 1.0
             kept = -1
-        if high - low < _CREST_CLOSE or abs(at) < _CREST_CLOSE:
-            return s, q
+        step = low + (high - low) * at_low / (at_low - at_high) - s
+        if abs(step) < _CREST_CLOSE:
+            # The slope falls to 0 along the last step.
+            return s + step, q + 0.5 * step * at / max(level, _LEAST_LEVEL)
     return s, q
 
 
@@ -260,14 +271,17 @@ def _crest(
 def _at_place(
     curve: YarnCurve, ray: ViewRay, crest: float, high: float, q_crest: float, q_high: float, target: float, near: float
 ) -> float:  # fmt: skip
-    """Return an s between the crest and `high` that is displaced to `target`, or to a place as `near` as that."""
+    """Return an s between the crest and `high` that is displaced to `target`: Newton's step from a place so `near`."""
     # Displaced places rise between them. Steps are those of parabolas through both ends, level at the first one.
     s = high
     for _ in range(_ROOT_STEPS):
         s = crest + (high - crest) * math.sqrt((target - q_crest) / (q_high - q_crest))
-        q, _ = seen_at(curve, ray, s)
+        q, at, level = seen_at(curve, ray, s)
         if abs(q - target) < near:
-            break
+            # Of the root of the distance from the crest, in which a parabola is a line.
+            over = max(q - q_crest, 0.0)
+            step = 2.0 * (math.sqrt(over * (target - q_crest)) - over) * level / max(at, _LEAST_LEVEL)
+            return min(max(s + step, crest), high)
         if q > target:
             high, q_high = s, q
         else:
@@ -301,12 +315,12 @@ def seen_interval(
     there to `covered` meet the wall below it. It is `covered` if this end faces away from the viewer.
     """
     crest, left, right = low, -FOOTPRINT_ENDS * sigma, FOOTPRINT_ENDS * sigma
-    q_crest, at_low = seen_at(curve, ray, low)
-    q_high, at_high = seen_at(curve, ray, high)
+    q_crest, at_low, _ = seen_at(curve, ray, low)
+    q_high, at_high, _ = seen_at(curve, ray, high)
     if at_low < 0.0:
         if at_high <= 0.0:
             return low, low, 0.0, min(covered, q_high), covered
-        crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, q_high)
+        crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, left)
     q_from, q_to = max(q_crest, left), min(q_high, right, covered)
     start, stop = crest, high
     if q_to > q_from:
