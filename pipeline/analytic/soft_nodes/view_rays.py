@@ -242,11 +242,11 @@ def place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: fl
 def _crest(
     curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, enough: float
 ) -> tuple[float, float]:  # fmt: skip
-    """Return where the displaced place is least (Illinois' method), and this place.
+    """Return where the displaced place is least (by secants), and this place.
 
     A place behind the crest will do that is displaced to `enough` or farther.
     """
-    kept, s, q = 0, high, enough
+    s, q = high, enough
     for _ in range(_CREST_STEPS):
         s = low + (high - low) * at_low / (at_low - at_high)
         q, at, level = seen_at(curve, ray, s)
@@ -254,12 +254,8 @@ def _crest(
             if q <= enough:
                 break
             high, at_high = s, at
-            at_low *= 0.5 if kept > 0 else 1.0
-            kept = 1
         else:
             low, at_low = s, at
-            at_high *= 0.5 if kept < 0 else 1.0
-            kept = -1
         step = low + (high - low) * at_low / (at_low - at_high) - s
         if abs(step) < _CREST_CLOSE:
             # The slope falls to 0 along the last step.

@@ -45,16 +45,16 @@ Answer = Callable[[Fabric, Queries, int], object]  # answers queries about a fab
 _ENDS: Final = (0.03, *SIZE_LIMITS, 10.0)  # of standard deviations, in yarn spacings
 _SIZES: Final = len(_ENDS) - 1
 _MICROSECONDS: Final = [
-    [3.6, 4.4, 4.6, 5.6, 167.0],
-    [3.8, 6.8, 8.4, 11.7, 139.0],
-    [2.5, 5.1, 15.8, 21.5, 75.0],
-    [2.1, 3.0, 4.8, 8.1, 40.0],
-    [0.76, 0.96, 1.4, 2.35, 20.0],
+    [0.73, 1.58, 2.61, 2.91, 3.24, 207.0],
+    [0.80, 2.26, 3.91, 5.06, 6.48, 157.0],
+    [1.28, 1.33, 2.63, 9.13, 12.66, 71.0],
+    [0.93, 0.93, 1.38, 2.36, 4.34, 27.0],
+    [0.34, 0.34, 0.42, 0.63, 1.02, 13.9],
 ]
 USUAL_SECONDS: Final = 1e-6 * np.array(_MICROSECONDS * CASES)
 """Seconds of a query by kind and answer: ratios of processor times, geometric means of denim, twill 4/4 and gauze."""
 
-_TIMED_ROWS: Final = (1024, 1024, 1024, 1024, 64)  # queries a timed call, by answer
+_TIMED_ROWS: Final = (1024, 1024, 1024, 1024, 1024, 64)  # queries a timed call, by answer
 _CALLS: Final = 3  # after one that loads kernels and tables; the fastest counts
 _SEED: Final = 0x5EC5
 _LOCK = Lock()

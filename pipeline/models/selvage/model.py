@@ -79,7 +79,7 @@ class Selvage:
     def choose(
         self, fabric: Fabric, queries: Queries, error: float | None = None, time: float | None = None
     ) -> choice.Chosen:
-        """Return which answer each of N queries gets, (N,): a level of soft nodes by its place, 4 the fallback."""
+        """Return which answer each of N queries gets, (N,): a level of soft nodes by its place, 5 the fallback."""
         refuse_other(queries, f"the method {self.name} answers", ("stretch", "behind", "curvature"))
         refuse_wishes(self.name, error, time)
         kinds = choice.kinds_of(queries)
@@ -103,11 +103,11 @@ class Selvage:
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, float32 (N,), by soft nodes."""
-        return self._nodes[1].transparency(fabric, looks)
+        return self._nodes[NODE_LEVELS.index(2)].transparency(fabric, looks)
 
     def coverage(self, fabric: Fabric, looks: Queries) -> Float32:
         """Return the share of view rays that do not leave curved cloth again, float32 (N,), as soft nodes do."""
-        return self._nodes[1].coverage(fabric, looks)
+        return self._nodes[NODE_LEVELS.index(2)].coverage(fabric, looks)
 
     def bytes_stored(self, fabric: Fabric) -> int:
         """Return the bytes of the tables of all levels and of the errors; all methods share those of the fallback."""
