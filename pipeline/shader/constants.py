@@ -84,8 +84,7 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
     },
     view_rays: {
         "VIEW_HALVINGS": "_HALVINGS",
-        **{n: f"_{n}" for n in ("CREST_STEPS", "CREST_CLOSE", "LEAST_LEVEL", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS")},
-        "THIRDS": "_THIRDS",
+        **{n: f"_{n}" for n in ("CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS", "THIRDS")},
     },
     visibility: {name: f"_{name}" for name in ("NARROWINGS", "STRIP_POINTS", "UPHILL_STEPS")},
     line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING", "NEAR_END": "_NEAR_END"},

@@ -46,7 +46,6 @@ DETAILS: Final = {
 
 USUAL: Final = 2  # the level unless another one is named
 
-
 COLUMNS: Final = 8  # nodes across a yarn: half the width of the vector units
 
 _ALONG = ((1.5, 4), (2.5, 3))  # nodes along a cell of a float shorter than

@@ -33,7 +33,6 @@ NEAREST: Final = 1e-5  # least length between cuts, in yarn spacings
 
 _CREST_STEPS: Final = 8
 _CREST_CLOSE: Final = 0.05  # of a yarn spacing
-_LEAST_LEVEL: Final = 1e-6  # keeps slopes finite
 _ROOT_STEPS: Final = 8
 _THIRDS, _HALVINGS = 16, 24
 _CLOSE: Final = 0.2  # of a deviation: from how near Newton's step finds the end of an interval where it is hidden,
@@ -147,10 +146,7 @@ def _height_and_slope(curve: YarnCurve, s: float) -> tuple[float, float, float]:
 
 @inlined_fast_kernel
 def seen_at(curve: YarnCurve, ray: ViewRay, s: float) -> tuple[float, float, float]:
-    """Return to where the point at s is displaced, q, and two numbers whose quotient is dq / ds.
-
-    The first has the sign of n.o, the second falls to 0 at the border of the yarn.
-    """
+    """Return to where the point at s is displaced, q, and two numbers of quotient dq / ds; the first has n.o's sign."""
     height, slope, upright = _height_and_slope(curve, s)
     distance, steep = sunk(ray, height)
     return s - distance, upright * steep + ray.run * slope, upright * steep
@@ -242,10 +238,7 @@ def place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: fl
 def _crest(
     curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, enough: float
 ) -> tuple[float, float]:  # fmt: skip
-    """Return where the displaced place is least (by secants), and this place.
-
-    A place behind the crest will do that is displaced to `enough` or farther.
-    """
+    """Return where the displaced place is least, by secants, or `enough` or less behind that; and this place."""
     s, q = high, enough
     for _ in range(_CREST_STEPS):
         s = low + (high - low) * at_low / (at_low - at_high)
@@ -259,7 +252,7 @@ def _crest(
         step = low + (high - low) * at_low / (at_low - at_high) - s
         if abs(step) < _CREST_CLOSE:
             # The slope falls to 0 along the last step.
-            return s + step, q + 0.5 * step * at / max(level, _LEAST_LEVEL)
+            return s + step, q + 0.5 * step * at / max(level, NEAREST)
     return s, q
 
 
@@ -276,7 +269,7 @@ def _at_place(
         if abs(q - target) < near:
             # Of the root of the distance from the crest, in which a parabola is a line.
             over = max(q - q_crest, 0.0)
-            step = 2.0 * (math.sqrt(over * (target - q_crest)) - over) * level / max(at, _LEAST_LEVEL)
+            step = 2.0 * (math.sqrt(over * (target - q_crest)) - over) * level / max(at, NEAREST)
             return min(max(s + step, crest), high)
         if q > target:
             high, q_high = s, q

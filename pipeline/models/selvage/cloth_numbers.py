@@ -16,8 +16,8 @@ NODE_LEVELS: Final[tuple[Level, ...]] = (0, 1, 2, 4, 8)
 
 FLOOR: Final = 0.05  # colour added to the colour that errors are relative to: a third of that of a usual cloth
 GREY: Final = np.array([0.3, 0.3, 0.5, 0.5])  # weights of the four components in a grey cloth's colour
-NUMBERS: Final = 6  # numbers of a cloth, the first of them 1
-_PAIRS: Final = ((0, 4), (1, 4), (2, 4), (3, 4), (4, 5))  # of answers
+NUMBERS: Final = len(NODE_LEVELS) + 1  # numbers of a cloth, the first of them 1
+_FINEST: Final = len(NODE_LEVELS) - 1  # answer that the others are compared with
 _ROWS: Final = 2048  # single queries decide fewer numbers of more of them
 _EVERY: Final = 2  # of them is answered by the fallback, which takes longest
 _SEED: Final = 0xC107
@@ -60,9 +60,7 @@ def colours(fabric: Fabric, queries: Queries, every: int = 1) -> Float64:
 
 def numbers_of(colours: Float64) -> Float64:
     """Return the numbers of a cloth with these colours of its answers, (NUMBERS,)."""
-    scale = colours[:, 4] + FLOOR
-    result = np.ones(NUMBERS)
-    for place, (one, other) in enumerate(_PAIRS, 1):
-        squares = np.minimum(((colours[:, one] - colours[:, other]) / scale) ** 2, _MOST)
-        result[place] = np.log(max(np.sqrt(np.nanmean(squares)), _LEAST)) + _MIDDLE
-    return result
+    finest = colours[:, [_FINEST]]
+    squares = np.minimum(((np.delete(colours, _FINEST, axis=1) - finest) / (finest + FLOOR)) ** 2, _MOST)
+    logarithms = np.log(np.maximum(np.sqrt(np.nanmean(squares, axis=0)), _LEAST))
+    return np.append(1.0, logarithms + _MIDDLE)

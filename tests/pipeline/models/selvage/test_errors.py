@@ -27,10 +27,10 @@ DENIM = load_fabric("denim")
 
 def test_the_table_has_a_row_for_every_case_and_a_query_errs_alike_alone_and_among_others():
     table = json.loads(ERROR_TABLE.read_text())
-    assert [len(rows) for rows in table] == [5, 5, 4, 4] and len(table) == CASES
+    assert [len(rows) for rows in table] == [6, 6, 5, 5] and len(table) == CASES
     assert {len(row) for rows in table for row in rows} == {TERMS + (NUMBERS - 1) * len(OF_CLOTH)}
     queries = probes(DENIM, False, False, 16)
-    np.testing.assert_allclose(colours(DENIM, queries)[:, 4], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)
+    np.testing.assert_allclose(colours(DENIM, queries)[:, -1], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)
     # Whatever side the others are lit from; mirrored queries have the same errors.
     front, behind = probes(DENIM, False, False, 20), probes(DENIM, True, True, 20)
     assert set(cases_of(front)) == {0} and set(cases_of(behind)) == {3}
@@ -38,12 +38,12 @@ def test_the_table_has_a_row_for_every_case_and_a_query_errs_alike_alone_and_amo
     np.testing.assert_array_equal(whole, squared_errors(front, coefficients_of(DENIM, False)))
     mirrored = front._replace(wi=front.wi * np.float32([-1, 1, 1]), wo=front.wo * np.float32([-1, 1, 1]))
     np.testing.assert_array_equal(whole, squared_errors(mirrored, coefficients_of(DENIM, True)))
-    assert (squared_errors(behind, coefficients_of(DENIM, True))[:, 4] > 1.0).all(), "no fallback of curved cloth"
+    assert (squared_errors(behind, coefficients_of(DENIM, True))[:, -1] > 1.0).all(), "no fallback of curved cloth"
 
 
 def test_numbers_of_a_cloth_are_differences_of_its_answers_and_find_where_a_level_errs_more():
     """Equal answers have the least number; a difference e times as large adds 1."""
-    same = np.full((10, 5), 0.2)
+    same = np.full((10, 6), 0.2)
     numbers = numbers_of(same)
     assert numbers[0] == 1.0 and (numbers[1:] == numbers[1]).all()
     one, other = same.copy(), same.copy()
@@ -53,18 +53,18 @@ def test_numbers_of_a_cloth_are_differences_of_its_answers_and_find_where_a_leve
     np.testing.assert_array_equal(numbers_of(one)[2:], numbers[2:])
     # Ten times as much as 1 % in one range of sizes; chi-square intervals of 4 deviations.
     queries, random = probes(DENIM, False, False, 4000), np.random.default_rng(3)
-    coefficients = np.zeros((CASES, 5, TERMS + len(SIZES) + 1), np.float32)
+    coefficients = np.zeros((CASES, 6, TERMS + len(SIZES) + 1), np.float32)
     coefficients[..., 0] = np.log(1e-4)
     places = np.searchsorted(SIZES, np.log(np.sqrt(queries.sigma * queries.sigma_minor)))
-    differences = 0.01 * (0.2 + FLOOR) * random.normal(size=(len(places), 4))
+    differences = 0.01 * (0.2 + FLOOR) * random.normal(size=(len(places), 5))
     differences[places == 1, 0] *= 10.0
     found = size_factors(queries, np.column_stack([0.2 + differences, np.full(len(places), 0.2)]), coefficients)
     rows = np.bincount(places)
-    wanted = np.ones((4, len(rows)))
+    wanted = np.ones((5, len(rows)))
     wanted[0, 1] = (100.0 * rows[1] + 16) / (rows[1] + 16)
     assert (np.abs(found / wanted - 1.0) < 4.0 * np.sqrt(2.0 / rows)).all()
     coefficients[..., TERMS:] = np.log(np.vstack([found, np.ones(len(rows))]))
-    expected = squared_errors(queries, coefficients)[:, :4]
+    expected = squared_errors(queries, coefficients)[:, :-1]
     assert expected[places == 1, 0].min() > 50.0 * expected[places == 1, 1].max()
 
 

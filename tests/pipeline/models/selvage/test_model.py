@@ -32,7 +32,7 @@ def test_every_query_gets_the_answer_chosen_by_itself_and_more_time_has_less_err
     for place, level in enumerate(NODE_LEVELS):
         rows = chosen == place
         np.testing.assert_array_equal(answers[rows], SoftNodes(level).predict(DENIM, queries.take(rows)))
-    best = selvage.choose(DENIM, queries, error=1e-6) == 4
+    best = selvage.choose(DENIM, queries, error=1e-6) == len(NODE_LEVELS)
     assert best.any()
     left = selvage.predict(DENIM, queries, 5, error=1e-6)[best]
     np.testing.assert_array_equal(left, fallback_answers(DENIM, queries.take(best), 5))
@@ -58,15 +58,15 @@ def test_every_query_gets_the_answer_chosen_by_itself_and_more_time_has_less_err
 def test_light_from_behind_and_curved_cloth_are_answered_but_another_meaning_of_walls_has_no_fallback(selvage, queries):
     mixed = probes(DENIM, True, True, 40)
     answers = selvage.predict(DENIM, mixed)
-    assert (selvage.choose(DENIM, mixed, error=1e-6) < 4).all(), "soft nodes alone"
+    assert (selvage.choose(DENIM, mixed, error=1e-6) < len(NODE_LEVELS)).all(), "soft nodes alone"
     assert np.isfinite(answers).all() and (answers >= 0).all()
     assert "viewers in front" in refusal(selvage.predict, DENIM, mixed._replace(wo=-mixed.wo))
     options = SelvageOptions(errors=[0.1, 0.025])
     assert [method.setting for method in options.methods()] == ["error 10 %", "error 2.5 %"]
     assert not options.learns and options.single()[1].settings == (0.025,)
     other = Selvage(1e-6, walls="left_out")
-    assert (other.choose(DENIM, queries) < 4).all()
-    chosen = other.choose(DENIM, queries) == 3
+    assert (other.choose(DENIM, queries) < len(NODE_LEVELS)).all()
+    chosen = other.choose(DENIM, queries) == NODE_LEVELS.index(8)
     finest = SoftNodes(8, walls="left_out").predict(DENIM, queries.take(chosen))
     np.testing.assert_array_equal(other.predict(DENIM, queries)[chosen], finest)
 
