@@ -32,7 +32,7 @@ NEVER: Final = 1e9  # place that no ray reaches
 NEAREST: Final = 1e-5  # least length between cuts, in yarn spacings
 
 _CREST_STEPS: Final = 8
-_CREST_CLOSE: Final = 0.05  # of a yarn spacing
+_CREST_CLOSE: Final = 0.01  # yarn spacings that a crest is displaced less than the place before it
 _ROOT_STEPS: Final = 8
 _THIRDS, _HALVINGS = 16, 24
 _CLOSE: Final = 0.2  # of a deviation: from how near Newton's step finds the end of an interval where it is hidden,
@@ -250,9 +250,10 @@ def _crest(
         else:
             low, at_low = s, at
         step = low + (high - low) * at_low / (at_low - at_high) - s
-        if abs(step) < _CREST_CLOSE:
-            # The slope falls to 0 along the last step.
-            return s + step, q + 0.5 * step * at / max(level, NEAREST)
+        # The slope falls to 0 along the step.
+        lower = -0.5 * step * at / max(level, NEAREST)
+        if lower < _CREST_CLOSE:
+            return s + step, q - lower
     return s, q
 
 
