@@ -2,7 +2,7 @@
 
 With a model's value m, the truth's estimate t, its standard error s, and means <.> over queries (pixels) and channels:
 
-MSE measured   <(m - t)^2> in linear RGB of the fabric's own colours: the error the papers report [Chen2024Woven].
+MSE measured   <(m - t)^2> in linear RGB of the fabric's own colours: the paper of `woven` reports one of a picture.
 noise          <s^2>, s the calibrated standard error (`pipeline.truth.calibration`). Components are taken to be
                uncorrelated, s_rgb^2 = sum_j colour_j^2 s_j^2: an approximation, for they share their points; the page
                says how much of an error the noise is.

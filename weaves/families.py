@@ -14,7 +14,7 @@ they turn, which cuts the floats there.
 
 from collections.abc import Sequence
 from math import gcd
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, StrictInt
@@ -25,13 +25,10 @@ from weaves.errors import BadInput
 MOST_WIDTH = LARGEST_REPEAT // 2  # most ends of a stripe of a herringbone, which has two
 
 
-def _listed(value: Any) -> Any:
-    """Let one step be written without brackets."""
-    return (value,) if isinstance(value, int) else value
-
-
 Steps = Annotated[
-    tuple[Annotated[StrictInt, Field(ge=1, le=64)], ...], BeforeValidator(_listed), Field(min_length=1, max_length=16)
+    tuple[Annotated[StrictInt, Field(ge=1, le=64)], ...],
+    BeforeValidator(lambda value: (value,) if isinstance(value, int) else value),  # one step needs no brackets
+    Field(min_length=1, max_length=16),
 ]
 
 

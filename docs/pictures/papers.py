@@ -77,7 +77,7 @@ def tiles(
 
 
 def components_over_directions() -> None:
-    """Components of a plain weave, in unit colour, over viewers, light at 30 degrees [Chen2024Woven, Fig. 1]."""
+    """Components of a plain weave, in unit colour, over viewers, light at 30 degrees [Chen2024Woven]."""
     fabric, (wo, inside) = load_fabric("polyester_lining"), disc(1.0)
     wi = [np.sin(np.pi / 6), 0.0, np.cos(np.pi / 6)]
     found = [answers(method, fabric, (0.5, 0.5), PATCH, [wi] * len(wo), wo)[1] for method in METHODS.values()]

@@ -133,16 +133,15 @@ def _note(
     """Return the page's note on a model; `trainings` are those of its first seed."""
     options, training = model.options, model.training
     kind = "" if options.name == options.model else f"{options.model}: "
-    about = f"{kind}nothing is trained"
+    unlike = f"; unlike the paper: {', '.join(options.departures)}" if options.departures else ""
+    about = f"{kind}nothing is trained{unlike}"
     if isinstance(options, AddedMethod):
         about = f"from outside this package: {options.origin}"
         kind = f"{about}; "
     if trainings:
         first = next(iter(trainings.values()))
         what = "each fabric by itself" if model.options.of_one_material else f"{len(first.fabrics)} fabrics at once"
-        about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries"
-        if options.departures:
-            about += f"; unlike the paper: {', '.join(options.departures)}"
+        about = f"{kind}{what}, {training.steps:,} steps of {training.batch:,} queries{unlike}"
         if model.seeds > 1:
             about += f", {model.seeds} trainings with the seeds {training.seed} to {training.seed + model.seeds - 1}"
         if (trainer := recipe.trainer_of(model)) is not recipe:

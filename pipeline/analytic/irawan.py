@@ -12,7 +12,7 @@ k_a is the share of the cloth that the family covers. With u_h = atan2(h_y, h_z)
 
 so that one u belongs to a v; a second one, where the curve of highlights turns back, is left out.
 
-The authors measured yarns by hand. Here twists and widths are the fabric's; bends are steeper by the relief, and at
+The authors' model has places too. Here twists and widths are the fabric's; bends are steeper by the relief, and at
 least 1 degree; 1/L is averaged over the cells where the yarn is on top. A fit finds beta and the k of both families
 from components in footprints of many yarns. Not here: ends of filaments that are smoothed (the authors' ss), spines
 that are no circle (kappa), noise.

@@ -10,7 +10,7 @@ thread, around t and along t. theta_h = (theta_i + theta_o)/2, theta_d = (theta_
           / cos^2 theta_d
     M   = (1 - u) m_i m_o + u min(m_i, m_o),   m = max(cos phi, 0),   u = exp(-phi_d^2 / (2 (20 degrees)^2))
 
-P is M with psi in place of phi, and g the normal density. The authors measured cylinders. Here a fit finds the k and
+P is M with psi in place of phi, and g the normal density. The authors measured threads. Here a fit finds the k and
 gamma of both families from a fabric's components in footprints of many yarns, and tangents are quantiles of the slopes
 of the visible surface. There is no Fresnel factor, since yarns here have no interface.
 """

@@ -7,7 +7,7 @@ camera is a pinhole, the light directional.
 
 A pixel is a Gaussian of standard deviation `pixel_sigma` pixels. Its image on the tangent plane is the ellipse of the
 matrix J = d(u, v)/d(pixel), found by intersecting neighbouring rays with the tangent plane [Igehy1999RayDifferentials].
-The papers' footprint is round, so sigma = pixel_sigma sqrt|det J| (`geometric_mean`), or pixel_sigma times the larger
+Networks know round footprints, so sigma = pixel_sigma sqrt|det J| (`geometric_mean`), or pixel_sigma times the larger
 singular value (`major`). Local frame of the directions: x along the weft (dp/du), y along the warp (dp/dv), z = normal.
 """
 

@@ -38,7 +38,9 @@ OF_PAPER: Final = "woven"
 PAPER: Final = (4.1, 0.83)
 """How much lower the MSE of the published `OF_PAPER` is, and its time relative to the baseline's [Chen2024Woven]."""
 
-PAPER_SAYS: Final = f"the paper reports {PAPER[0]}× at {PAPER[1]}× without our changes, on its own scene and GPU."
+PAPER_SAYS: Final = (
+    f"the paper reports {PAPER[0]}× at {PAPER[1]}× without our changes, in a picture of its own scene, on a GPU."
+)
 """The same as the end of a sentence on `woven`."""
 
 _FRAME: Final = 1920 * 1080  # queries of a frame, one a pixel

@@ -54,7 +54,7 @@ class MicrocylinderOptions(_FarField):
     """The BRDF of thin cylinders [Sadeghi2013Microcylinder], fitted to each fabric; nothing is trained."""
 
     seconds: ClassVar[tuple[float, float]] = (0.0, 1.5e-6)
-    departures: ClassVar[tuple[str, ...]] = ("fitted to soft nodes in place of measured threads", "no Fresnel factor")
+    departures: ClassVar[tuple[str, ...]] = ("fitted to soft nodes", "no Fresnel factor", "tangents of visible slopes")
 
     model: Literal["microcylinder"] = "microcylinder"
 
@@ -70,8 +70,8 @@ class IrawanOptions(_FarField):
     seconds: ClassVar[tuple[float, float]] = (0.0, 5e-7)
     departures: ClassVar[tuple[str, ...]] = (
         "fitted to soft nodes in place of measured cloth",
-        "spines are circles",
-        "no smoothed ends of filaments, no noise",
+        "the far field alone, one highlight across a yarn",
+        "spines are circles, no smoothed ends of filaments, no noise",
     )
 
     model: Literal["irawan"] = "irawan"

@@ -1,9 +1,9 @@
 """The point model at k points of the footprint, as in a renderer without prefiltering [Jin2022Woven].
 
 The points are independent draws from the footprint's kernel, or the R2 sequence with one random shift a query
-[Roberts2018R2]; the answer is the ratio of the sums over points (pipeline.truth.scattering.point), as [Chen2024Woven]
-modified the baseline. Cheap at k = 1; the error falls as k^(-1/2), with R2 somewhat faster, and what is left shows as
-aliasing. With parallax a point is the first one that a view ray meets, without, a point of the fabric plane.
+[Roberts2018R2]; the answer is the ratio of the sums over points (pipeline.truth.scattering.point). Cheap at k = 1; the
+error falls as k^(-1/2), with R2 somewhat faster, and what is left shows as aliasing. With parallax a point is the first
+one that a view ray meets, without, a point of the fabric plane, as [Chen2024Woven] modified the baseline.
 """
 
 from __future__ import annotations

@@ -81,6 +81,7 @@ class CurvedOptions(TextureOptions):
             "no offset": not self.offset,
             "the root of the curvature as an input": self.curvature_input == "root",
             "how deep the ray dips as an input": self.curvature_input == "touch",
-            "full opacity where it is certain": True,
+            "full opacity where it is certain, from a coarser texture": True,
+            "mean and deviation of a grazing cosine in place of opacity": self.silhouette == "grazing",
         }
         return ("four components in place of RGB", *(change for change, made in changes.items() if made))

@@ -16,7 +16,7 @@ For that variant gaps count as filled, as they do in its truth.
 A row's transparency is another quantity: the share of light that goes straight through the cloth at the points that the
 viewer sees. So the silhouette is learnt from rows of its own (pipeline.shards.silhouettes). ADAPTED as in `neumip`:
 four components, specular ones in log space, counts of texels and steps. The paper has one level and no footprint:
-`levels = 1` is its network.
+`levels = 1` with `curvature_input = "linear"` is nearest to it.
 """
 
 from collections.abc import Mapping, Sequence

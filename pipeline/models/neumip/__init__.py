@@ -24,7 +24,8 @@ class NeumipOptions(TextureOptions):
     def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
         changes = {"no offset": not self.offset, "blind to the curvature it learns from": self.ignore_curvature}
-        return ("four components in place of RGB", *(change for change, made in changes.items() if made))
+        always = "four components in place of RGB", "rates, loss and footprints of our own"
+        return (*always, *(change for change, made in changes.items() if made))
 
     @property
     def kinds(self) -> frozenset[str]:  # type: ignore[override]
@@ -44,7 +45,7 @@ class TriplePlaneOptions(NeumipOptions):
     @property
     def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
-        return (*super().departures, "no silhouettes and no synthesis of larger cloth", "sizes are our own")
+        return (*super().departures, "no silhouettes, no synthesis of larger cloth", "sizes and frame of ours")
 
 
 class HierarchicalOptions(NeumipOptions):
@@ -59,6 +60,6 @@ class HierarchicalOptions(NeumipOptions):
     @property
     def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
-        changes = "blocks of one query in place of a picture", "sines of a place averaged over footprints"
+        changes = "blocks of one query in place of a picture", "sines of a place over footprints, without the place"
         octaves = () if self.octaves == (4, 10) else (f"Fourier inputs of {self.octaves} octaves",)
         return (*super().departures, *changes, "no loss of gradients", *octaves)

@@ -9,7 +9,7 @@ read (pipeline.models.networks.texture); a small perceptron decodes features and
 
 Head and loss are ADAPTED to the four components: the specular ones are learnt in log space as in `woven`, where the
 authors put out RGB as (e^x - 1) times a mask. So are the counts of texels, queries and steps; the published training
-takes 45 minutes of a GPU.
+takes 45 minutes of a GPU for textures of 512 x 512.
 
 `triple_plane` [Xu2025Comprehensive] reads two more textures of 7 features, of the half vector h and of the difference
 vector d, bilinearly at their x and y, and its decoder has no other input:

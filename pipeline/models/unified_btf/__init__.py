@@ -10,6 +10,7 @@ from pipeline.shards.generate import ExtraRows
 from pipeline.truth.options import TruthOptions
 
 IN_COMPONENTS: Final = "four components in place of RGB, in samples and answers"
+ON_ROWS: Final = "trained on rows of all footprints in place of the samples"
 
 
 class BtfOptions(ComponentLossOptions):
@@ -98,7 +99,7 @@ class UnifiedBtfOptions(EncoderOptions):
     @property
     def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
-        return ("random colours in training, components as colours",) if self.head == "rgb" else (IN_COMPONENTS,)
+        return "random colours in training, components as colours" if self.head == "rgb" else IN_COMPONENTS, ON_ROWS
 
     @model_validator(mode="after")
     def _weighs_components(self) -> Self:
@@ -115,7 +116,7 @@ class BtfAutoencoderOptions(EncoderOptions):
     """
 
     of_one_material: ClassVar[bool] = True
-    departures: ClassVar[tuple[str, ...]] = (IN_COMPONENTS, "the encoder of 2020")
+    departures: ClassVar[tuple[str, ...]] = (IN_COMPONENTS, "the encoder of 2020", ON_ROWS)
     seconds: ClassVar[tuple[float, float]] = (1.5e-5, 1.5e-6)
 
     model: Literal["btf_autoencoder"] = "btf_autoencoder"
@@ -130,7 +131,6 @@ class UniversalOptions(BtfOptions):
     """
 
     fixed: ClassVar[tuple[str, ...]] = (*BtfOptions.fixed, "batch", "latent_rate", "rate")
-    departures: ClassVar[tuple[str, ...]] = (IN_COMPONENTS, "the decoder and the samples of 2020")
     seconds: ClassVar[tuple[float, float]] = (1.1e-4, 1.5e-6)
     prepare_seconds: ClassVar[float] = 8.0
 

@@ -14,9 +14,9 @@ samples in random order, and the rows of the data set are the targets.
 
 ADAPTED: values are the four components of unit colour in place of RGB, in and out, the specular ones in log space, so
 that every model is measured alike. With 3 outputs, `head = "rgb"`, the decoder has the published 38,269 weights
-(`RgbBtfNetwork`); then measured samples can be encoded (pipeline.models.unified_btf.encode). Not published, so
-chosen here: m, the widths of the encoder, the activations, the loss, the parameterisation of directions. Reflection of
-round footprints only, as published.
+(`RgbBtfNetwork`); then measured samples can be encoded (pipeline.models.unified_btf.encode). Unknown to us, so
+chosen here: m, the widths of the encoder, the activations, the loss, the parameterisation of directions. Reflection
+only, as published.
 
 A training reads the samples of its fabrics from shards. A fabric that is added to a trained model brings its samples
 with it, as in the paper: computing them is part of the method, and of the time that adding a fabric takes.

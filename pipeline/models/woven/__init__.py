@@ -25,9 +25,9 @@ class WovenOptions(ComponentLossOptions):
     """Width of the decoder's hidden layers."""
     extra_layer: Literal["fusion", "encoder"] = "fusion"
     """Place of one layer `hidden` -> `hidden`. With `encoder` the decoder has the layers of the paper's figure, 70,148
-    parameters. With `fusion` it has 86,660, a number from a note on the paper, and the encoder 16,512 less."""
+    parameters. With `fusion` it has 86,660, which we infer from notes on the paper. Both with `one_blob = "plain"`."""
     map_texels: Literal[16, 32, 64, 128] = 32
-    """Side of the square normal and tangent maps, which hold one repeat; the paper does not say."""
+    """Side of the square normal and tangent maps, which hold one repeat; unknown, one figure of the paper has 512."""
     encoder_channels: int = Field(default=16, ge=4, le=128)
     """Channels after the first convolution of the encoder; they double twice on the way down. Not published."""
     one_blob: Literal["none", "plain", "periodic", "local"] = "local"
@@ -35,7 +35,7 @@ class WovenOptions(ComponentLossOptions):
     the repeat's edge; `local` encodes u and v within their yarn and sees a picture of the repeat from the queried place
     (an own change: see the model)."""
     bins: int = Field(default=8, ge=2, le=64)
-    """One-blob bins for each of u, v and size; the published 24 values are 3 x 8."""
+    """One-blob bins for each of u, v and size; 24 values are published, 3 x 8 is our reading."""
     spatial_fusion: bool = True
     """Merge latent and patch before the directions (the published design); otherwise all enter together."""
     transmission: bool = False
@@ -73,8 +73,12 @@ class WovenOptions(ComponentLossOptions):
             "a random origin in every training step": self.roll,
             "no spatial fusion": not self.spatial_fusion,
             "one layer more in the fusion, one less in the encoder": self.extra_layer == "fusion",
-            "an encoder of the maps with fewer channels": True,
+            f"width {self.hidden}, latents of {self.latent}": (self.hidden, self.latent) != (128, 64),
+            "no light from behind": not self.transmission,
+            "widths and optical thickness as parameters, transparency as an output": self.transmission,
+            "an encoder of the maps of our own": True,
             f"maps of {self.map_texels} texels": True,
+            "Gaussian footprints in place of squares": True,
         }
         return tuple(change for change, made in changes.items() if made)
 

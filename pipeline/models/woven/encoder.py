@@ -5,7 +5,7 @@ and begins at a random yarn in every training step: both are options.
 
 Residual convolutions, padded around the repeat, halve the maps four times; fully connected layers join them with the
 yarns' parameters. With `one_blob = "local"` it gives a picture of the repeat as well, bins x bins numbers, and the
-latent is then the same wherever the repeat begins. The paper's encoder of the maps is larger.
+latent is then the same wherever the repeat begins. The shape of the paper's is unknown.
 """
 
 from __future__ import annotations

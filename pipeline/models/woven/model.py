@@ -10,10 +10,10 @@ answers with the four components, the specular ones in log space:
     angular   + wi xyz + wo xy = 69 -> 128 -> residual -> 64 -> 4
 
 A residual block is two fully connected layers with the skip added before the last activation; a leaky ReLU follows
-every layer, the last one too. Two descriptions of the network differ in the place of one layer 128 -> 128, which is the
-option `extra_layer`: the paper's figure, as we read it, has it in the encoder; a count of 86,660 parameters of the
-decoder, from a note and not from the paper, needs it in the fusion. Not published, so chosen here: the encoder of the
-maps (smaller than theirs, to be trained in minutes), the scale of the size, the training on all mirror images.
+every layer, the last one too. Sources differ on one layer 128 -> 128, the option `extra_layer`: the paper's
+figure gives a decoder of 70,148 parameters; we read a further layer into its encoder. 86,660 parameters, which we infer
+from notes, need it in the fusion. Unknown, so chosen here: the encoder of the maps (the whole network takes about 5 MB
+there and 1.2 MB here), the scale of the size, the training on all mirror images.
 
 Maps and parameters are read in pipeline.models.woven.encoder. OWN CHANGE, `one_blob = "local"`: the encoder also gives
 a picture of the repeat, and the decoder sees it from the queried place (pipeline.models.woven.decoder).
