@@ -16,13 +16,13 @@ MODELS: Final[dict[str, int]] = {
     "curved": 2,
     "point_sampled": 6,
     "prefiltered": 2,
-    "selvage": 12,
-    "soft_nodes": 11,
+    "selvage": 13,
+    "soft_nodes": 12,
     "woven": 2,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
-BOUND: Final = 5  # how the energy bound changes the answers of a network (`pipeline.models.bounded`)
+BOUND: Final = 6  # how the energy bound changes the answers of a network (`pipeline.models.bounded`)
 
 FALLBACK: Final = 12
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
@@ -31,6 +31,6 @@ SCENES: Final = 4  # the shipped scenes, and the queries of any scene
 
 SCENE_BENCH: Final = 5  # measurements in scenes and the files they write (`reports.measure.scene`)
 
-VIEWER: Final = 8  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
+VIEWER: Final = 9  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
 
 EXTREMES: Final = 1  # measurements at extremes (`reports.measure.extremes`)

@@ -83,8 +83,8 @@ _RENAMED: Final[dict[ModuleType, dict[str, str]]] = {
         **{name: f"_{name}" for name in ("DEVIATIONS", "FARTHEST", "STEEP", "SMEARED")},
     },
     view_rays: {
-        "VIEW_HALVINGS": "_HALVINGS",
-        **{n: f"_{n}" for n in ("CREST_STEPS", "CREST_CLOSE", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS", "THIRDS")},
+        "VIEW_HALVINGS": "_HALVINGS", "THIRDS": "_THIRDS",
+        **{n: f"_{n}" for n in ("CREST_STEPS", "CREST_CLOSE", "CREST_NEAR", "ROOT_STEPS", "CLOSE", "WHERE_IT_ENDS")},
     },
     visibility: {name: f"_{name}" for name in ("NARROWINGS", "STRIP_POINTS", "UPHILL_STEPS")},
     line_nodes: {"LINE_VERTICAL": "_VERTICAL", "LINE_GRAZING": "_GRAZING", "NEAR_END": "_NEAR_END"},

@@ -36,7 +36,7 @@ class Detail(NamedTuple):
 
 
 DETAILS: Final = {
-    0: Detail(most=64, along=0.5, parts=1, lines=0.0, spacing=1.3),
+    0: Detail(most=64, along=0.5, parts=1, lines=0.0, spacing=1.8),
     1: Detail(most=64, along=0.5, parts=1, lines=0.25, spacing=1.8),
     2: Detail(most=256, along=1.0, parts=1, lines=0.3, spacing=1.0),
     4: Detail(most=1024, along=1.0, parts=2, lines=0.5, spacing=0.7),

@@ -1,9 +1,9 @@
 """Nodes that a footprint of view rays places itself: on lines in the viewer's azimuth, with nothing hidden among them.
 
 A footprint is cut into lines in that azimuth, and what is seen of each piece along a line is one interval (view_rays).
-Gauss's rule is used in it, with the density where the viewer sees each node; across the lines the midpoint rule.
-Rays between what is covered and the near end of a piece meet the wall below it: with `SoftNodeTable.rims` they see the
-surface at this end, which is one node.
+Gauss's rule is used in it, with the density where the viewer sees each node; across the lines the midpoint rule,
+or Gauss's where they run along yarns. Rays between what is covered and the near end of a piece meet the wall below it:
+with `SoftNodeTable.rims` they see the surface at this end, which is one node.
 """
 
 import math

@@ -32,11 +32,11 @@ NEVER: Final = 1e9  # place that no ray reaches
 NEAREST: Final = 1e-5  # least length between cuts, in yarn spacings
 
 _CREST_STEPS: Final = 8
-_CREST_CLOSE: Final = 0.01  # yarn spacings that a crest is displaced less than the place before it
+_CREST_CLOSE, _CREST_NEAR = 0.01, 0.2  # yarn spacings, deviations: falls of the displaced place that end its search
 _ROOT_STEPS: Final = 8
 _THIRDS, _HALVINGS = 16, 24
 _CLOSE: Final = 0.2  # of a deviation: from how near Newton's step finds the end of an interval where it is hidden,
-_WHERE_IT_ENDS: Final = 3.0  # and where the footprint ends
+_WHERE_IT_ENDS: Final = 1.0  # and where the footprint ends
 _0, _HALF = np.float32(0.0), np.float32(0.5)
 _INVERSE_PI = np.float32(1.0 / math.pi)
 
@@ -236,23 +236,24 @@ def place_of(curve: YarnCurve, ray: ViewRay, low: float, high: float, target: fl
 
 @inlined_fast_kernel
 def _crest(
-    curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, enough: float
+    curve: YarnCurve, ray: ViewRay, low: float, high: float, at_low: float, at_high: float, enough: float, near: float
 ) -> tuple[float, float]:  # fmt: skip
-    """Return where the displaced place is least, by secants, or `enough` or less behind that; and this place."""
-    s, q = high, enough
+    """Return where the displaced place is least, or a place behind that is displaced to `enough` or farther; and it."""
+    # Illinois' method: without halves an end that is kept makes steps far shorter than the way to the crest.
+    kept, s, q = 0, high, enough
     for _ in range(_CREST_STEPS):
         s = low + (high - low) * at_low / (at_low - at_high)
         q, at, level = seen_at(curve, ray, s)
         if at > 0.0:
             if q <= enough:
                 break
-            high, at_high = s, at
+            high, at_high, at_low, kept = s, at, at_low * (0.5 if kept > 0 else 1.0), 1
         else:
-            low, at_low = s, at
+            low, at_low, at_high, kept = s, at, at_high * (0.5 if kept < 0 else 1.0), -1
         step = low + (high - low) * at_low / (at_low - at_high) - s
         # The slope falls to 0 along the step.
         lower = -0.5 * step * at / max(level, NEAREST)
-        if lower < _CREST_CLOSE:
+        if lower < near:
             return s + step, q - lower
     return s, q
 
@@ -271,7 +272,8 @@ def _at_place(
             # Of the root of the distance from the crest, in which a parabola is a line.
             over = max(q - q_crest, 0.0)
             step = 2.0 * (math.sqrt(over * (target - q_crest)) - over) * level / max(at, NEAREST)
-            return min(max(s + step, crest), high)
+            if crest <= s + step <= high:
+                return s + step
         if q > target:
             high, q_high = s, q
         else:
@@ -310,7 +312,7 @@ def seen_interval(
     if at_low < 0.0:
         if at_high <= 0.0:
             return low, low, 0.0, min(covered, q_high), covered
-        crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, left)
+        crest, q_crest = _crest(curve, ray, low, high, at_low, at_high, left, min(_CREST_CLOSE, _CREST_NEAR * sigma))
     q_from, q_to = max(q_crest, left), min(q_high, right, covered)
     start, stop = crest, high
     if q_to > q_from:

@@ -84,4 +84,8 @@ class CurvedOptions(TextureOptions):
             "full opacity where it is certain, from a coarser texture": True,
             "mean and deviation of a grazing cosine in place of opacity": self.silhouette == "grazing",
         }
-        return ("four components in place of RGB", *(change for change, made in changes.items() if made))
+        return (
+            "four components in place of RGB",
+            "rates, loss and sizes of our own",
+            *(change for change, made in changes.items() if made),
+        )

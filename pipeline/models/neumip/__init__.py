@@ -24,7 +24,7 @@ class NeumipOptions(TextureOptions):
     def departures(self) -> tuple[str, ...]:  # type: ignore[override]
         """Deviations from the published method, for the page."""
         changes = {"no offset": not self.offset, "blind to the curvature it learns from": self.ignore_curvature}
-        always = "four components in place of RGB", "rates, loss and footprints of our own"
+        always = "four components in place of RGB", "rates, loss and sizes of footprints of our own"
         return (*always, *(change for change, made in changes.items() if made))
 
     @property

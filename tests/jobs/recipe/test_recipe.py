@@ -17,7 +17,7 @@ def test_recipes_of_the_package_load_and_trade_trains_the_published_woven_as_lon
     recipe = load_recipe("trade")
     published = next(one for one in recipe.models if one.options.name == "woven_published")
     ours = next(one for one in load_recipe("standard").models if one.options.name == "woven")
-    assert "maps of 32 texels" in published.options.departures
+    assert "maps of 32 texels" in published.options.departures and len(published.options.departures) == 4
     assert published.seeds == ours.seeds == 3
     assert published.training == ours.training and recipe.dataset == load_recipe("standard").dataset
 
