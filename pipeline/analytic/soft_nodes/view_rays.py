@@ -272,8 +272,9 @@ def _at_place(
             # Of the root of the distance from the crest, in which a parabola is a line.
             over = max(q - q_crest, 0.0)
             step = 2.0 * (math.sqrt(over * (target - q_crest)) - over) * level / max(at, NEAREST)
-            if crest <= s + step <= high:
-                return s + step
+            inside = min(max(s + step, crest), high)
+            if abs(s + step - inside) < NEAREST:
+                return inside
         if q > target:
             high, q_high = s, q
         else:
