@@ -10,7 +10,7 @@ weight, with a penalty on their squares in units of the columns' root mean squar
     mean(log(m + v) + e^2 / (m + v)) + PENALTY / 2 |coefficients|^2
 
 Patches that are hidden almost wholly are left out: a limit of visibility decides whether the truth is 0 there.
-The table in use was fitted so to 34 cloths (reports/LOG.md).
+The table in use was fitted so to 33 cloths (reports/LOG.md).
 """
 
 import json
