@@ -4,12 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from scipy import special
 
+from pipeline.analytic.soft_nodes import nodes, view_rays
 from pipeline.analytic.soft_nodes.answer import query_sums
 from pipeline.analytic.soft_nodes.components import read_queries
 from pipeline.analytic.soft_nodes.nodes import tabulate
 from pipeline.analytic.soft_nodes.shade import AREA, BARE_AREA, OPEN_DIFFUSE, OPEN_SPECULAR
+from pipeline.analytic.soft_nodes.view_rays import ViewRay
 from pipeline.truth.cloth import cloth_side
+from pipeline.truth.geometry.heightfield import GAP
 from pipeline.truth.options import TruthOptions
 from pipeline.truth.query import Queries
 from pipeline.truth.scattering.point import Choices, directions_of, ray_share
@@ -44,6 +48,39 @@ def test_a_point_sees_what_its_ray_meets(curvature, rims):
     assert met.mean() > (0.99 if rims else 0.9)
     wrong = np.abs(found[met] / area[met] - expected[met] / of_rays[met]).sum(axis=1).max(axis=1)
     assert np.quantile(wrong, 0.97) < 1e-3
+
+
+def test_what_is_seen_of_a_piece_is_what_a_fine_grid_of_the_line_sees():
+    """The Gaussian's mass between both ends, and where the crest hides what lies behind, of pieces on top and beneath.
+
+    Of the worst of 400 random lines. A crest is known to .2 deviations, but seldom is it in the middle of a footprint.
+    """
+    table, random, looked_at = tabulate(load_fabric("denim")), np.random.default_rng(5), 0
+    for p in random.choice(np.flatnonzero(table.pieces[:, nodes.FAMILY] != GAP), 400):
+        sigma = random.choice([0.02, 0.1])
+        turn, run = random.uniform(0.0, 2.0 * np.pi), np.tan(np.radians(random.choice([2.0, 15.0, 40.0, 60.0, 75.0])))
+        ray = ViewRay(np.cos(turn), np.sin(turn), run, 0.0, table.plane, table.lowest)
+        (x_low, x_high, y_low, y_high), own = table.bounds[p, :4].astype(float), random.uniform(0.05, 0.95, 2)
+        x, y = x_low + own[0] * (x_high - x_low), y_low + own[1] * (y_high - y_low)
+        ends = np.sort([[x_low - x, x_high - x] / np.float64(ray.dx), [y_low - y, y_high - y] / np.float64(ray.dy)])
+        low, high = max(ends[:, 0]), min(ends[:, 1])
+        # The line begins where the place at hand is seen at some place of the footprint.
+        at_hand = view_rays.curve_of(table, p, ray, x, y)
+        shift = view_rays.seen_at(at_hand, ray, 0.0)[0] - random.uniform(-2.0, 2.0) * sigma
+        curve = view_rays.curve_of(table, p, ray, x + shift * ray.dx, y + shift * ray.dy)
+        low, high = low - shift, high - shift
+        places = low + (high - low) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 401)))
+        seen = np.array([view_rays.seen_at(curve, ray, s)[0] for s in places])
+        left = -view_rays.FOOTPRINT_ENDS * sigma
+        covered = random.choice([view_rays.NEVER, random.uniform(-1.0, 2.0) * sigma])
+        first, last = max(seen.min(), left), min(seen[-1], -left, covered)
+        start, stop, _, hides, _ = view_rays.seen_interval(curve, ray, low, high, sigma, covered)
+        found = [view_rays.seen_at(curve, ray, s)[0] / sigma for s in (start, stop)]
+        mass = np.diff(special.ndtr(found))[0] if stop > start else 0.0
+        assert mass == pytest.approx(max(np.diff(special.ndtr([first / sigma, last / sigma]))[0], 0.0), abs=0.05)
+        assert max(hides, left) == pytest.approx(max(min(covered, seen.min()), left), abs=0.3 * sigma)
+        looked_at += last > first
+    assert looked_at > 200
 
 
 def test_a_thin_ellipse_covers_what_its_gaussian_covers():
