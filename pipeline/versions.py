@@ -16,21 +16,21 @@ MODELS: Final[dict[str, int]] = {
     "curved": 2,
     "point_sampled": 6,
     "prefiltered": 2,
-    "selvage": 13,
-    "soft_nodes": 12,
+    "selvage": 14,
+    "soft_nodes": 13,
     "woven": 2,
 }
 """A model's network, features and answers, by the name of its folder. A model that is not listed has version 1."""
 
-BOUND: Final = 6  # how the energy bound changes the answers of a network (`pipeline.models.bounded`)
+BOUND: Final = 7  # how the energy bound changes the answers of a network (`pipeline.models.bounded`)
 
-FALLBACK: Final = 12
+FALLBACK: Final = 13
 """Answers in scenes to queries that a method was not trained on: by itself, or by `pipeline.models.fallback`."""
 
 SCENES: Final = 4  # the shipped scenes, and the queries of any scene
 
 SCENE_BENCH: Final = 5  # measurements in scenes and the files they write (`reports.measure.scene`)
 
-VIEWER: Final = 9  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
+VIEWER: Final = 10  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
 
 EXTREMES: Final = 1  # measurements at extremes (`reports.measure.extremes`)

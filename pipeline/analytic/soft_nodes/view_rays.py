@@ -254,7 +254,7 @@ def _crest(
         # The slope falls to 0 along the step.
         lower = -0.5 * step * at / max(level, NEAREST)
         if lower < near:
-            return s + step, q - lower
+            return s, q - lower
     return s, q
 
 
