@@ -119,6 +119,15 @@ class RayHits(NamedTuple):
     bend: Float64  # curvature of the surface that way, 1/length; 0 if it is flat or not known, (N,)
 
 
+class _Known(NamedTuple):
+    """Hits, and what was computed of them."""
+
+    hits: RayHits
+    looks: Queries  # footprints and viewers, lit from the viewer
+    covered: Float32  # share of view rays that do not leave the cloth again, (N,)
+    lobes: list[Lobes]  # of each run; empty until they are needed
+
+
 class Worn:
     """A cloth on a shape, of a fabric in place of that of the options if one is given.
 
@@ -131,7 +140,7 @@ class Worn:
         self.fabric = self._bsdf.fabric
         turn = math.radians(options.turn)
         self._turn = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-        self._known: tuple[Queries, list[Lobes]] | None = None
+        self._known: _Known | None = None
 
     def colours(self) -> dict[str, Sequence[float]]:
         """Return the colours of the yarns, linear RGB, by names such as ``warp_diffuse``; none if threads have some."""
@@ -159,7 +168,7 @@ class Worn:
     def sample(self, hits: RayHits, random: Float64) -> Sample:
         """Draw a direction to the light for each hit, from random numbers (N, 3) in [0, 1)."""
         numbers = np.split(random, range(RUN, len(random), RUN))
-        runs = zip(_runs(self._looks(hits)), numbers, self._lobes(hits), strict=True)
+        runs = zip(_runs(self._seen(hits).looks), numbers, self._lobes(hits), strict=True)
         tasks = [(looks, drawn, lobes, _seed(looks.u, drawn)) for looks, drawn, lobes in runs]
         parts = on_all_cores(self._bsdf.sample, tasks)
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -168,36 +177,43 @@ class Worn:
         covered = self.coverage(hits)
         if (covered < 1.0).any():
             weight *= covered[:, None]
-            weight[straight] = (self.transparency(hits)[straight] / pdf[straight])[:, None]
+            weight[straight] += ((1.0 - covered) / pdf)[straight, None]
         return Sample(light.astype(np.float32), pdf, straight, weight)
 
     def transparency(self, hits: RayHits) -> Float32:
         """Return the light straight through the cloth or past a silhouette, to the viewer of each hit, (N,)."""
-        covered = self.coverage(hits)
-        through = _asked(partial(self._bsdf.method.transparency, self.fabric), self._looks(hits))
+        _, looks, covered, _ = self._seen(hits)
+        through = _asked(partial(self._bsdf.method.transparency, self.fabric), looks)
         return np.asarray(1.0 - covered + covered * through)
 
     def coverage(self, hits: RayHits) -> Float32:
         """Return the share of view rays that do not leave the cloth again, (N,)."""
-        result = np.ones(len(hits.uv), np.float32)
-        looks = self._looks(hits)
-        if (curved := np.flatnonzero(looks.curvature)).size:
-            wo = _turned(hits.viewer[curved], self._turn.T).astype(np.float32)
-            along = looks.take(curved)._replace(wi=wo, wo=wo)
-            result[curved] = _asked(partial(self._bsdf.method.coverage, self.fabric), along)
-        return result
+        return self._seen(hits).covered
+
+    def _seen(self, hits: RayHits) -> _Known:
+        """Return what is known of hits; a renderer asks several times about the same ones."""
+        known = self._known
+        if known is None or not (known.hits is hits or all(map(np.array_equal, known.hits, hits))):
+            looks, covered = self._looks(hits), np.ones(len(hits.uv), np.float32)
+            if (curved := np.flatnonzero(looks.curvature)).size:
+                wo = _turned(hits.viewer[curved], self._turn.T).astype(np.float32)
+                along = looks.take(curved)._replace(wi=wo, wo=wo)
+                covered[curved] = _asked(partial(self._bsdf.method.coverage, self.fabric), along)
+            known = _Known(hits, looks, covered, [])
+            self._known = known if len(covered) <= _KEPT else None
+        return known
 
     def _queries(self, hits: RayHits, light: Float64) -> Queries:
         towards = _turned(light, self._turn.T)
         # A light in the plane has no answer; it counts as dark (`_lit`).
         towards[:, 2] = np.where(np.abs(towards[:, 2]) < _FLAT, _FLAT, towards[:, 2])
-        return self._looks(hits)._replace(wi=towards.astype(np.float32))
+        return self._seen(hits).looks._replace(wi=towards.astype(np.float32))
 
     def _looks(self, hits: RayHits) -> Queries:
         """Return the footprint and viewer of each hit as queries, lit from the viewer."""
         own = (self.options.yarns, self.options.yarns_v or self.options.yarns)
         yarns = np.stack([np.ones_like(hits.handed), hits.handed], axis=-1) * own
-        place = (hits.uv * yarns) @ self._turn.T
+        place = _turned(hits.uv * yarns, self._turn.T)
         facing = np.einsum("ni,ni->n", hits.outward, hits.viewer)
         side = np.where(np.where(facing == 0.0, hits.viewer[:, 2], facing) < 0.0, -1.0, 1.0)
         wo = tilted(_turned(hits.viewer, self._turn.T), side, _LARGEST_ANGLE).astype(np.float32)
@@ -217,7 +233,7 @@ class Worn:
         if self.options.sigma is not None:
             return _round_footprints(np.full(len(hits.uv), self.options.sigma))
         traced = np.asarray(hits.jacobian.any(axis=(1, 2)))
-        of_rays = footprints_of(self._turn @ (hits.jacobian * yarns[..., None]))
+        of_rays = footprints_of(_turned(hits.jacobian * yarns[..., None], self._turn.T))
         if traced.all():
             return of_rays
         if self.options.pixel_angle is None:
@@ -229,25 +245,26 @@ class Worn:
         return sigma, sigma_minor, angle
 
     def _lobes(self, hits: RayHits) -> list[Lobes]:
-        """Return the lobes of each run; those of the last call if its hits were the same."""
-        looks, known = self._looks(hits), self._known
-        if known is not None and all(map(np.array_equal, known[0], looks)):
-            return known[1]
+        """Return the lobes of each run."""
+        _, looks, covered, known = self._seen(hits)
+        if known:
+            return known
         lobes = on_all_cores(self._bsdf.lobes, [(run,) for run in _runs(looks)])
-        covered = self.coverage(hits)
         for start, run in zip(range(0, len(covered), RUN), lobes, strict=True) if (covered < 1.0).any() else ():
             share = covered[start : start + RUN, None]
             run.flakes[:, [SHARE, HEIGHT]] *= share[:, None]
             run.rest[:] *= share
             run.rest[:, STRAIGHT] += 1.0 - share[:, 0]
-        self._known = (looks, lobes) if len(looks.u) <= _KEPT else None
+        known[:] = lobes
         return lobes
 
 
-def _turned(direction: Float64, turn: Float64) -> Float64:
-    """Return directions, (N, 3), turned about z by a matrix, (2, 2)."""
-    result = direction.copy()
-    result[:, :2] = direction[:, :2] @ turn
+def _turned(vectors: Float64, turn: Float64) -> Float64:
+    """Return vectors, (N, 2) or (N, 3), or pairs of rows (N, 2, 2), turned about z by a matrix, (2, 2)."""
+    result = vectors.copy()
+    # A product of matrices this small would take ten times as long.
+    for axis in range(2):
+        result[:, axis] = vectors[:, 0] * turn[0, axis] + vectors[:, 1] * turn[1, axis]
     return result
 
 

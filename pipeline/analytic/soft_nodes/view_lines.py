@@ -294,7 +294,8 @@ def _place_line(
                 slit_from = max(slit_from, cleared)
             stops[kind] = k
             continue
-        if stop <= start or k >= limit:
+        # Nodes of no length would count as a rim.
+        if stop - start < NEAREST or k >= limit:
             continue
         count = 1 + int(max((stop - start + NEAREST) / _LENGTH, seen / (_DEVIATIONS * sigma)) / table.spacing)
         count = min(count, MOST_GAUSS)
