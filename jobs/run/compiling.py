@@ -52,10 +52,12 @@ def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
     for task in tasks:
         for name in _estimators(task):
             groups[name] = KernelGroup(name)
-        for options in _models(task):
-            # The value of the parameter is an argument of the same kernels.
-            key = options.model_dump_json(exclude={"name", options.parameter})
-            groups.setdefault(key, KernelGroup(options.name, options))
+        for options in task.held(Options):
+            if not options.learns and options.model != "added":  # code from outside runs in a process of its own
+                # The value of the parameter is an argument of the same kernels.
+                first = options.single()[0]
+                key = first.model_dump_json(exclude={"name", first.parameter})
+                groups.setdefault(key, KernelGroup(first.name, first))
     order = {name: place for place, name in enumerate(_LONGEST_FIRST)}
     return sorted(groups.values(), key=lambda group: order.get(group.name, len(order)))
 
@@ -66,10 +68,3 @@ def _estimators(task: Task) -> Iterator[str]:
         yield "owen" if truth.estimator in ("mc", "r2") else truth.estimator
     if "fallback" in task.versions():
         yield from ("node_table", "owen")  # which answer queries outside the domain of a method
-
-
-def _models(task: Task) -> Iterator[Options]:
-    """Yield the models without training that a task names, with the first value of their parameter alone."""
-    for options in task.held(Options):
-        if not options.learns and options.model != "added":  # code from outside runs in a process of its own
-            yield options.single()[0]

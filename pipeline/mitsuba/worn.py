@@ -119,13 +119,8 @@ class RayHits(NamedTuple):
     bend: Float64  # curvature of the surface that way, 1/length; 0 if it is flat or not known, (N,)
 
 
-class _Known(NamedTuple):
-    """Hits, and what was computed of them."""
-
-    hits: RayHits
-    looks: Queries  # footprints and viewers, lit from the viewer
-    covered: Float32  # share of view rays that do not leave the cloth again, (N,)
-    lobes: list[Lobes]  # of each run; empty until they are needed
+_Known = tuple[RayHits, Queries, Float32, list[Lobes]]
+"""Hits, their footprints and viewers, the shares of rays that do not leave the cloth again, and the runs' lobes."""
 
 
 class Worn:
@@ -162,19 +157,18 @@ class Worn:
 
     def pdf(self, hits: RayHits, light: Float64) -> Float32:
         """Return the density with which `sample` draws N lights, (N,), 1/sr."""
-        tasks = zip(_runs(self._queries(hits, light)), self._lobes(hits), strict=True)
+        tasks = zip(_runs(self._queries(hits, light)), self._seen(hits)[3], strict=True)
         return np.concatenate(on_all_cores(self._bsdf.pdf, list(tasks)))
 
     def sample(self, hits: RayHits, random: Float64) -> Sample:
         """Draw a direction to the light for each hit, from random numbers (N, 3) in [0, 1)."""
-        numbers = np.split(random, range(RUN, len(random), RUN))
-        runs = zip(_runs(self._seen(hits).looks), numbers, self._lobes(hits), strict=True)
+        _, looks, covered, lobes = self._seen(hits)
+        runs = zip(_runs(looks), np.split(random, range(RUN, len(random), RUN)), lobes, strict=True)
         tasks = [(looks, drawn, lobes, _seed(looks.u, drawn)) for looks, drawn, lobes in runs]
         parts = on_all_cores(self._bsdf.sample, tasks)
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
         light = np.where(straight[:, None], -hits.viewer, _turned(wi.astype(np.float64), self._turn))
         weight[~straight & ~_lit(hits, light)] = 0.0
-        covered = self.coverage(hits)
         if (covered < 1.0).any():
             weight *= covered[:, None]
             weight[straight] += ((1.0 - covered) / pdf)[straight, None]
@@ -188,18 +182,24 @@ class Worn:
 
     def coverage(self, hits: RayHits) -> Float32:
         """Return the share of view rays that do not leave the cloth again, (N,)."""
-        return self._seen(hits).covered
+        return self._seen(hits)[2]
 
     def _seen(self, hits: RayHits) -> _Known:
-        """Return what is known of hits; a renderer asks several times about the same ones."""
+        """Return what is known of hits; a renderer calls several times with the same ones."""
         known = self._known
-        if known is None or not (known.hits is hits or all(map(np.array_equal, known.hits, hits))):
+        if known is None or not (known[0] is hits or all(map(np.array_equal, known[0], hits))):
             looks, covered = self._looks(hits), np.ones(len(hits.uv), np.float32)
             if (curved := np.flatnonzero(looks.curvature)).size:
                 wo = _turned(hits.viewer[curved], self._turn.T).astype(np.float32)
                 along = looks.take(curved)._replace(wi=wo, wo=wo)
                 covered[curved] = _asked(partial(self._bsdf.method.coverage, self.fabric), along)
-            known = _Known(hits, looks, covered, [])
+            lobes = on_all_cores(self._bsdf.lobes, [(run,) for run in _runs(looks)])
+            for start, run in zip(range(0, len(covered), RUN), lobes, strict=True) if (covered < 1.0).any() else ():
+                share = covered[start : start + RUN, None]
+                run.flakes[:, [SHARE, HEIGHT]] *= share[:, None]
+                run.rest[:] *= share
+                run.rest[:, STRAIGHT] += 1.0 - share[:, 0]
+            known = (hits, looks, covered, lobes)
             self._known = known if len(covered) <= _KEPT else None
         return known
 
@@ -207,7 +207,7 @@ class Worn:
         towards = _turned(light, self._turn.T)
         # A light in the plane has no answer; it counts as dark (`_lit`).
         towards[:, 2] = np.where(np.abs(towards[:, 2]) < _FLAT, _FLAT, towards[:, 2])
-        return self._seen(hits).looks._replace(wi=towards.astype(np.float32))
+        return self._seen(hits)[1]._replace(wi=towards.astype(np.float32))
 
     def _looks(self, hits: RayHits) -> Queries:
         """Return the footprint and viewer of each hit as queries, lit from the viewer."""
@@ -243,20 +243,6 @@ class Worn:
         round_size = _round_footprints(np.nan_to_num(width, nan=LARGEST_FOOTPRINT))
         sigma, sigma_minor, angle = (np.where(traced, a, b) for a, b in zip(of_rays, round_size, strict=True))
         return sigma, sigma_minor, angle
-
-    def _lobes(self, hits: RayHits) -> list[Lobes]:
-        """Return the lobes of each run."""
-        _, looks, covered, known = self._seen(hits)
-        if known:
-            return known
-        lobes = on_all_cores(self._bsdf.lobes, [(run,) for run in _runs(looks)])
-        for start, run in zip(range(0, len(covered), RUN), lobes, strict=True) if (covered < 1.0).any() else ():
-            share = covered[start : start + RUN, None]
-            run.flakes[:, [SHARE, HEIGHT]] *= share[:, None]
-            run.rest[:] *= share
-            run.rest[:, STRAIGHT] += 1.0 - share[:, 0]
-        known[:] = lobes
-        return lobes
 
 
 def _turned(vectors: Float64, turn: Float64) -> Float64:

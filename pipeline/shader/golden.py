@@ -244,7 +244,8 @@ def _steady(read: Answering, queries: Queries, rng: np.random.Generator, digits:
     steps = {name: np.maximum(place, np.spacing(getattr(queries, name))) for name in ("u", "v")}
     steps |= {name: digits * np.spacing(getattr(queries, name)) for name in ("sigma", "sigma_minor")}
     for _ in range(_TRIALS):
-        moved = queries._replace(**{name: _moved(getattr(queries, name), rng, step) for name, step in steps.items()})
+        moves = {name: np.where(rng.random(len(answer)) < 0.5, -step, step) for name, step in steps.items()}
+        moved = queries._replace(**{name: getattr(queries, name) + move for name, move in moves.items()})
         change = np.maximum(change, (np.abs(read(moved) - answer) / span).max(axis=1))
     return np.asarray(change <= STEADY), answer
 
@@ -253,8 +254,3 @@ def turning(queries: Queries, depth: float) -> Mask:
     """Return which view rays over curved cloth turn down to a depth below the reference plane, (N,)."""
     square = np.square(queries.wo.astype(np.float64))
     return np.asarray(square[:, 2] < 2.0 * queries.curvature * (square[:, 0] + square[:, 1]) * depth)
-
-
-def _moved(values: Float32, rng: np.random.Generator, step: Float32) -> Float32:
-    """Return numbers a step above or below, at random."""
-    return values + np.where(rng.random(len(values)) < 0.5, -step, step)
