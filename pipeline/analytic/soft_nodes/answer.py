@@ -43,7 +43,7 @@ def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32
     wi, wo, curvature = (np.ascontiguousarray(part, np.float32) for part in (looks.wi, looks.wo, looks.curvature))
     result = np.zeros((len(wi), table.kinds.sum(), NODE_SUMS), np.float32)
     gaps = np.zeros(len(wi), np.float32)
-    # Compiled for each kind of nodes alone: in one kernel both together took a tenth more time.
+    # Compiled for each kind of nodes alone: one kernel for both took a tenth more time.
     for lines in (True, None) if table.view_lines > 0.0 else (None,):
         _sum_rows(table, scratch_for(table), footprints(queries), wi, wo, curvature, lines, result, gaps)
     return result, gaps
