@@ -110,15 +110,24 @@ def bsdf_class() -> type[Any]:
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             """Return the BSDF times the cosine to wo."""
-            return self._evaluated(ctx, si, wo, active, values=True, density=False)[0]
+            return self.eval_pdf(ctx, si, wo, active)[0]
 
         def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             """Return the density with which `sample` draws wo, 1/sr."""
-            return self._evaluated(ctx, si, wo, active, values=False, density=True)[1]
+            return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             """Return `eval` and `pdf`."""
-            return self._evaluated(ctx, si, wo, active, values=True, density=True)
+            if _recorded():
+                return mi.Spectrum(0.0), mi.Float(0.0)
+            columns, rows, hits = _hits(si, active, wo)
+            light = columns.vector(wo)[rows]
+            rgb, pdf = np.zeros((len(rows), 3)), np.zeros(len(rows))
+            if len(rows):
+                kept = enabled(ctx, _component(hits, light))
+                rgb = np.where(kept[:, None], self._worn.eval(hits, light), 0.0)
+                pdf = np.where(kept, self._worn.pdf(hits, light), 0.0)
+            return columns.to_mitsuba(mi.Spectrum, rgb, rows), columns.to_mitsuba(mi.Float, pdf, rows)
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
             """Draw a direction; return it and the BSDF times its cosine, over its density."""
@@ -148,20 +157,6 @@ def bsdf_class() -> type[Any]:
         def to_string(self) -> str:
             """Return the properties as text."""
             return f"{BSDF}[{self._worn.options}]"
-
-        def _evaluated(self, ctx: Any, si: Any, wo: Any, active: Any, values: bool, density: bool) -> tuple[Any, Any]:
-            if _recorded():
-                return mi.Spectrum(0.0), mi.Float(0.0)
-            columns, rows, hits = _hits(si, active, wo)
-            light = columns.vector(wo)[rows]
-            rgb, pdf = np.zeros((len(rows), 3)), np.zeros(len(rows))
-            if len(rows):
-                kept = enabled(ctx, _component(hits, light))
-                if values:
-                    rgb = np.where(kept[:, None], self._worn.eval(hits, light), 0.0)
-                if density:
-                    pdf = np.where(kept, self._worn.pdf(hits, light), 0.0)
-            return columns.to_mitsuba(mi.Spectrum, rgb, rows), columns.to_mitsuba(mi.Float, pdf, rows)
 
     return Twillight
 

@@ -17,6 +17,7 @@ from pipeline.compiled.float32 import remaining
 
 RESOLVED: Final = 0.12  # least deviation whose density fixed nodes resolve; narrower footprints are widened to it
 
+_TAIL = np.float32(5.0)
 _REACH = np.float32(2.6)  # deviations at which a footprint is cut off; 1 % of it lies beyond
 _CHEAPER: Final = 4.0  # time of a line of nodes in a loop over cells, over that in one over all nodes
 _SHORTEST_RUN = np.float32(1e-6)
@@ -165,9 +166,14 @@ def displaced_weights(table: SoftNodeTable, scratch: Scratch, look: SoftQuery) -
                     first, last = group[START], group[START] + COLUMNS * group[LINES]
                     _add_products(scratch.across[end, first:], scratch.along[pick, first:], of_nodes[first:last])
     else:
+        # At each y a slanted footprint is thin in x: cells beyond `_TAIL` deviations hold less than 1e-5 of it.
+        lean, side = look.rho * dx / dy, _TAIL * dx * np.sqrt(_1 - look.rho * look.rho)
         for row in range(first_row, last_row + 1):
             middle_y = np.float32(look.y - row)
-            for column in range(first_column, last_column + 1):
+            below, above = lean * (_REACH * dy - middle_y - y_high), lean * (_1 - _REACH * dy - middle_y - y_low)
+            first = math.floor(look.x + min(below, above) - side + x_low + _REACH * dx)
+            last = math.floor(look.x + max(below, above) + side + x_high - _REACH * dx)
+            for column in range(max(first_column, first), min(last_column, last) + 1):
                 middle_x = np.float32(look.x - column)
                 cell = (row % picks) * ends + column % ends
                 for c in range(table.group_starts[cell], table.group_starts[cell + 1]):
