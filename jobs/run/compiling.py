@@ -54,10 +54,10 @@ def kernel_groups(tasks: Iterable[Task]) -> list[KernelGroup]:
             groups[name] = KernelGroup(name)
         for options in task.held(Options):
             if not options.learns and options.model != "added":  # code from outside runs in a process of its own
-                # The value of the parameter is an argument of the same kernels.
-                first = options.single()[0]
-                key = first.model_dump_json(exclude={"name", first.parameter})
-                groups.setdefault(key, KernelGroup(first.name, first))
+                # The value of the parameter is an argument of the same kernels; the first level may not need all.
+                last = options.single()[-1]
+                key = last.model_dump_json(exclude={"name", last.parameter})
+                groups.setdefault(key, KernelGroup(last.name, last))
     order = {name: place for place, name in enumerate(_LONGEST_FIRST)}
     return sorted(groups.values(), key=lambda group: order.get(group.name, len(order)))
 

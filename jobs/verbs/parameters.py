@@ -32,10 +32,6 @@ def _added(type_: object, tokens: Sequence[Token]) -> list[str]:
     return [str(Path(each.value) / FORM) if each.keyword == "--answers" else each.value for each in tokens]
 
 
-def _whole(type_: object, tokens: Sequence[Token]) -> int:
-    return int(tokens[0].value)  # cyclopts itself rounds 1.5 to 2
-
-
 @contextmanager
 def named_flags(verb: str, where: str, **flags: str) -> Iterator[None]:
     """Name options in the messages of `where` as the verb does, as flags; `flags` are those that differ."""
@@ -68,7 +64,7 @@ Add = Annotated[
 NOTHING: Final[list[str]] = []
 
 Local = Annotated[Path, Parameter(converter=_local)]  # a path of this machine
-Whole = Annotated[int, Parameter(converter=_whole)]  # an integer, never rounded
+Whole = Annotated[int, Parameter(converter=lambda _, tokens: int(tokens[0].value))]  # cyclopts rounds 1.5 to 2
 Place = Annotated[Any, Parameter(converter=_place)]
 """A path; `Any`, because one of object storage is no `pathlib.Path` to pydantic, which cyclopts may call."""
 Out = Annotated[Place, Parameter(help="Folder of all products, or an address such as s3://bucket/x.")]

@@ -50,7 +50,7 @@ LARGEST_FOOTPRINT: Final = SceneOptions().largest_sigma
 """Both axes of a footprint are cut here, in yarn spacings; where derivatives are not finite, they are this long."""
 
 _COLOURS = ("specular", "diffuse", "diffuse_transmission")
-_KEPT = 2**20  # rows of lobes that are kept for the next call: 250 megabytes
+_KEPT = 2**19  # hits of which all is kept for the next call: 230 megabytes
 _TRUTH = TruthOptions(estimator="auto", relative_error=0.1, min_count=64, max_count=256)  # many rays share a pixel
 _LARGEST_ANGLE = SceneOptions().largest_angle
 _FLAT = 1e-6  # least |cosine| of a light
@@ -107,7 +107,7 @@ def _cut(deviation: Float64) -> Float32:
 
 
 class RayHits(NamedTuple):
-    """N places of a shape that rays meet, in its local frame."""
+    """N places of a shape that rays meet, in its local frame; never changed once they are made."""
 
     uv: Float64  # texture coordinates, (N, 2)
     viewer: Float64  # unit vectors to where the ray comes from, (N, 3)
@@ -152,26 +152,27 @@ class Worn:
 
     def eval(self, hits: RayHits, light: Float64) -> Float64:
         """Return the BSDF times the cosine to N lights, linear RGB (N, 3), 1/sr."""
-        answers = _asked(self._bsdf.eval, self._queries(hits, light))
-        return np.where(_lit(hits, light)[:, None], answers, 0.0) * self.coverage(hits)[:, None]
+        _, looks, covered, _ = self._seen(hits)
+        values = np.where(_lit(hits, light)[:, None], _asked(self._bsdf.eval, self._lit_by(looks, light)), 0.0)
+        return values * covered[:, None]
 
     def pdf(self, hits: RayHits, light: Float64) -> Float32:
         """Return the density with which `sample` draws N lights, (N,), 1/sr."""
-        tasks = zip(_runs(self._queries(hits, light)), self._seen(hits)[3], strict=True)
+        _, looks, _, lobes = self._seen(hits)
+        tasks = zip(_runs(self._lit_by(looks, light)), lobes, strict=True)
         return np.concatenate(on_all_cores(self._bsdf.pdf, list(tasks)))
 
     def sample(self, hits: RayHits, random: Float64) -> Sample:
         """Draw a direction to the light for each hit, from random numbers (N, 3) in [0, 1)."""
         _, looks, covered, lobes = self._seen(hits)
         runs = zip(_runs(looks), np.split(random, range(RUN, len(random), RUN)), lobes, strict=True)
-        tasks = [(looks, drawn, lobes, _seed(looks.u, drawn)) for looks, drawn, lobes in runs]
+        tasks = [(run, drawn, own, _seed(run.u, drawn)) for run, drawn, own in runs]
         parts = on_all_cores(self._bsdf.sample, tasks)
         wi, pdf, straight, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
         light = np.where(straight[:, None], -hits.viewer, _turned(wi.astype(np.float64), self._turn))
         weight[~straight & ~_lit(hits, light)] = 0.0
-        if (covered < 1.0).any():
-            weight *= covered[:, None]
-            weight[straight] += ((1.0 - covered) / pdf)[straight, None]
+        weight *= covered[:, None]
+        weight[straight] += ((1.0 - covered[straight]) / pdf[straight])[:, None]
         return Sample(light.astype(np.float32), pdf, straight, weight)
 
     def transparency(self, hits: RayHits) -> Float32:
@@ -194,7 +195,7 @@ class Worn:
                 along = looks.take(curved)._replace(wi=wo, wo=wo)
                 covered[curved] = _asked(partial(self._bsdf.method.coverage, self.fabric), along)
             lobes = on_all_cores(self._bsdf.lobes, [(run,) for run in _runs(looks)])
-            for start, run in zip(range(0, len(covered), RUN), lobes, strict=True) if (covered < 1.0).any() else ():
+            for start, run in zip(range(0, len(covered), RUN), lobes, strict=True):
                 share = covered[start : start + RUN, None]
                 run.flakes[:, [SHARE, HEIGHT]] *= share[:, None]
                 run.rest[:] *= share
@@ -203,11 +204,11 @@ class Worn:
             self._known = known if len(covered) <= _KEPT else None
         return known
 
-    def _queries(self, hits: RayHits, light: Float64) -> Queries:
+    def _lit_by(self, looks: Queries, light: Float64) -> Queries:
         towards = _turned(light, self._turn.T)
         # A light in the plane has no answer; it counts as dark (`_lit`).
         towards[:, 2] = np.where(np.abs(towards[:, 2]) < _FLAT, _FLAT, towards[:, 2])
-        return self._seen(hits)[1]._replace(wi=towards.astype(np.float32))
+        return looks._replace(wi=towards.astype(np.float32))
 
     def _looks(self, hits: RayHits) -> Queries:
         """Return the footprint and viewer of each hit as queries, lit from the viewer."""
@@ -246,7 +247,7 @@ class Worn:
 
 
 def _turned(vectors: Float64, turn: Float64) -> Float64:
-    """Return vectors, (N, 2) or (N, 3), or pairs of rows (N, 2, 2), turned about z by a matrix, (2, 2)."""
+    """Return vectors, (N, 2) or (N, 3), or the columns of matrices (N, 2, 2), turned about z by a matrix, (2, 2)."""
     result = vectors.copy()
     # A product of matrices this small would take ten times as long.
     for axis in range(2):

@@ -43,9 +43,10 @@ def query_sums(table: SoftNodeTable, queries: Queries) -> tuple[Float32, Float32
     wi, wo, curvature = (np.ascontiguousarray(part, np.float32) for part in (looks.wi, looks.wo, looks.curvature))
     result = np.zeros((len(wi), table.kinds.sum(), NODE_SUMS), np.float32)
     gaps = np.zeros(len(wi), np.float32)
-    # Compiled for each kind of nodes alone: one kernel for both took a tenth more time.
+    patches, scratch = footprints(queries), scratch_for(table)
+    # Compiled for True and for None, each kind of nodes alone: one kernel for both took a tenth more time.
     for lines in (True, None) if table.view_lines > 0.0 else (None,):
-        _sum_rows(table, scratch_for(table), footprints(queries), wi, wo, curvature, lines, result, gaps)
+        _sum_rows(table, scratch, patches, wi, wo, curvature, lines, result, gaps)
     return result, gaps
 
 
@@ -92,7 +93,7 @@ def _sum_rows(
         flat, depth = wo[n, 0] * wo[n, 0] + wo[n, 1] * wo[n, 1], np.float32(table.plane) - table.shown[0]
         rises = wo[n, 2] * wo[n, 2] < np.float32(2.0) * bend_o * flat * depth
         narrow = narrowest < table.view_lines * (2.0 if rises else 1.0)
-        if (narrow and nodes_on_lines(dx, dy, narrowest, table.spacing) <= MOST_ON_LINES) == (lines is None):
+        if (narrow and nodes_on_lines(dx, dy, narrowest, table.spacing) <= MOST_ON_LINES) != (lines is not None):
             continue
         look = SoftQuery(
             x, y, dx, dy, rho, narrowest, wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2], low_i, high_i,

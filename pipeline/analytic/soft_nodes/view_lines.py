@@ -44,7 +44,7 @@ _JUST = 0.5 - 1e-7  # a half, less what rounding takes: the height at which rays
 _BOX = np.float32(0.1)  # deviation of the box of a node
 
 
-@fast_kernel
+@inlined_kernel
 def nodes_on_lines(deviation_x: float, deviation_y: float, narrowest: float, spacing: float) -> float:
     """Return a bound of the nodes that a footprint places on lines, given its least deviation of any direction."""
     widest = math.sqrt(max(deviation_x**2 + deviation_y**2 - narrowest**2, narrowest**2))
