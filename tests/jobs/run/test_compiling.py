@@ -18,10 +18,9 @@ def test_a_task_asks_for_what_it_uses_alone_and_each_group_is_compiled_once_what
     assert names(task for task in tasks if task.stage == "generate") == {"auto"}
     assert names(task for task in tasks if task.stage in ("train", "report")) <= {"soft_nodes"}
     assert names(t for t in tasks if t.title == "extremes of prefiltered") == {"owen", "prefiltered"}
-    groups = kernel_groups(tasks)
-    assert len(groups) == len({group.name for group in groups})
-    group = next(group for group in groups if group.name == "prefiltered")
-    group.compile(lambda kernel: None)
-    heard = []
-    group.compile(heard.append)
-    assert heard == []
+    groups = {group.name: group for group in kernel_groups(tasks)}
+    assert len(groups) == len(kernel_groups(tasks))
+    groups["prefiltered"].compile(lambda kernel: None)
+    groups["prefiltered"].compile(pytest.fail)  # nothing is left to be announced
+    usual = {group.name: group.model for group in kernel_groups(plan(load_recipe("standard")))}
+    assert usual["soft_nodes"].levels == [8]  # level 0 has no nodes on lines
