@@ -41,7 +41,7 @@ def samples(fabric: Fabric, case: int, rows: int, seed: int) -> tuple[np.ndarray
     answers, true = colours(fabric, queries), truth.mean @ GREY
     squares = np.minimum(((answers - true[:, None]) / (true + FLOOR)[:, None]) ** 2, LARGEST)
     variance = (np.linalg.norm(truth.standard_error * GREY, axis=1) / (true + FLOOR)) ** 2
-    terms = terms_of(queries).astype(np.float64)
+    terms = terms_of(queries).T.astype(np.float64)
     of_cloth = [number * terms[:, OF_CLOTH] for number in numbers_of(probed(fabric, behind)[1])[1:]]
     seen = truth.mean.any(axis=1) & (answers > 0.0).any(axis=1)
     return np.concatenate([terms, *of_cloth], axis=1)[seen], squares[seen], variance[seen]

@@ -26,8 +26,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64, Index
-from pipeline.compiled.decorators import kernel
-from pipeline.models.selvage.errors import CASES, SIZE_LIMITS, cases_of
+from pipeline.compiled.decorators import allocating_kernel
+from pipeline.models.selvage.errors import CASES, RANGES, SIZE_LIMITS
 from pipeline.per_fabric import PerFabric
 from pipeline.shards.queries import QueryOptions, draw_queries
 from pipeline.truth.query import Queries
@@ -43,7 +43,6 @@ _RAISE: Final = 1.02  # of the price, if all queries take longer at it than the 
 Answer = Callable[[Fabric, Queries, int], object]  # answers queries about a fabric, with a seed
 
 _ENDS: Final = (0.03, *SIZE_LIMITS, 10.0)  # of standard deviations, in yarn spacings
-_SIZES: Final = len(_ENDS) - 1
 _MICROSECONDS: Final = [
     [0.73, 1.58, 2.61, 2.91, 3.24, 207.0],
     [0.80, 2.26, 3.91, 5.06, 6.48, 157.0],
@@ -62,11 +61,8 @@ _LOCK = Lock()
 
 def error_curve(squares: Float32, kinds: Index, seconds: Float64) -> Float64:
     """Return the mean expected squared error of some queries at all PRICES; columns as for `within_time`."""
-    chosen, rows = np.empty(len(squares), np.uint8), np.arange(len(squares))
-    curve = []
-    for price in PRICES:
-        choose_at(squares, kinds, price * seconds, chosen)
-        curve.append(squares[rows, chosen].mean(dtype=np.float64))
+    rows, choices = np.arange(len(kinds)), (choose_at(squares, kinds, price * seconds) for price in PRICES)
+    curve = [squares[chosen, rows].mean(dtype=np.float64) for chosen in choices]
     return np.maximum.accumulate(curve)
 
 
@@ -78,53 +74,42 @@ def price_of(curve: Float64, error: float) -> float:
 def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -> Chosen:
     """Return the answers of least summed squared error whose mean time is at most `time`, which is possible.
 
-    `squares` (N, answers) are expected squared errors, `kinds` (N,) rows of `seconds` (kinds, answers), the time of an
+    `squares` (answers, N) are expected squared errors, `kinds` (N,) rows of `seconds` (kinds, answers), the time of an
     answer; `time` is the mean of a query, at least that of the cheapest answers.
     """
-    chosen, every = np.empty(len(squares), np.uint8), max(1, len(squares) // _SAMPLE)
-    some = np.ascontiguousarray(squares[::every]), np.ascontiguousarray(kinds[::every])
-    low, high = 0, len(PRICES) - 1
+    every, low, high = max(1, len(kinds) // _SAMPLE), 0, len(PRICES) - 1
+    sample, some = np.ascontiguousarray(squares[:, ::every]), np.ascontiguousarray(kinds[::every])
     while high - low > 1:
         middle = (low + high) // 2
-        over = _mean_seconds(*some, seconds, PRICES[middle], chosen[: len(some[0])]) > time
+        over = seconds[some, choose_at(sample, some, PRICES[middle] * seconds)].mean() > time
         low, high = (middle, high) if over else (low, middle)
     price = float(PRICES[low])
-    while _mean_seconds(squares, kinds, seconds, price, chosen) > time:
+    while seconds[kinds, chosen := choose_at(squares, kinds, price * seconds)].mean() > time:
         if price == np.inf:  # an error that no price outweighs
             return np.asarray(seconds[kinds].argmin(axis=1), np.uint8)
         price = max(_RAISE * price, PRICES[1])
     return chosen
 
 
-def _mean_seconds(squares: Float32, kinds: Index, seconds: Float64, price: float, chosen: Chosen) -> float:
-    """Write the answers at a price; return their mean seconds."""
-    choose_at(squares, kinds, price * seconds, chosen)
-    return float(seconds[kinds, chosen].mean())
-
-
-@kernel
-def choose_at(squares: Float32, kinds: Index, priced: Float64, chosen: Chosen) -> None:
-    """Write the answer of each query with the least squared error plus price of its kind, (kinds, answers)."""
-    for n in range(len(squares)):
+@allocating_kernel
+def choose_at(squares: Float32, kinds: Index, priced: Float64) -> Chosen:
+    """Return the answer of each query with the least squared error plus price of its kind, (kinds, answers)."""
+    chosen = np.zeros(len(kinds), np.uint8)
+    for n in range(len(kinds)):
         least, kind = np.inf, kinds[n]
-        for answer in range(squares.shape[1]):
-            value = squares[n, answer] + priced[kind, answer]
+        for answer in range(len(squares)):
+            value = squares[answer, n] + priced[kind, answer]
             if value < least:
                 least, chosen[n] = value, answer
-
-
-def kinds_of(queries: Queries) -> Index:
-    """Return the kinds of N queries, (N,), rows of `seconds_of`."""
-    sizes = np.searchsorted(_ENDS[1:-1], np.sqrt(queries.sigma * queries.sigma_minor))
-    return np.asarray(_SIZES * cases_of(queries) + sizes, np.int64)
+    return chosen
 
 
 def seconds_of(kinds: Index, answers: Sequence[Answer], fabric: Fabric) -> Float64:
     """Return the seconds of a query of some kinds by answer, (all kinds, answers); NaN of other kinds."""
-    result = np.full((_SIZES * CASES, len(answers)), np.nan)
+    result = np.full((RANGES * CASES, len(answers)), np.nan)
     with _LOCK:
         known = _KNOWN.of(fabric)
-        for kind in np.unique(kinds).tolist():
+        for kind in np.flatnonzero(np.bincount(kinds)).tolist():
             if len(known.get(kind, ())) < len(answers):
                 known[kind] = _measure(kind, answers, fabric)
             result[kind] = known[kind][: len(answers)]
@@ -136,7 +121,7 @@ _KNOWN: Final = PerFabric[dict[int, Float64]](lambda fabric: {})  # seconds by k
 
 def _measure(kind: int, answers: Sequence[Answer], fabric: Fabric) -> Float64:
     """Return the seconds of a query of one kind by answer, (answers,)."""
-    case, size = divmod(kind, _SIZES)
+    case, size = divmod(kind, RANGES)
     curvature = (0.01, 0.5) if case >= 2 else (0.0, 0.0)
     options = QueryOptions(sigma=_ENDS[size : size + 2], behind=float(case % 2), stretch=2.0, curvature=curvature)
     result = np.empty(len(answers))

@@ -45,65 +45,79 @@ CASES: Final = 4
 """Cases, each with coefficients of its own: light in front, behind; curved cloth with light in front, behind."""
 
 CURVED: Final = 2  # first case of curved cloth
+RANGES: Final = len(SIZE_LIMITS) + 1  # ranges of sizes; a kind of query is a case and a range
 _LEAST_COSINE = np.float32(0.03)  # lower directions are as this one
 _SMALLEST, _LARGEST = np.float32(math.log(0.03)), np.float32(math.log(16.0))  # sizes beyond are as these
 _BENDS = np.float32(30.0)  # of flat cloth on: curvature well above which errors are of another kind
 _PRIOR = 16  # rows of each range that the polynomial counts for
 _NEVER = 50.0  # logarithm of an error that no wish allows
+_BLOCK = 256  # queries whose terms are at hand at once: they fit a first cache
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
 
-def cases_of(queries: Queries) -> Index:
-    """Return the cases of N queries, (N,)."""
-    return np.asarray((queries.wi[:, 2] < 0.0) + 2 * (queries.curvature > 0.0), np.int64)
-
-
 @kernel
-def _write_terms(queries: Queries, result: Float32) -> None:
-    """Write the terms of N queries, (N, TERMS)."""
-    for n in range(len(result)):
-        terms = result[n]
-        sigma, minor = queries.sigma[n], queries.sigma_minor[n]
+def _write_terms(queries: Queries, start: int, terms: Float32, kinds: Index) -> None:
+    """Write the terms (TERMS or more, n or more) and kinds (n,) of n queries from `start` on."""
+    for n in range(len(kinds)):
+        query = start + n
+        sigma, minor, curvature = queries.sigma[query], queries.sigma_minor[query], queries.curvature[query]
         size = min(max(_HALF * np.log(sigma * minor), _SMALLEST), _LARGEST)
-        length = np.abs(np.log(sigma / minor))
-        viewer = -np.log(max(queries.wo[n, 2], _LEAST_COSINE))
-        light = -np.log(max(abs(queries.wi[n, 2]), _LEAST_COSINE))
-        bend = np.log(_1 + _BENDS * queries.curvature[n])
-        terms[0] = _1
-        terms[1], terms[2], terms[3] = size, size * size, size * size * size
-        terms[4], terms[5], terms[6] = viewer, viewer * viewer, size * viewer
-        terms[7], terms[8], terms[9] = light, light * light, size * light
-        terms[10] = viewer * light
-        terms[11], terms[12] = length, size * length
-        terms[13], terms[14] = bend, size * bend
+        terms[0, n], terms[1, n] = _1, size
+        terms[4, n] = -np.log(max(queries.wo[query, 2], _LEAST_COSINE))
+        terms[7, n] = -np.log(max(abs(queries.wi[query, 2]), _LEAST_COSINE))
+        terms[11, n] = np.abs(np.log(sigma / minor)) if sigma != minor else _0
+        terms[13, n] = np.log(_1 + _BENDS * curvature) if curvature > _0 else _0
+        kind = RANGES * (int(queries.wi[query, 2] < _0) + 2 * int(curvature > _0))
+        for end in SIZES:
+            kind += int(size > end)
+        kinds[n] = kind
+    for n in range(len(kinds)):
+        size, viewer, light, length, bend = terms[1, n], terms[4, n], terms[7, n], terms[11, n], terms[13, n]
+        terms[2, n], terms[3, n] = size * size, size * size * size
+        terms[5, n], terms[6, n] = viewer * viewer, size * viewer
+        terms[8, n], terms[9, n], terms[10, n] = light * light, size * light, viewer * light
+        terms[12, n], terms[14, n] = size * length, size * bend
 
 
 @kernel
-def _write_logarithms(terms: Float32, cases: Index, coefficients: Float32, result: Float32) -> None:
-    """Write the logarithms of the mean squared errors of N queries, (N, answers)."""
-    for n in range(len(result)):
-        own, place = coefficients[cases[n]], TERMS
-        for end in SIZES:
-            place += int(terms[n, 1] > end)
-        for answer in range(len(own)):
-            total = own[answer, place]
-            for t in range(TERMS):
-                total += own[answer, t] * terms[n, t]
-            result[n, answer] = total
+def _write_logarithms(queries: Queries, coefficients: Float32, terms: Float32, kinds: Index, result: Float32) -> None:
+    """Write the kinds (N,) of N queries and the logarithms of their mean squared errors, (answers, N).
+
+    By blocks of n queries: `terms` (TERMS + 1, n) has room for their terms and sums.
+    """
+    totals = terms[TERMS]
+    for start in range(0, len(kinds), len(totals)):
+        block = kinds[start : start + len(totals)]
+        _write_terms(queries, start, terms, block)
+        first, last = block[0], block[0]
+        for kind in block:
+            first, last = min(first, kind), max(last, kind)
+        for case in range(first // RANGES, last // RANGES + 1):
+            for answer, own in enumerate(coefficients[case]):
+                for n in range(len(block)):
+                    totals[n] = own[TERMS + block[n] % RANGES]
+                for term in range(TERMS):
+                    for n in range(len(block)):  # one loop a term: eight queries at once
+                        totals[n] += own[term] * terms[term, n]
+                for n in range(len(block)):
+                    if block[n] // RANGES == case:
+                        result[answer, start + n] = totals[n]
 
 
-def squared_errors(queries: Queries, coefficients: Float32) -> Float32:
-    """Return the expected squared errors of all answers to N queries, (N, answers), by `coefficients_of` a cloth."""
-    result = np.empty((len(queries.u), coefficients.shape[1]), np.float32)
-    _write_logarithms(terms_of(queries), cases_of(queries), np.ascontiguousarray(coefficients), result)
-    return np.exp(result, out=result)
+def squares_and_kinds(queries: Queries, coefficients: Float32) -> tuple[Float32, Index]:
+    """Return the expected squared errors (answers, N) of N queries, by `coefficients_of` a cloth, and kinds (N,)."""
+    kinds, terms = np.empty(len(queries.u), np.int64), np.empty((TERMS + 1, _BLOCK), np.float32)
+    result = np.empty((coefficients.shape[1], len(kinds)), np.float32)
+    columns = Queries(*(np.ascontiguousarray(column, np.float32) for column in queries))
+    _write_logarithms(columns, np.ascontiguousarray(coefficients), terms, kinds, result)
+    return np.exp(result, out=result), kinds
 
 
 def terms_of(queries: Queries) -> Float32:
-    """Return the terms of N queries, (N, TERMS)."""
-    result = np.empty((len(queries.u), TERMS), np.float32)
-    _write_terms(Queries(*(np.ascontiguousarray(column, np.float32) for column in queries)), result)
-    return result
+    """Return the terms of N queries, (TERMS, N)."""
+    terms = np.empty((TERMS, len(queries.u)), np.float32)
+    _write_terms(queries, 0, terms, np.empty(len(queries.u), np.int64))
+    return terms
 
 
 def coefficients_of(fabric: Fabric, behind: bool) -> Float32:
@@ -128,7 +142,7 @@ def _side(fabric: Fabric, behind: bool) -> Float32:
     """Return coefficients with those of one side of the light, the others 0."""
     (queries, colours), rows = probed(fabric, behind), _table()
     numbers = numbers_of(colours)
-    result = np.zeros((CASES, len(rows[0]), TERMS + len(SIZES) + 1), np.float32)
+    result = np.zeros((CASES, len(rows[0]), TERMS + RANGES), np.float32)
     for case in range(int(behind), CASES, 2):
         result[case, :, 0] = _NEVER
         for answer, row in enumerate(rows[case]):
@@ -142,13 +156,12 @@ def size_factors(queries: Queries, colours: Float64, coefficients: Float32) -> F
     """Return the factors of each level and range of sizes, from the colours of all answers to N queries."""
     best = colours[:, -1:]
     squares = ((colours[:, :-1] - best) / (best + FLOOR)) ** 2
-    expected = squared_errors(queries, coefficients)[:, :-1]
-    places = np.searchsorted(SIZES, terms_of(queries)[:, 1])
-    result = np.ones((squares.shape[1], len(SIZES) + 1))
-    for place in np.unique(places):
-        rows = places == place
-        prior = _PRIOR * expected[rows].mean(axis=0)
-        result[:, place] = (squares[rows].sum(axis=0) + prior) / (expected[rows].sum(axis=0) + prior)
+    expected, kinds = squares_and_kinds(queries, coefficients)
+    result = np.ones((squares.shape[1], RANGES))
+    for place in np.unique(kinds % RANGES):
+        rows = kinds % RANGES == place
+        prior = _PRIOR * expected[:-1, rows].mean(axis=1)
+        result[:, place] = (squares[rows].sum(axis=0) + prior) / (expected[:-1, rows].sum(axis=1) + prior)
     return result
 
 

@@ -20,7 +20,7 @@ from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import refuse_other
 from pipeline.models.selvage import choice
 from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
-from pipeline.models.selvage.errors import CASES, CURVED, coefficients_of, squared_errors
+from pipeline.models.selvage.errors import CASES, CURVED, RANGES, coefficients_of, squares_and_kinds
 from pipeline.models.selvage.wish import USUAL_ERROR, refuse_wishes, text_of
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import Walls
@@ -70,10 +70,10 @@ class Selvage:
         behind the cloth, both are wished, or a wish is out of its range.
         """
         chosen, result = self.choose(fabric, queries, error, time), np.empty((len(queries.u), 4), np.float32)
-        for index, answer in enumerate(self._answers):
+        for index in np.flatnonzero(np.bincount(chosen)):
             rows = np.flatnonzero(chosen == index)
-            if len(rows):
-                result[rows] = answer(fabric, queries.take(rows), seed)
+            own = Queries(*(column.take(rows, axis=0) for column in queries))  # a third of the time of column[rows]
+            result[rows] = self._answers[index](fabric, own, seed)
         return result
 
     def choose(
@@ -82,16 +82,13 @@ class Selvage:
         """Return which answer each of N queries gets, (N,): a level of soft nodes by its place, 5 the fallback."""
         refuse_other(queries, f"the method {self.name} answers", ("stretch", "behind", "curvature"))
         refuse_wishes(self.name, error, time)
-        kinds = choice.kinds_of(queries)
-        squares = squared_errors(queries, self._coefficients(fabric, queries))
+        squares, kinds = squares_and_kinds(queries, self._coefficients(fabric, queries))
         if time is None:
             curves, wish = self._curves[_behind(queries)].of(fabric), self.error if error is None else error
-            prices = np.repeat([choice.price_of(curve, wish) for curve in curves], len(choice.USUAL_SECONDS) // CASES)
-            chosen = np.empty(len(kinds), np.uint8)
-            choice.choose_at(squares, kinds, prices[:, None] * self._seconds, chosen)
-            return chosen
+            prices = np.repeat([choice.price_of(curve, wish) for curve in curves], RANGES)
+            return choice.choose_at(squares, kinds, prices[:, None] * self._seconds)
         seconds = choice.seconds_of(kinds, self._answers, fabric)
-        least = float(seconds[kinds].min(axis=1).mean()) if len(kinds) else 0.0
+        least = float(seconds.min(axis=1)[kinds].mean()) if len(kinds) else 0.0
         if time < least:
             allowed = f"these queries take at least {least:.2g} seconds each on this machine"
             raise BadInput(self.name, "time", time, allowed)
@@ -99,7 +96,7 @@ class Selvage:
 
     def expected_errors(self, fabric: Fabric, queries: Queries) -> Float32:
         """Return the expected relative errors of all answers to N queries, root mean squares, (N, answers)."""
-        return np.sqrt(squared_errors(queries, self._coefficients(fabric, queries)))
+        return np.sqrt(squares_and_kinds(queries, self._coefficients(fabric, queries))[0].T)
 
     def transparency(self, fabric: Fabric, looks: Queries, seed: int = 0) -> Float32:
         """Return the transparency of N footprints, float32 (N,), by soft nodes."""
@@ -123,8 +120,7 @@ class Selvage:
         curves = []
         for case in range(CASES):
             queries = probes(fabric, bool(case % 2) and behind, case >= CURVED, directions=("projected_disc",))
-            squares = squared_errors(queries, coefficients)
-            curves.append(choice.error_curve(squares, choice.kinds_of(queries), self._seconds))
+            curves.append(choice.error_curve(*squares_and_kinds(queries, coefficients), self._seconds))
         return curves
 
 

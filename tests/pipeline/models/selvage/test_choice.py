@@ -11,12 +11,12 @@ def drawn(rows):
     """Return squared errors that mostly fall from answer to answer, and kinds."""
     random = np.random.default_rng(7)
     squares = np.exp(random.normal([-6.0, -7.5, -9.0], 1.5, (rows, 3))).astype(np.float32)
-    return squares, random.integers(0, 2, rows)
+    return squares.T, random.integers(0, 2, rows)
 
 
 def totals(squares, kinds, chosen):
     """Return the mean squared error and the mean seconds of a choice."""
-    return squares[np.arange(len(kinds)), chosen].mean(dtype=np.float64), SECONDS[kinds, chosen].mean()
+    return squares[chosen, np.arange(len(kinds))].mean(dtype=np.float64), SECONDS[kinds, chosen].mean()
 
 
 @pytest.mark.parametrize("time", [2.1e-6, 3e-6, 4e-6, 1e-5])
@@ -33,7 +33,7 @@ def test_no_other_choice_in_the_same_time_has_less_error(time):
 
 def test_the_wished_time_is_used_up_and_the_price_of_an_error_is_the_highest_that_keeps_it():
     squares, kinds = drawn(20_000)
-    least, most = SECONDS[kinds].min(axis=1).mean(), totals(squares, kinds, squares.argmin(axis=1))[1]
+    least, most = SECONDS[kinds].min(axis=1).mean(), totals(squares, kinds, squares.argmin(axis=0))[1]
     for share in (0.1, 0.5, 0.9):
         time = least + share * (most - least)
         _, seconds = totals(squares, kinds, within_time(squares, kinds, SECONDS, time))
@@ -41,15 +41,14 @@ def test_the_wished_time_is_used_up_and_the_price_of_an_error_is_the_highest_tha
     squares, kinds = drawn(100)
     cheapest = within_time(squares, kinds, SECONDS, SECONDS[kinds, 0].mean())
     np.testing.assert_array_equal(cheapest, np.zeros(100))
-    np.testing.assert_array_equal(within_time(squares, kinds, SECONDS, 1.0), squares.argmin(axis=1))
+    np.testing.assert_array_equal(within_time(squares, kinds, SECONDS, 1.0), squares.argmin(axis=0))
     squares, kinds = drawn(1000)
     curve = error_curve(squares, kinds, SECONDS)
     assert (np.diff(curve) >= 0).all()
-    chosen = np.empty(1000, np.uint8)
     for error in np.sqrt(curve[[50, 200, 300]] * 1.0001):
         price = price_of(curve, error)
-        choose_at(squares, kinds, price * SECONDS, chosen)
+        chosen = choose_at(squares, kinds, price * SECONDS)
         assert totals(squares, kinds, chosen)[0] <= error**2
-        choose_at(squares, kinds, PRICES[np.searchsorted(PRICES, price) + 20] * SECONDS, chosen)
+        chosen = choose_at(squares, kinds, PRICES[np.searchsorted(PRICES, price) + 20] * SECONDS)
         assert totals(squares, kinds, chosen)[0] > error**2 or price > 1e4
     assert price_of(curve, 1e-9) == 0.0

@@ -9,12 +9,12 @@ from pipeline.models.selvage.errors import (
     CASES,
     ERROR_TABLE,
     OF_CLOTH,
+    RANGES,
     SIZES,
     TERMS,
-    cases_of,
     coefficients_of,
     size_factors,
-    squared_errors,
+    squares_and_kinds,
 )
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.estimator import estimate
@@ -33,12 +33,13 @@ def test_the_table_has_a_row_for_every_case_and_a_query_errs_alike_alone_and_amo
     np.testing.assert_allclose(colours(DENIM, queries)[:, -1], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)
     # Whatever side the others are lit from; mirrored queries have the same errors.
     front, behind = probes(DENIM, False, False, 20), probes(DENIM, True, True, 20)
-    assert set(cases_of(front)) == {0} and set(cases_of(behind)) == {3}
-    whole = squared_errors(front, coefficients_of(DENIM, True))
-    np.testing.assert_array_equal(whole, squared_errors(front, coefficients_of(DENIM, False)))
+    whole, kinds = squares_and_kinds(front, coefficients_of(DENIM, True))
+    assert set(kinds // RANGES) == {0}
+    np.testing.assert_array_equal(whole, squares_and_kinds(front, coefficients_of(DENIM, False))[0])
     mirrored = front._replace(wi=front.wi * np.float32([-1, 1, 1]), wo=front.wo * np.float32([-1, 1, 1]))
-    np.testing.assert_array_equal(whole, squared_errors(mirrored, coefficients_of(DENIM, True)))
-    assert (squared_errors(behind, coefficients_of(DENIM, True))[:, -1] > 1.0).all(), "no fallback of curved cloth"
+    np.testing.assert_array_equal(whole, squares_and_kinds(mirrored, coefficients_of(DENIM, True))[0])
+    squares, kinds = squares_and_kinds(behind, coefficients_of(DENIM, True))
+    assert set(kinds // RANGES) == {3} and (squares[-1] > 1.0).all(), "no fallback of curved cloth"
 
 
 def test_numbers_of_a_cloth_are_differences_of_its_answers_and_find_where_a_level_errs_more():
@@ -64,7 +65,7 @@ def test_numbers_of_a_cloth_are_differences_of_its_answers_and_find_where_a_leve
     wanted[0, 1] = (100.0 * rows[1] + 16) / (rows[1] + 16)
     assert (np.abs(found / wanted - 1.0) < 4.0 * np.sqrt(2.0 / rows)).all()
     coefficients[..., TERMS:] = np.log(np.vstack([found, np.ones(len(rows))]))
-    expected = squared_errors(queries, coefficients)[:, :-1]
+    expected = squares_and_kinds(queries, coefficients)[0][:-1].T
     assert expected[places == 1, 0].min() > 50.0 * expected[places == 1, 1].max()
 
 
