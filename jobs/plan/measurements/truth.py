@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _START = 0.3  # seconds of any image
 _LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 37.0, 512, 5
 _UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced", "measured_cloth")
-_LONG: Final[dict[StudyName, float]] = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0, "measured_cloth": 510.0}
+_LONG: Final = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0, "measured_cloth": 510.0, "path_traced": 600.0}
 
 
 class _OfFabric(Measurement):
