@@ -97,7 +97,7 @@ def _write_logarithms(queries: Queries, coefficients: Float32, terms: Float32, k
                 for n in range(len(block)):
                     totals[n] = own[TERMS + block[n] % RANGES]
                 for term in range(TERMS):
-                    for n in range(len(block)):  # one loop a term: eight queries at once
+                    for n in range(len(block)):  # the inner loop, so that queries are independent
                         totals[n] += own[term] * terms[term, n]
                 for n in range(len(block)):
                     if block[n] // RANGES == case:
