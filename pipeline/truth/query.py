@@ -96,7 +96,10 @@ class Queries(NamedTuple):
 
     def take(self, index: npt.NDArray[np.integer] | Mask | slice) -> Queries:
         """Return the queries at `index`."""
-        return Queries(*(column[index] for column in self))
+        if isinstance(index, slice):
+            return Queries(*(column[index] for column in self))
+        rows = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
+        return Queries(*(column.take(rows, axis=0) for column in self))  # 40 % of the time of column[rows]
 
 
 class Answers(NamedTuple):

@@ -62,8 +62,7 @@ _LOCK = Lock()
 def error_curve(squares: Float32, kinds: Index, seconds: Float64) -> Float64:
     """Return the mean expected squared error of some queries at all PRICES; columns as for `within_time`."""
     rows, choices = np.arange(len(kinds)), (choose_at(squares, kinds, price * seconds) for price in PRICES)
-    curve = [squares[chosen, rows].mean(dtype=np.float64) for chosen in choices]
-    return np.maximum.accumulate(curve)
+    return np.maximum.accumulate([squares[chosen, rows].mean(dtype=np.float64) for chosen in choices])
 
 
 def price_of(curve: Float64, error: float) -> float:

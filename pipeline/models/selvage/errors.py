@@ -73,9 +73,8 @@ def _write_terms(queries: Queries, start: int, terms: Float32, kinds: Index) -> 
         kinds[n] = kind
     for n in range(len(kinds)):
         size, viewer, light, length, bend = terms[1, n], terms[4, n], terms[7, n], terms[11, n], terms[13, n]
-        terms[2, n], terms[3, n] = size * size, size * size * size
-        terms[5, n], terms[6, n] = viewer * viewer, size * viewer
-        terms[8, n], terms[9, n], terms[10, n] = light * light, size * light, viewer * light
+        terms[2, n], terms[3, n], terms[5, n] = size * size, size * size * size, viewer * viewer
+        terms[6, n], terms[8, n], terms[9, n], terms[10, n] = size * viewer, light * light, size * light, viewer * light
         terms[12, n], terms[14, n] = size * length, size * bend
 
 
