@@ -1,8 +1,8 @@
-"""Fit the table of expected errors of `selvage`, pipeline/models/selvage/errors.json, against the truth.
+"""Fit what `selvage` expects, pipeline/models/selvage/expected.json: errors against the truth, and seconds.
 
 Command: ``python tests/fits/fit_selvage_errors.py [--presets voile,denim] [--random 12] [--rows 768] [--seed 31]``
 
-Presets and random cloths with the ranges of the recipe `standard`, of another seed, seen with light in front and
+Presets and random cloths (ranges of the recipe `standard`, of other seeds, and usual ones), lit from the front and from
 behind, flat and curved. The squared error of an answer has the mean m plus the variance v of the truth's noise; log m
 is linear in the coefficients. They maximise the likelihood of errors as a Gaussian has it, every cloth with equal
 weight, with a penalty on their squares in units of the columns' root mean squares:
@@ -10,7 +10,7 @@ weight, with a penalty on their squares in units of the columns' root mean squar
     mean(log(m + v) + e^2 / (m + v)) + PENALTY / 2 |coefficients|^2
 
 Patches that are hidden almost wholly are left out: a limit of visibility decides whether the truth is 0 there.
-The table in use was fitted so to 33 cloths (reports/LOG.md).
+The table in use was fitted so to 45 cloths (reports/LOG.md). Times are geometric means of TIMED; ratios count.
 """
 
 import json
@@ -20,16 +20,20 @@ import cyclopts
 import numpy as np
 
 from jobs.recipe.load import load_recipe
+from pipeline.models.analytic.soft_nodes import SoftNodes
+from pipeline.models.fallback import fallback_answers
+from pipeline.models.selvage.choice import seconds_of
 from pipeline.models.selvage.cloth_numbers import FLOOR, GREY, NODE_LEVELS, colours, numbers_of, probed, probes
-from pipeline.models.selvage.errors import CASES, CURVED, OF_CLOTH, terms_of
+from pipeline.models.selvage.errors import CASES, CURVED, OF_CLOTH, RANGES, TERMS, terms_of
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric, load_fabric
-from weaves.population import population_fabrics
+from weaves.population import Population, population_fabrics
 
 PENALTY = 3e-4
 STEPS = 40
 LARGEST = 4.0  # squared error of twice the colour
+TIMED = ("denim", "twill_4_4", "gauze")
 PRESETS = "cotton_twill,denim,silk_charmeuse,voile,herringbone,polyester_lining,basket,wool_gabardine,gauze"
 
 
@@ -53,8 +57,7 @@ def fitted(columns: np.ndarray, squares: np.ndarray, variance: np.ndarray, weigh
     columns, weights = columns / np.where(scale > 0.0, scale, 1.0), weights / weights.sum()
     found = np.zeros(columns.shape[1])
     found[0] = np.log(max(weights @ (squares - variance), 1e-5))
-    penalty = np.full(len(found), PENALTY)
-    penalty[0] = 0.0
+    penalty = np.where(np.arange(len(found)) > 0, PENALTY, 0.0)
 
     def mean(coefficients: np.ndarray) -> np.ndarray:
         return np.exp(np.clip(columns @ coefficients, -16.0, 2.0))
@@ -76,26 +79,29 @@ def fitted(columns: np.ndarray, squares: np.ndarray, variance: np.ndarray, weigh
 
 
 def main(presets: str = PRESETS, random: int = 12, rows: int = 768, seed: int = 31, out: Path | None = None) -> None:
-    """Fit the table; write it to `out`, if named, and print the root mean squares of the errors."""
+    """Fit the table; write it and the seconds to `out`, if named, and print the root mean squares of the errors."""
     dataset = load_recipe("standard").dataset
     cloths = [load_fabric(name) for name in presets.split(",") if name]
-    for population in (dataset.unseen_population, dataset.population):
-        own = population.model_copy(update={"seed": seed, "count": random})
-        cloths += population_fabrics(own) if random else []
-    table = []
+    usual = Population(families=dataset.unseen_population.families, balanced=True, solid=0.5)
+    for population in (dataset.unseen_population, dataset.population, usual):
+        cloths += population_fabrics(population.model_copy(update={"seed": seed, "count": random}))
+    table, ranges = [], []
     for case in range(CASES):
         parts = [samples(cloth, case, rows, seed + index) for index, cloth in enumerate(cloths)]
         columns, squares, variance = (np.concatenate(part) for part in zip(*parts, strict=True))
+        numbers = columns[:, [0, *range(TERMS, columns.shape[1], len(OF_CLOTH))]]
+        ranges.append([numbers.min(axis=0).tolist(), numbers.max(axis=0).tolist()])
         weights = np.concatenate([np.full(len(part[0]), 1.0 / len(part[0])) for part in parts])
-        answers = (
-            len(NODE_LEVELS) if case >= CURVED else len(NODE_LEVELS) + 1
-        )  # of curved cloth the fallback is never taken
-        table.append([fitted(columns, squares[:, one], variance, weights).tolist() for one in range(answers)])
+        answers = len(NODE_LEVELS) + (case < CURVED)  # of curved cloth the fallback is never taken
+        table.append([fitted(columns, squares[:, one], variance, weights) for one in range(answers)])
         errors = np.sqrt(np.maximum(weights @ (squares - variance[:, None]) / weights.sum(), 0.0))
         print(f"case {case}: errors", " ".join(f"{error:.2%}" for error in errors))
     if out is not None:
-        rows_of = [",\n  ".join(json.dumps([float(f"{x:.5g}") for x in row]) for row in case) for case in table]
-        out.write_text("[\n [\n  " + "\n ],\n [\n  ".join(rows_of) + "\n ]\n]\n", encoding="utf-8")
+        levels = [*(SoftNodes(level).predict for level in NODE_LEVELS), fallback_answers]
+        times = [1e6 * seconds_of(np.arange(RANGES * CASES), levels, load_fabric(name)) for name in TIMED]
+        means = np.exp(np.log(times).mean(axis=0)).round(3).tolist()
+        found = {"errors": [np.round(rows, 4).tolist() for rows in table], "numbers": ranges, "microseconds": means}
+        out.write_text(json.dumps(found).replace("], [", "],\n [") + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ answer then depends on the query, the cloth and the wish alone. For a wished tim
 of these queries is at most the wished one.
 
 Seconds are by kind of query: a case of `errors` and a range of sizes, in which times hardly differ. For a wished error
-they are `USUAL_SECONDS`, so that the choice depends on no machine: ratios count, and errors hardly depend on them. For
-a wished time they are measured, once for a cloth in a process.
+they are the usual ones (`errors.EXPECTED`), so that the choice depends on no machine: ratios count, and errors hardly
+depend on them. For a wished time they are measured, once for a cloth in a process.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,21 +38,10 @@ Chosen = npt.NDArray[np.uint8]
 
 PRICES: Final[Float64] = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 400)])  # prices of a second, in squared errors
 _SAMPLE: Final = 512  # queries that the price of a wished time is found on
-_RAISE: Final = 1.02  # of the price, if all queries take longer at it than the sample did
 
 Answer = Callable[[Fabric, Queries, int], object]  # answers queries about a fabric, with a seed
 
 _ENDS: Final = (0.03, *SIZE_LIMITS, 10.0)  # of standard deviations, in yarn spacings
-_MICROSECONDS: Final = [
-    [0.73, 1.58, 2.61, 2.91, 3.24, 207.0],
-    [0.80, 2.26, 3.91, 5.06, 6.48, 157.0],
-    [1.28, 1.33, 2.63, 9.13, 12.66, 71.0],
-    [0.93, 0.93, 1.38, 2.36, 4.34, 27.0],
-    [0.34, 0.34, 0.42, 0.63, 1.02, 13.9],
-]
-USUAL_SECONDS: Final = 1e-6 * np.array(_MICROSECONDS * CASES)
-"""Seconds of a query by kind and answer: ratios of processor times, geometric means of denim, twill 4/4 and gauze."""
-
 _TIMED_ROWS: Final = (1024, 1024, 1024, 1024, 1024, 64)  # queries a timed call, by answer
 _CALLS: Final = 3  # after one that loads kernels and tables; the fastest counts
 _SEED: Final = 0x5EC5
@@ -82,12 +71,11 @@ def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -
         middle = (low + high) // 2
         over = seconds[some, choose_at(sample, some, PRICES[middle] * seconds)].mean() > time
         low, high = (middle, high) if over else (low, middle)
-    price = float(PRICES[low])
-    while seconds[kinds, chosen := choose_at(squares, kinds, price * seconds)].mean() > time:
-        if price == np.inf:  # an error that no price outweighs
-            return np.asarray(seconds[kinds].argmin(axis=1), np.uint8)
-        price = max(_RAISE * price, PRICES[1])
-    return chosen
+    for price in PRICES[low:]:  # all queries may take longer than the sample did
+        chosen = choose_at(squares, kinds, price * seconds)
+        if seconds[kinds, chosen].mean() <= time:
+            return chosen
+    return np.asarray(seconds[kinds].argmin(axis=1), np.uint8)  # an error that no price outweighs
 
 
 @allocating_kernel

@@ -20,7 +20,7 @@ import json
 import math
 from functools import cache, partial
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -31,8 +31,10 @@ from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
 
-ERROR_TABLE: Final = Path(__file__).with_name("errors.json")
-"""The table of all cloths, C: cases, answers, TERMS for the number 1 and OF_CLOTH for each of the others."""
+EXPECTED: Final = Path(__file__).with_name("expected.json")
+"""Expectations of all cloths: ``errors``, the table C (cases, answers, TERMS for the number 1 and OF_CLOTH for each of
+the others), the least and the largest ``numbers`` of the cloths that it was fitted to, of each case, and
+``microseconds`` of a query (kinds, answers), see `choice`. Beyond these numbers cloths count as at them."""
 
 OF_CLOTH: Final = (0, 1, 4)
 """Terms whose coefficients depend on the cloth: the constant one, size, inclination of the viewer."""
@@ -132,15 +134,15 @@ def expand(row: Float64, numbers: Float64) -> Float64:
 
 
 @cache
-def _table() -> list[list[Float64]]:
-    """Return the rows of the table by case and answer."""
-    return [[np.array(row) for row in rows] for rows in json.loads(ERROR_TABLE.read_text(encoding="utf-8"))]
+def expected(what: Literal["errors", "numbers", "microseconds"]) -> list[Float64]:
+    """Return one part of `EXPECTED`, by case or by kind."""
+    return [np.array(rows) for rows in json.loads(EXPECTED.read_text(encoding="utf-8"))[what]]
 
 
 def _side(fabric: Fabric, behind: bool) -> Float32:
     """Return coefficients with those of one side of the light, the others 0."""
-    (queries, colours), rows = probed(fabric, behind), _table()
-    numbers = numbers_of(colours)
+    (queries, colours), rows = probed(fabric, behind), expected("errors")
+    numbers = np.clip(numbers_of(colours), *expected("numbers")[int(behind)])
     result = np.zeros((CASES, len(rows[0]), TERMS + RANGES), np.float32)
     for case in range(int(behind), CASES, 2):
         result[case, :, 0] = _NEVER

@@ -20,7 +20,7 @@ from pipeline.models.fallback import fallback_answers
 from pipeline.models.method import refuse_other
 from pipeline.models.selvage import choice
 from pipeline.models.selvage.cloth_numbers import NODE_LEVELS, probes
-from pipeline.models.selvage.errors import CASES, CURVED, RANGES, coefficients_of, squares_and_kinds
+from pipeline.models.selvage.errors import CASES, CURVED, RANGES, coefficients_of, expected, squares_and_kinds
 from pipeline.models.selvage.wish import USUAL_ERROR, refuse_wishes, text_of
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.options import Walls
@@ -48,7 +48,7 @@ class Selvage:
         self._answers: list[Callable[[Fabric, Queries, int], Float32]] = [node.predict for node in self._nodes]
         if walls == "rim":
             self._answers.append(fallback_answers)
-        self._seconds = choice.USUAL_SECONDS[:, : len(self._answers)]
+        self._seconds = 1e-6 * np.array(expected("microseconds"))[:, : len(self._answers)]
 
     def covers(self, fabric: Fabric) -> bool:
         """Return True: any fabric can be tabulated."""
@@ -69,11 +69,13 @@ class Selvage:
         mean seconds of a query on one thread of this machine, on which the choice then depends. BadInput if viewers are
         behind the cloth, both are wished, or a wish is out of its range.
         """
-        chosen, result = self.choose(fabric, queries, error, time), np.empty((len(queries.u), 4), np.float32)
-        for index in np.flatnonzero(np.bincount(chosen)):
-            rows = np.flatnonzero(chosen == index)
-            result[rows] = self._answers[index](fabric, queries.take(rows), seed)
-        return result
+        chosen = self.choose(fabric, queries, error, time)
+        order, ends = np.argsort(chosen, kind="stable"), np.bincount(chosen).cumsum().tolist()
+        ordered, answers = queries.take(order), np.empty((len(order), 4), np.float32)
+        for answer, start, end in zip(self._answers, [0, *ends], ends, strict=False):
+            if start < end:
+                answers[start:end] = answer(fabric, ordered.take(slice(start, end)), seed)
+        return answers.take(np.argsort(order), axis=0)
 
     def choose(
         self, fabric: Fabric, queries: Queries, error: float | None = None, time: float | None = None

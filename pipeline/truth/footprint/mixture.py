@@ -15,7 +15,6 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.compiled.arrays import Float32, Float64
 from pipeline.compiled.decorators import allocating_kernel, kernel
@@ -52,6 +51,7 @@ SMALLEST: Final = np.float32(1e-3)
 place."""
 
 _LITTLE: Final = 0.02  # correlation that is none to a method
+_STRONGEST: Final = COARSE_LINE.most
 _WIDEST: Final = np.float32(1e4)  # yarn spacings: even along that axis, and places on the line still have digits
 
 
@@ -65,13 +65,22 @@ def footprints(queries: Queries) -> Footprints:
     Axes count as `SMALLEST` yarn spacings at least and as 1e4 at most. Correlations are 0 or such as a `COARSE_LINE`
     resolves: an ellipse thinner than that is taken wider.
     """
-    major, minor = (np.clip(side, SMALLEST, _WIDEST) for side in (queries.sigma, queries.sigma_minor))
-    shape: npt.NDArray[np.floating] = np.stack([major, minor, np.zeros_like(major)])
-    if (major != minor).any():
-        shape = axes(*(column.astype(np.float64) for column in (major, minor, queries.angle)))
-        shape[2] = np.where(np.abs(shape[2]) < _LITTLE, 0.0, np.clip(shape[2], -COARSE_LINE.most, COARSE_LINE.most))
-    u, v, x, y, correlation = (np.ascontiguousarray(column, np.float32) for column in (queries.u, queries.v, *shape))
+    columns = queries.u, queries.v, queries.sigma, queries.sigma_minor, queries.angle
+    u, v, *shape = (np.ascontiguousarray(column, np.float32) for column in columns)
+    x, y, correlation = _shapes(*shape)
     return u, v, x, y, correlation
+
+
+@allocating_kernel
+def _shapes(major: Float32, minor: Float32, angle: Float32) -> Float32:
+    """Return deviations along x and y and correlations of N footprints within all limits, (3, N)."""
+    shapes = np.empty((3, len(major)), np.float32)
+    for row in range(len(major)):
+        longer, shorter = min(max(major[row], SMALLEST), _WIDEST), min(max(minor[row], SMALLEST), _WIDEST)
+        x, y, correlation = along_axes(np.float64(longer), np.float64(shorter), np.float64(angle[row]))
+        shapes[0, row], shapes[1, row] = x, y
+        shapes[2, row] = 0.0 if abs(correlation) < _LITTLE else min(max(correlation, -_STRONGEST), _STRONGEST)
+    return shapes
 
 
 @allocating_kernel
