@@ -24,7 +24,7 @@ from pipeline.models.analytic.soft_nodes import SoftNodes
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.selvage.choice import seconds_of
 from pipeline.models.selvage.cloth_numbers import FLOOR, GREY, NODE_LEVELS, colours, numbers_of, probed, probes
-from pipeline.models.selvage.errors import CASES, CURVED, OF_CLOTH, RANGES, TERMS, terms_of
+from pipeline.models.selvage.errors import CASES, CURVED, OF_CLOTH, RANGES, TERMS, write_terms
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
 from weaves.fabric import Fabric, load_fabric
@@ -45,10 +45,11 @@ def samples(fabric: Fabric, case: int, rows: int, seed: int) -> tuple[np.ndarray
     answers, true = colours(fabric, queries), truth.mean @ GREY
     squares = np.minimum(((answers - true[:, None]) / (true + FLOOR)[:, None]) ** 2, LARGEST)
     variance = (np.linalg.norm(truth.standard_error * GREY, axis=1) / (true + FLOOR)) ** 2
-    terms = terms_of(queries).T.astype(np.float64)
-    of_cloth = [number * terms[:, OF_CLOTH] for number in numbers_of(probed(fabric, behind)[1])[1:]]
+    terms, kinds = np.empty((TERMS, len(true)), np.float32), np.empty(len(true), np.int64)
+    write_terms(queries, 0, terms, kinds)
+    of_cloth = [number * terms.T[:, OF_CLOTH] for number in numbers_of(probed(fabric, behind)[1])[1:]]
     seen = truth.mean.any(axis=1) & (answers > 0.0).any(axis=1)
-    return np.concatenate([terms, *of_cloth], axis=1)[seen], squares[seen], variance[seen]
+    return np.concatenate([terms.T, *of_cloth], axis=1)[seen], squares[seen], variance[seen]
 
 
 def fitted(columns: np.ndarray, squares: np.ndarray, variance: np.ndarray, weights: np.ndarray) -> np.ndarray:

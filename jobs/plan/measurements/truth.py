@@ -26,6 +26,11 @@ if TYPE_CHECKING:
 _START = 0.3  # seconds of any image
 _LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 37.0, 512, 5
 _UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced", "measured_cloth")
+_EVALUATED: Final = {  # models of studies
+    "footprint_colours": ("soft_nodes",),
+    "path_traced": ("point_sampled", "soft_nodes"),
+    "throughput": ("selvage", "soft_nodes"),
+}
 _LONG: Final = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0, "measured_cloth": 510.0, "path_traced": 600.0}
 
 
@@ -184,6 +189,10 @@ class Study(Measurement):
     def slots(self) -> Literal["one", "all"]:
         """All where times are among the results."""
         return "one" if self.study in _UNTIMED else "all"
+
+    def versions(self) -> dict[str, int]:
+        """Return the versions of its code and of the models that it evaluates."""
+        return super().versions() | {name: versions.MODELS[name] for name in _EVALUATED.get(self.study, ())}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure it.

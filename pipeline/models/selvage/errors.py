@@ -58,7 +58,7 @@ _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 
 
 @kernel
-def _write_terms(queries: Queries, start: int, terms: Float32, kinds: Index) -> None:
+def write_terms(queries: Queries, start: int, terms: Float32, kinds: Index) -> None:
     """Write the terms (TERMS or more, n or more) and kinds (n,) of n queries from `start` on."""
     for n in range(len(kinds)):
         query = start + n
@@ -89,7 +89,7 @@ def _write_logarithms(queries: Queries, coefficients: Float32, terms: Float32, k
     totals = terms[TERMS]
     for start in range(0, len(kinds), len(totals)):
         block = kinds[start : start + len(totals)]
-        _write_terms(queries, start, terms, block)
+        write_terms(queries, start, terms, block)
         first, last = block[0], block[0]
         for kind in block:
             first, last = min(first, kind), max(last, kind)
@@ -114,23 +114,9 @@ def squares_and_kinds(queries: Queries, coefficients: Float32) -> tuple[Float32,
     return np.exp(result, out=result), kinds
 
 
-def terms_of(queries: Queries) -> Float32:
-    """Return the terms of N queries, (TERMS, N)."""
-    terms = np.empty((TERMS, len(queries.u)), np.float32)
-    _write_terms(queries, 0, terms, np.empty(len(queries.u), np.int64))
-    return terms
-
-
 def coefficients_of(fabric: Fabric, behind: bool) -> Float32:
     """Return a cloth's coefficients, (cases, answers, TERMS and ranges of sizes); 0 of light behind unless wanted."""
     return (_BOTH if behind else _FRONT).of(fabric)
-
-
-def expand(row: Float64, numbers: Float64) -> Float64:
-    """Return the coefficients (TERMS,) of a cloth with these numbers, from a row of the table."""
-    result = row[:TERMS].copy()
-    result[list(OF_CLOTH)] += numbers[1:] @ row[TERMS:].reshape(NUMBERS - 1, len(OF_CLOTH))
-    return result
 
 
 @cache
@@ -145,9 +131,10 @@ def _side(fabric: Fabric, behind: bool) -> Float32:
     numbers = np.clip(numbers_of(colours), *expected("numbers")[int(behind)])
     result = np.zeros((CASES, len(rows[0]), TERMS + RANGES), np.float32)
     for case in range(int(behind), CASES, 2):
+        own = rows[case][:, :TERMS].copy()
+        own[:, OF_CLOTH] += numbers[1:] @ rows[case][:, TERMS:].reshape(len(own), NUMBERS - 1, len(OF_CLOTH))
         result[case, :, 0] = _NEVER
-        for answer, row in enumerate(rows[case]):
-            result[case, answer, :TERMS] = expand(row, numbers)
+        result[case, : len(own), :TERMS] = own
     known = ~np.isnan(colours[:, -1])
     result[int(behind) :: 2, :-1, TERMS:] = np.log(size_factors(queries.take(known), colours[known], result))
     return result

@@ -91,8 +91,7 @@ class Selvage:
         seconds = choice.seconds_of(kinds, self._answers, fabric)
         least = float(seconds.min(axis=1)[kinds].mean()) if len(kinds) else 0.0
         if time < least:
-            allowed = f"these queries take at least {least:.2g} seconds each on this machine"
-            raise BadInput(self.name, "time", time, allowed)
+            raise BadInput(self.name, "time", time, f"these queries take at least {least:.2g} s each on this machine")
         return choice.within_time(squares, kinds, seconds, time)
 
     def expected_errors(self, fabric: Fabric, queries: Queries) -> Float32:
