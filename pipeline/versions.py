@@ -16,7 +16,7 @@ MODELS: Final[dict[str, int]] = {
     "curved": 2,
     "point_sampled": 6,
     "prefiltered": 2,
-    "selvage": 17,
+    "selvage": 18,
     "soft_nodes": 14,
     "woven": 2,
 }

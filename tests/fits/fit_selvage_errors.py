@@ -47,7 +47,7 @@ def samples(fabric: Fabric, case: int, rows: int, seed: int) -> tuple[np.ndarray
     variance = (np.linalg.norm(truth.standard_error * GREY, axis=1) / (true + FLOOR)) ** 2
     terms, kinds = np.empty((TERMS, len(true)), np.float32), np.empty(len(true), np.int64)
     write_terms(queries, 0, terms, kinds)
-    of_cloth = [number * terms.T[:, OF_CLOTH] for number in numbers_of(probed(fabric, behind)[1])[1:]]
+    of_cloth = [number * terms.T[:, OF_CLOTH] for number in numbers_of(probed(fabric, behind))[1:]]
     seen = truth.mean.any(axis=1) & (answers > 0.0).any(axis=1)
     return np.concatenate([terms.T, *of_cloth], axis=1)[seen], squares[seen], variance[seen]
 

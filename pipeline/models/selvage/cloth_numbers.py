@@ -25,10 +25,9 @@ _LEAST, _MOST = 1e-3, 1.0  # differences
 _MIDDLE = 4.0  # minus the logarithm of a usual difference
 
 
-def probed(fabric: Fabric, behind: bool) -> tuple[Queries, Float64]:
-    """Return queries of flat cloth with light from one side, and their `colours`; most without the fallback's."""
-    queries = probes(fabric, behind, False)
-    return queries, colours(fabric, queries, _EVERY)
+def probed(fabric: Fabric, behind: bool) -> Float64:
+    """Return the `colours` of queries of flat cloth with light from one side; most without the fallback's."""
+    return colours(fabric, probes(fabric, behind, False), _EVERY)
 
 
 def probes(

@@ -4,14 +4,11 @@ The mean squared error of a level of soft nodes, or of the fallback, is the expo
 the query: size and length of its footprint, inclinations of viewer and light, bend of the cloth. Its coefficients are
 linear in numbers y of the cloth, so that a cloth turns the table C into coefficients of its own, once:
 
-    log E[e^2] = sum_t x_t(query) sum_z C_tz y_z(cloth) + log f(cloth, range of sizes)
+    log E[e^2] = sum_t x_t(query) sum_z C_tz y_z(cloth)
 
 An error e is that of a grey cloth's colour, relative to the true colour plus a floor. The numbers of a cloth say how
 far its answers differ from one another, on some queries of flat cloth: logarithms of root mean squares, for each side
-of the light. The factors f of a level are the mean squares of its differences from the fallback over what the
-polynomial expects there, in each range of sizes: where a level takes up another way, errors have a step, which is no
-polynomial and differs from cloth to cloth. No truth is needed for either. tests/fits/fit_selvage_errors.py makes the
-table from random cloths.
+of the light. No truth is needed for them. tests/fits/fit_selvage_errors.py makes the table from random cloths.
 
 Of curved cloth the fallback has larger errors than the finest nodes, and is never taken.
 """
@@ -26,7 +23,7 @@ import numpy as np
 
 from pipeline.compiled.arrays import Float32, Float64, Index
 from pipeline.compiled.decorators import kernel
-from pipeline.models.selvage.cloth_numbers import FLOOR, NUMBERS, numbers_of, probed
+from pipeline.models.selvage.cloth_numbers import NUMBERS, numbers_of, probed
 from pipeline.per_fabric import PerFabric
 from pipeline.truth.query import Queries
 from weaves.fabric import Fabric
@@ -40,7 +37,7 @@ OF_CLOTH: Final = (0, 1, 4)
 """Terms whose coefficients depend on the cloth: the constant one, size, inclination of the viewer."""
 
 TERMS: Final = 15  # terms of the polynomial
-SIZE_LIMITS: Final = (0.1, 0.3, 1.0, 3.0)  # limits of the ranges of sizes with factors of their own, in yarn spacings
+SIZE_LIMITS: Final = (0.1, 0.3, 1.0, 3.0)  # limits of the ranges of sizes, in which times differ, in yarn spacings
 SIZES: Final = np.log(np.array(SIZE_LIMITS, np.float32))
 
 CASES: Final = 4
@@ -51,7 +48,6 @@ RANGES: Final = len(SIZE_LIMITS) + 1  # ranges of sizes; a kind of query is a ca
 _LEAST_COSINE = np.float32(0.03)  # lower directions are as this one
 _SMALLEST, _LARGEST = np.float32(math.log(0.03)), np.float32(math.log(16.0))  # sizes beyond are as these
 _BENDS = np.float32(30.0)  # of flat cloth on: curvature well above which errors are of another kind
-_PRIOR = 16  # rows of each range that the polynomial counts for
 _NEVER = 50.0  # logarithm of an error that no wish allows
 _BLOCK = 256  # queries whose terms are at hand at once: they fit a first cache
 _0, _1, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
@@ -95,9 +91,8 @@ def _write_logarithms(queries: Queries, coefficients: Float32, terms: Float32, k
             first, last = min(first, kind), max(last, kind)
         for case in range(first // RANGES, last // RANGES + 1):
             for answer, own in enumerate(coefficients[case]):
-                for n in range(len(block)):
-                    totals[n] = own[TERMS + block[n] % RANGES]
-                for term in range(TERMS):
+                totals[:] = own[0]
+                for term in range(1, TERMS):
                     for n in range(len(block)):  # the inner loop, so that queries are independent
                         totals[n] += own[term] * terms[term, n]
                 for n in range(len(block)):
@@ -115,7 +110,7 @@ def squares_and_kinds(queries: Queries, coefficients: Float32) -> tuple[Float32,
 
 
 def coefficients_of(fabric: Fabric, behind: bool) -> Float32:
-    """Return a cloth's coefficients, (cases, answers, TERMS and ranges of sizes); 0 of light behind unless wanted."""
+    """Return a cloth's coefficients, (cases, answers, TERMS); 0 of light behind unless wanted."""
     return (_BOTH if behind else _FRONT).of(fabric)
 
 
@@ -127,29 +122,13 @@ def expected(what: Literal["errors", "numbers", "microseconds"]) -> list[Float64
 
 def _side(fabric: Fabric, behind: bool) -> Float32:
     """Return coefficients with those of one side of the light, the others 0."""
-    (queries, colours), rows = probed(fabric, behind), expected("errors")
-    numbers = np.clip(numbers_of(colours), *expected("numbers")[int(behind)])
-    result = np.zeros((CASES, len(rows[0]), TERMS + RANGES), np.float32)
+    rows, numbers = expected("errors"), np.clip(numbers_of(probed(fabric, behind)), *expected("numbers")[int(behind)])
+    result = np.zeros((CASES, len(rows[0]), TERMS), np.float32)
     for case in range(int(behind), CASES, 2):
         own = rows[case][:, :TERMS].copy()
         own[:, OF_CLOTH] += numbers[1:] @ rows[case][:, TERMS:].reshape(len(own), NUMBERS - 1, len(OF_CLOTH))
         result[case, :, 0] = _NEVER
-        result[case, : len(own), :TERMS] = own
-    known = ~np.isnan(colours[:, -1])
-    result[int(behind) :: 2, :-1, TERMS:] = np.log(size_factors(queries.take(known), colours[known], result))
-    return result
-
-
-def size_factors(queries: Queries, colours: Float64, coefficients: Float32) -> Float64:
-    """Return the factors of each level and range of sizes, from the colours of all answers to N queries."""
-    best = colours[:, -1:]
-    squares = ((colours[:, :-1] - best) / (best + FLOOR)) ** 2
-    expected, kinds = squares_and_kinds(queries, coefficients)
-    result = np.ones((squares.shape[1], RANGES))
-    for place in np.unique(kinds % RANGES):
-        rows = kinds % RANGES == place
-        prior = _PRIOR * expected[:-1, rows].mean(axis=1)
-        result[:, place] = (squares[rows].sum(axis=0) + prior) / (expected[:-1, rows].sum(axis=1) + prior)
+        result[case, : len(own)] = own
     return result
 
 
