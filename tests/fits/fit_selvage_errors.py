@@ -91,7 +91,7 @@ def main(presets: str = PRESETS, random: int = 12, rows: int = 768, seed: int = 
         parts = [samples(cloth, case, rows, seed + index) for index, cloth in enumerate(cloths)]
         columns, squares, variance = (np.concatenate(part) for part in zip(*parts, strict=True))
         numbers = columns[:, [0, *range(TERMS, columns.shape[1], len(OF_CLOTH))]]
-        ranges.append([numbers.min(axis=0).tolist(), numbers.max(axis=0).tolist()])
+        ranges.append(np.round([numbers.min(axis=0), numbers.max(axis=0)], 4).tolist())
         weights = np.concatenate([np.full(len(part[0]), 1.0 / len(part[0])) for part in parts])
         answers = len(NODE_LEVELS) + (case < CURVED)  # of curved cloth the fallback is never taken
         table.append([fitted(columns, squares[:, one], variance, weights) for one in range(answers)])
@@ -101,7 +101,8 @@ def main(presets: str = PRESETS, random: int = 12, rows: int = 768, seed: int = 
         levels = [*(SoftNodes(level).predict for level in NODE_LEVELS), fallback_answers]
         times = [1e6 * seconds_of(np.arange(RANGES * CASES), levels, load_fabric(name)) for name in TIMED]
         means = np.exp(np.log(times).mean(axis=0)).round(3).tolist()
-        found = {"errors": [np.round(rows, 4).tolist() for rows in table], "numbers": ranges, "microseconds": means}
+        errors = [[[float(f"{x:.5g}") for x in row] for row in rows] for rows in table]
+        found = {"errors": errors, "numbers": ranges[:CURVED], "microseconds": means}
         out.write_text(json.dumps(found).replace("], [", "],\n [") + "\n", encoding="utf-8")
 
 

@@ -26,10 +26,12 @@ if TYPE_CHECKING:
 _START = 0.3  # seconds of any image
 _LIVE_SECONDS, _POINTS_A_PIXEL, _LIVE_VIEWS = 37.0, 512, 5
 _UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "path_traced", "measured_cloth")
-_EVALUATED: Final = {  # models of studies
+_EVALUATED: Final[dict[StudyName, tuple[str, ...]]] = {  # what studies evaluate
     "footprint_colours": ("soft_nodes",),
-    "path_traced": ("point_sampled", "soft_nodes"),
-    "throughput": ("selvage", "soft_nodes"),
+    "measured_cloth": ("soft_nodes",),
+    "path_traced": ("fallback", "point_sampled", "soft_nodes"),
+    "sampling": ("soft_nodes",),
+    "throughput": ("fallback", "selvage", "soft_nodes"),
 }
 _LONG: Final = {"calibration": 400.0, "bias": 170.0, "sampling": 170.0, "measured_cloth": 510.0, "path_traced": 600.0}
 
@@ -192,7 +194,8 @@ class Study(Measurement):
 
     def versions(self) -> dict[str, int]:
         """Return the versions of its code and of the models that it evaluates."""
-        return super().versions() | {name: versions.MODELS[name] for name in _EVALUATED.get(self.study, ())}
+        known = {"fallback": versions.FALLBACK, **versions.MODELS}
+        return super().versions() | {name: known[name] for name in _EVALUATED.get(self.study, ())}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
         """Measure it.

@@ -10,9 +10,9 @@ For a wished error the price is the highest at which the root mean square over r
 answer then depends on the query, the cloth and the wish alone. For a wished time it is the least at which the mean time
 of these queries is at most the wished one.
 
-Seconds are by kind of query: a case of `errors` and a range of sizes, in which times hardly differ. For a wished error
-they are the usual ones (`errors.EXPECTED`), so that the choice depends on no machine: ratios count, and errors hardly
-depend on them. For a wished time they are measured, once for a cloth in a process.
+Seconds are by kind of query: a case of `errors` and a range of sizes. For a wished error they are the usual ones
+(`errors.EXPECTED`), so that the choice depends on no machine: ratios count, and errors hardly depend on them. For a
+wished time they are measured, once for a cloth in a process.
 """
 
 from collections.abc import Callable, Sequence
@@ -65,6 +65,8 @@ def within_time(squares: Float32, kinds: Index, seconds: Float64, time: float) -
     `squares` (answers, N) are expected squared errors, `kinds` (N,) rows of `seconds` (kinds, answers), the time of an
     answer; `time` is the mean of a query, at least that of the cheapest answers.
     """
+    if not len(kinds):
+        return np.empty(0, np.uint8)
     every, low, high = max(1, len(kinds) // _SAMPLE), 0, len(PRICES) - 1
     sample, some = np.ascontiguousarray(squares[:, ::every]), np.ascontiguousarray(kinds[::every])
     while high - low > 1:

@@ -30,15 +30,16 @@ from weaves.fabric import Fabric
 
 EXPECTED: Final = Path(__file__).with_name("expected.json")
 """Expectations of all cloths: ``errors``, the table C (cases, answers, TERMS for the number 1 and OF_CLOTH for each of
-the others), the least and the largest ``numbers`` of the cloths that it was fitted to, of each case, and
-``microseconds`` of a query (kinds, answers), see `choice`. Beyond these numbers cloths count as at them."""
+the others); ``numbers``, the least and the largest of the cloths that it was fitted to, for light in front and behind
+(a number outside them counts as the nearer of the two); and usual ``microseconds`` of a query (kinds, answers),
+processor times, geometric means of three cloths."""
 
 OF_CLOTH: Final = (0, 1, 4)
 """Terms whose coefficients depend on the cloth: the constant one, size, inclination of the viewer."""
 
 TERMS: Final = 15  # terms of the polynomial
-SIZE_LIMITS: Final = (0.1, 0.3, 1.0, 3.0)  # limits of the ranges of sizes, in which times differ, in yarn spacings
-SIZES: Final = np.log(np.array(SIZE_LIMITS, np.float32))
+SIZE_LIMITS: Final = (0.1, 0.3, 1.0, 3.0)  # limits of the ranges of sizes of `choice`, in yarn spacings
+_SIZES: Final = np.log(np.array(SIZE_LIMITS, np.float32))
 
 CASES: Final = 4
 """Cases, each with coefficients of its own: light in front, behind; curved cloth with light in front, behind."""
@@ -66,7 +67,7 @@ def write_terms(queries: Queries, start: int, terms: Float32, kinds: Index) -> N
         terms[11, n] = np.abs(np.log(sigma / minor)) if sigma != minor else _0
         terms[13, n] = np.log(_1 + _BENDS * curvature) if curvature > _0 else _0
         kind = RANGES * (int(queries.wi[query, 2] < _0) + 2 * int(curvature > _0))
-        for end in SIZES:
+        for end in _SIZES:
             kind += int(size > end)
         kinds[n] = kind
     for n in range(len(kinds)):

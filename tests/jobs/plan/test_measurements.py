@@ -53,6 +53,7 @@ def test_every_study_is_in_a_shipped_recipe():
     for name in sum(named.values(), ()):
         module = import_module(f"reports.truth.{name}")
         assert callable(module.measure) and module.RECORDS
+    assert truth.Study(study="throughput").versions().keys() == {"truth", "bench", "fallback", "selvage", "soft_nodes"}
 
 
 def test_a_study_records_what_its_module_yields_and_fails_on_an_unstable_expression(tmp_path, monkeypatch):

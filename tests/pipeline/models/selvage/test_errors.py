@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,8 @@ def test_the_table_has_a_row_for_every_case_and_a_query_errs_alike_alone_and_amo
     table = expected("errors")
     assert [len(rows) for rows in table] == [6, 6, 5, 5] and len(table) == CASES
     assert {len(row) for rows in table for row in rows} == {TERMS + (NUMBERS - 1) * len(OF_CLOTH)}
+    times = np.array(expected("microseconds"))
+    assert times.shape == (RANGES * CASES, 6) and (times > 0.0).all() and np.isfinite(times).all()
     queries = probes(DENIM, False, False, 16)
     np.testing.assert_allclose(colours(DENIM, queries)[:, -1], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)
     # Whatever side the others are lit from; mirrored queries have the same errors.
@@ -50,10 +54,11 @@ def test_numbers_of_a_cloth_are_differences_of_its_answers_and_end_where_those_o
     assert numbers_of(other)[1] - numbers_of(one)[1] == pytest.approx(1.0)
     np.testing.assert_array_equal(numbers_of(one)[2:], numbers[2:])
     sides = []
-    for further in (0.0, 1.0):
-        monkeypatch.setattr(errors, "numbers_of", lambda _, further=further: expected("numbers")[0][1] + further)
+    least, most = expected("numbers")[0]
+    for counted in (least - 1.0, least, 0.5 * (least + most), most, most + 1.0):
+        monkeypatch.setattr(errors, "numbers_of", lambda _, counted=counted: counted)
         sides.append(errors._side(DENIM, False))
-    np.testing.assert_array_equal(*sides)
+    assert [(one == other).all() for one, other in pairwise(sides)] == [True, False, False, True]
 
 
 @pytest.mark.slow

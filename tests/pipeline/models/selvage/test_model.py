@@ -53,6 +53,8 @@ def test_every_query_gets_the_answer_chosen_by_itself_and_more_time_has_less_err
     assert errors[0] >= errors[1] >= errors[2]
     best = selvage.expected_errors(DENIM, queries).argmin(axis=1)
     np.testing.assert_array_equal(selvage.choose(DENIM, queries, time=1e-2), best)
+    for wish in ({"error": 0.01}, {"time": 1e-4}):
+        assert selvage.predict(DENIM, queries.take(slice(0)), **wish).shape == (0, 4)
 
 
 def test_light_from_behind_and_curved_cloth_are_answered_but_another_meaning_of_walls_has_no_fallback(selvage, queries):
