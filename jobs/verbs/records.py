@@ -154,7 +154,7 @@ def _print_times(records: Sequence[Record], names: Sequence[str]) -> None:
     """Print the time of a query on one thread: a row a method, a column a machine."""
     times: dict[str, dict[str, float]] = {}
     for record in records:
-        if record.metric == "time" and record.threads in (0, 1):
+        if record.metric == "time" and not record.role and record.threads in (0, 1):
             method = f"{record.method} {record.setting}".strip()
             times.setdefault(method, {})[record.provenance.machine] = record.value
     columns = ["method", *(f"{_letter(index)}, ns a query" for index in range(len(names)))]

@@ -104,6 +104,7 @@ def measure_timing(
     truth: TruthOptions,
     options: TimingOptions,
     progress: Callable[[float], None] = lambda share: None,
+    unseen: Sequence[HeldOutFabric] = (),
 ) -> list[Record]:
     """Time methods side by side on held-out queries of all fabrics; note bytes, memory and the cost of a fabric.
 
@@ -113,9 +114,13 @@ def measure_timing(
     on one thread, where the system reports it (`reports.measure.memory`); `prepare_time`, the time until a fabric never
     seen before can be evaluated, where any fabric can be. Then `time` for each method and number of threads, the truth
     last, with every reading as `samples` and the queries a fabric as `note` (`reports.measure.timing.affordable`).
+    Methods that cover all `unseen` fabrics are timed on those alone too, on one thread, with the role ``unseen``.
     """
-    sample = [(cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))) for cloth, queries, _ in fabrics]
-    _prepare(methods, sample, truth)
+    sample, others = (
+        [(cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))) for cloth, queries, _ in part]
+        for part in (fabrics, unseen)
+    )
+    _prepare(methods, [*sample, *others], truth)
     entries, records, edits = [], [], count(1)
     for index, method in enumerate(methods):
         progress(0.3 * index / len(methods))
@@ -124,6 +129,9 @@ def measure_timing(
             continue
         subject = Record(method=method.name, setting=method.setting)
         entries.append((subject, timing.affordable(timing.Contender(method.predict, covered))))
+        if others and all(method.covers(cloth) for cloth, _ in others):
+            own = timing.affordable(timing.Contender(method.predict, others))
+            entries.append((subject.model_copy(update={"role": "unseen"}), own))
         stored = float(np.mean([method.bytes_stored(cloth) for cloth, _ in covered]))
         records.append(subject.of("bytes_stored", stored, len(covered)))
         memory = peak_memory(partial(method.predict, *covered[0]))
@@ -141,7 +149,7 @@ def _times(
     runs = [
         (subject.model_copy(update={"threads": threads}), contender._replace(threads=threads))
         for subject, contender in entries
-        for threads in timing.thread_counts(options.threads)
+        for threads in timing.thread_counts(options.threads)[: 1 if subject.role else None]
     ]
     contenders, repeats = [contender for _, contender in runs], options.timing_repeats
     timings = timing.time_side_by_side(contenders, repeats, options.warm_up, progress=progress)

@@ -131,7 +131,8 @@ def _row(row: Difference) -> TableRow:
 
 def _subject(record: Record) -> str:
     if record.metric == "time":
-        return f"a query, {record.threads} thread{'' if record.threads == 1 else 's'}" if record.threads else "a query"
+        query = "a query of unseen fabrics" if record.role else "a query"
+        return f"{query}, {record.threads} thread{'' if record.threads == 1 else 's'}" if record.threads else query
     words = {"prepare_time": "to add a fabric", "encode_time": f"to edit {record.note}"}
     return words.get(record.metric, record.fabric)
 
@@ -160,8 +161,8 @@ def holm(p_values: Sequence[float]) -> list[float]:
 def _comparable(records: Iterable[Record]) -> dict[_Key, Record]:
     """Return times and errors by what they are of."""
     chosen = (r for r in records if r.metric in TIMES or (r.metric == "mse" and r.scene == "queries"))
-    edits = ((r, r.note if r.metric == "encode_time" else "") for r in chosen)
-    return {(r.metric, r.method, r.setting, r.fabric, r.threads, edit): r for r, edit in edits}
+    parts = ((r, r.note if r.metric == "encode_time" else r.role) for r in chosen)
+    return {(r.metric, r.method, r.setting, r.fabric, r.threads, part): r for r, part in parts}
 
 
 def _extents(*benchmarks: Sequence[Record]) -> dict[_Key, float]:

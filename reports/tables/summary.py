@@ -190,10 +190,12 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
     Columns: method, setting; on the fewest threads that were timed median_ns, first_quartile_ns, third_quartile_ns (a
     query), repeats, threads and frame_ms; on the most, where those are more, most_threads, most_threads_ns and
     most_threads_frame_ms; processor_time and energy on the fewest, where measured; bytes_stored, memory (bytes a call
-    adds), prepare_ms; time_ratio, the time over that of 2 points. A frame is 1920 × 1080 queries.
+    adds), prepare_ms; unseen_ns, the median on all unseen fabrics; time_ratio, the time over that of 2 points. A frame
+    is 1920 × 1080 queries.
     """
     table = to_table(records)
     times = table[table["metric"] == "time"]
+    unseen, times = (times[times["role"] == role] for role in ("unseen", ""))
     threads = times.groupby(_KEYS, sort=False)["threads"]
     fewest, most = threads.transform("min"), threads.transform("max")
     names = {"value": "median_ns", "low": "first_quartile_ns", "high": "third_quartile_ns", "count": "repeats"}
@@ -205,10 +207,10 @@ def timing_table(records: Sequence[Record]) -> pd.DataFrame:
     names = {"bytes_stored": "bytes_stored", "peak_memory": "memory", "prepare_time": "prepare_ms"}
     names |= {metric: metric for metric in ("processor_time", "energy") if metric in {*table["metric"]}}
     for metric, name in names.items():
-        costs = table[table["metric"] == metric]
+        costs = table[(table["metric"] == metric) & (table["role"] == "")]
         costs = costs[costs["threads"] == costs["threads"].min()]
         result = result.join(costs.set_index(_KEYS)["value"].rename(name))
-    result = result.reset_index()
+    result = result.join(unseen.set_index(_KEYS)["value"].rename("unseen_ns")).reset_index()
     base = result.loc[of_baseline(result), "median_ns"]
     result["time_ratio"] = result["median_ns"] / float(base.iloc[0]) if len(base) else math.nan
     return result

@@ -31,7 +31,6 @@ from weaves.fabric import Fabric, load_fabric
 from weaves.population import Population, population_fabrics
 
 PENALTY = 3e-4
-STEPS = 40
 LARGEST = 4.0  # squared error of twice the colour
 TIMED = ("denim", "twill_4_4", "gauze")
 PRESETS = "cotton_twill,denim,silk_charmeuse,voile,herringbone,polyester_lining,basket,wool_gabardine,gauze"
@@ -67,7 +66,7 @@ def fitted(columns: np.ndarray, squares: np.ndarray, variance: np.ndarray, weigh
         total = mean(coefficients) + variance
         return float(weights @ (np.log(total) + squares / total) + 0.5 * penalty @ coefficients**2)
 
-    for _ in range(STEPS):
+    for _ in range(40):
         total = mean(found) + variance
         share = mean(found) / total
         slope = columns.T @ (weights * share * (1.0 - squares / total)) + penalty * found

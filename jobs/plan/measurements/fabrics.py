@@ -238,7 +238,7 @@ class TimeOfMethods(Measurement):
         bench, firsts = subjects.recipe.bench, (model for model in subjects.models if model.is_first)
         yield cls(
             models=tuple(TimedModel(ways=model.run_options(bench), **dict(model)) for model in firsts),
-            dataset=subjects.held_out(*(fabric for fabric, _ in subjects.fabrics)),
+            dataset=subjects.held_out(*(fabric for fabric, _ in subjects.recipe.tested)),
             options=options.select(TimingOptions, bench),
         )
 
@@ -263,12 +263,15 @@ class TimeOfMethods(Measurement):
         from reports.measure.held_out import measure_timing
         from reports.record import Record
 
-        truth = TruthOptions.model_validate(self.dataset.manifest(out).about["truth"])
+        manifest = self.dataset.manifest(out)
+        truth = TruthOptions.model_validate(manifest.about["truth"])
         loaded = [(model, model.methods(out)) for model in self.models]
         methods = [method for _, own in loaded for method in own]
         variants = [run for model, own in loaded for run in model.variants(own, model.ways)]
         rows = list(self.dataset.read(out, rows=self.options.rows))
-        records = measure_timing(methods + variants, rows, truth, self.options, lambda share: progress(0.6 * share))
+        unseen = list(self.dataset.read(out, manifest.names("unseen", "unseen_population"), self.options.rows))
+        timed = methods + variants
+        records = measure_timing(timed, rows, truth, self.options, lambda share: progress(0.6 * share), unseen)
         for model, own in loaded:
             for method in own:  # those runtimes that this machine lacks
                 for name, reason in not_run(method, model.ways.runtimes).items():

@@ -50,7 +50,7 @@ class HeldOutRows(TaskPart):
         from reports.measure.held_out import held_out
 
         manifest = self.manifest(out)
-        for name in names or manifest.names("seen", "unseen"):
+        for name in manifest.names("seen", "unseen") if names is None else names:
             yield held_out(manifest, out / self.folder, name, rows)
 
 

@@ -34,6 +34,7 @@ RECORDS = [
     *error("point_sampled", "k = 2", "twill_4_4", "unseen", 5.0),
     *(Record(method="woven", fabric=f, role="seen", scene=s, metric=m, value=v) for f, s, m, v in PICTURES),
     Record(method="woven", metric="time", value=400.0),
+    Record(method="woven", role="unseen", metric="time", value=900.0),
     Record(method="point_sampled", setting="k = 2", metric="time", value=500.0),
     Record(method="truth", metric="time", value=50_000.0),
     Record(method="woven", metric="bytes_stored", value=350_000.0),
@@ -82,6 +83,7 @@ def test_summary_is_one_row_a_method_with_aliasing_timing_and_mean_spectra():
     timing = summary.timing_table(RECORDS)
     woven, truth = row(timing, method="woven"), row(timing, method="truth")
     assert (woven.median_ns, woven.time_ratio, woven.bytes_stored) == pytest.approx((400, 0.8, 350_000))
+    assert woven.unseen_ns == 900.0 and math.isnan(truth.unseen_ns)
     assert truth.time_ratio == pytest.approx(100) and math.isnan(truth.bytes_stored)
     # 400 ns a query are .83 s a frame of 1920 by 1080.
     assert woven.frame_ms == pytest.approx(829.44)

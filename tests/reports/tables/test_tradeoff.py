@@ -19,7 +19,7 @@ TIMING = pd.DataFrame(
         ("poor", "", 300.0, 1.0), ("narrow", "", 10.0, 1.0), ("lost", "", 10.0, 1.0), ("truth", "", 9e4, math.nan),
     ],
     columns=["method", "setting", "median_ns", "bytes_stored"],
-)  # fmt: skip
+).assign(unseen_ns=[math.nan, 150.0, *[math.nan] * 5])  # fmt: skip
 
 
 def test_the_table_compares_what_answers_for_the_same_fabrics_and_names_the_cheapest():
@@ -27,7 +27,8 @@ def test_the_table_compares_what_answers_for_the_same_fabrics_and_names_the_chea
     found = {(row.role, row.method, row.setting): row.front for row in tradeoff_table(ERRORS, TIMING).itertuples()}
     front = [("seen", "slow", ""), ("seen", "fast", "k = 1"), ("seen", "fast", "k = 2"), ("unseen", "fast", "k = 1")]
     assert found == dict.fromkeys(front, True) | {("seen", name, ""): False for name in ("poor", "lost")}
-    seen = tradeoff_table(ERRORS, TIMING).query("role == 'seen'")
+    seen, unseen = (tradeoff_table(ERRORS, TIMING).query(f"role == '{role}'") for role in ("seen", "unseen"))
+    assert unseen["ns"].tolist() == [150.0]
     best = [cheapest(seen, "ns", error=limit) for limit in (0.25, 0.1, 0.05)]
     assert [(row.method, row.setting) for row in best] == [("fast", "k = 1"), ("fast", "k = 2"), ("slow", "")]
     assert cheapest(seen, "ns", error=0.005) is None

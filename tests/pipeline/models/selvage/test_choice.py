@@ -39,7 +39,6 @@ def test_the_wished_time_is_used_up_and_the_price_of_an_error_is_the_highest_tha
         assert 0.93 * time < seconds <= time
     assert not within_time(squares, kinds, SECONDS, SECONDS[kinds, 0].mean()).any()
     np.testing.assert_array_equal(within_time(squares, kinds, SECONDS, 1.0), squares.argmin(axis=0))
-    squares, kinds = drawn(1000)
     curve = error_curve(squares, kinds, SECONDS)
     assert (np.diff(curve) >= 0).all()
     for error in np.sqrt(curve[[50, 200, 300]] * 1.0001):

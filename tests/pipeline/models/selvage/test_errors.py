@@ -29,7 +29,7 @@ def test_the_table_has_a_row_for_every_case_and_a_query_errs_alike_alone_and_amo
     assert [len(rows) for rows in table] == [6, 6, 5, 5] and len(table) == CASES
     assert {len(row) for rows in table for row in rows} == {TERMS + (NUMBERS - 1) * len(OF_CLOTH)}
     times = np.array(expected("microseconds"))
-    assert times.shape == (RANGES * CASES, 6) and (times > 0.0).all() and np.isfinite(times).all()
+    assert times.shape == (RANGES * CASES, 6) and (times > 0.0).all()
     queries = probes(DENIM, False, False, 16)
     np.testing.assert_allclose(colours(DENIM, queries)[:, -1], fallback_answers(DENIM, queries, 0) @ GREY, rtol=1e-6)
     # Whatever side the others are lit from; mirrored queries have the same errors.
