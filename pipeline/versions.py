@@ -34,3 +34,5 @@ SCENE_BENCH: Final = 5  # measurements in scenes and the files they write (`repo
 VIEWER: Final = 10  # the page of a live fabric: its shaders, scripts and views (`reports.viewer`)
 
 EXTREMES: Final = 1  # measurements at extremes (`reports.measure.extremes`)
+
+MITSUBA: Final = 1  # frames of the integrator `twillight_path`

@@ -17,14 +17,7 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, SerializerFunctionWrapHandler, Strict, model_serializer, model_validator
 
-from weaves.colour_order import (
-    MOST_COLOURS,
-    MOST_THREADS,
-    ColourOrder,
-    PaletteColour,
-    ThreadColours,
-    colours_of_yarns,
-)
+from weaves.colour_order import MOST_COLOURS, MOST_THREADS, ColourOrder, PaletteColour, ThreadColours, colours_of_yarns
 from weaves.count import PerCm, with_widths
 from weaves.draft import Draft, Loom, Matrix
 from weaves.errors import BadInput, nearest

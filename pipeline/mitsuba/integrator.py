@@ -5,7 +5,9 @@
 Otherwise it is Mitsuba's `path`. At the camera a ray's footprint is a pixel's Gaussian less the variance that the
 film's filter adds, so that cloth is equally sharp with any number of samples.
 
-Emitters are sampled at every bounce, and both ways to a light are weighted by the power heuristic [Veach1995Combining].
+At every bounce each emitter is sampled, because a choice between sun and sky is noisier than cloth; one at random in a
+scene with more than `MOST_EMITTERS`, or with a `sampling_weight` that is not 1. Both ways to a light are weighted by
+the power heuristic [Veach1995Combining].
 A footprint after a bounce is a disc across the ray, of deviation
 
     sqrt(width^2 + blur^2),    width += spread t,    blur += scatter t
@@ -22,6 +24,7 @@ of u are a tenth of a yarn spacing by default. A ray that leaves a silhouette ag
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import Any, Final
 
 import drjit as dr
@@ -37,6 +40,8 @@ from weaves.validation import Frozen, validated
 INTEGRATOR: Final = "twillight_path"
 
 MOST_RAYS: Final = 2**18  # most rays that are traced at a time; a ray takes about a kilobyte
+
+MOST_EMITTERS: Final = 4  # emitters that are sampled each
 
 MOST_SCATTER: Final = 0.5
 """Largest square of `scatter`, in radians squared: that of a direction drawn evenly from a hemisphere."""
@@ -158,6 +163,10 @@ class _Path:
 
     def __init__(self, scene: Any, sampler: Any, options: PathOptions) -> None:
         self._scene, self._sampler, self._options = scene, sampler, options
+        emitters = scene.emitters()
+        self._to_light = [emitter.sample_direction for emitter in emitters]
+        if len(emitters) > MOST_EMITTERS or any(emitter.sampling_weight() != 1.0 for emitter in emitters):
+            self._to_light = [partial(scene.sample_emitter_direction, test_visibility=False)]
         self._scalar = str(mi.variant()).startswith("scalar")
         self._context = mi.BSDFContext()
 
@@ -180,9 +189,10 @@ class _Path:
                 break
             cone.meet(ray, si)
             chord = self._bend(si, active)
-            to_light, lobe, direction, end = sampler.next_2d(), sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
-            self._evaluate(si, to_light, lobe, direction, end, active, cone.state)
-            light += throughput * self._lit(si, to_light, active)
+            lobe, direction, end = sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
+            self._evaluate(si, lobe, direction, end, active, cone.state)
+            for to_light in self._to_light:
+                light += throughput * self._lit(si, to_light, active)
             drawn, weight = si.bsdf().sample(self._context, si, lobe, direction, active)
             throughput *= weight
             place, pdf, delta = si, drawn.pdf, mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
@@ -238,19 +248,20 @@ class _Path:
         emitted = mi.DirectionSample3f(scene, si, place)
         sampled = active & ~delta if not self._scalar else active and not delta
         other = scene.pdf_emitter_direction(place, emitted, sampled) if dr.any(sampled) else mi.Float(0.0)
+        other *= len(self._to_light)  # a scene's density is that of one of its emitters, drawn at random
         return dr.select(delta, 1.0, _heuristic(pdf, other)) * emitter.eval(si, active)
 
-    def _lit(self, si: Any, numbers: Any, active: Any) -> Any:
-        """Return the light of emitters that are sampled, weighted against `_emitted`."""
-        scene, bsdf = self._scene, si.bsdf()
-        wanted = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        towards, power = scene.sample_emitter_direction(si, numbers, True, wanted)
+    def _lit(self, si: Any, to_light: Callable[..., Any], active: Any) -> Any:
+        """Return the light of an emitter in a direction to it, weighted against `_emitted`."""
+        wanted = active & mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Smooth)
+        towards, power = to_light(si, self._sampler.next_2d(), active=wanted)
         wanted = wanted & (towards.pdf != 0.0) & (dr.max(power) > 0.0)
+        wanted = wanted & (self._scene.ray_test(si.spawn_ray_to(towards.p), wanted) != wanted)
         if not dr.any(wanted):
             return mi.Spectrum(0.0)
         wo = si.to_local(towards.d)
         self._evaluate(wo, wanted, power, towards)
-        value, pdf = bsdf.eval_pdf(self._context, si, wo, wanted)
+        value, pdf = si.bsdf().eval_pdf(self._context, si, wo, wanted)
         return dr.select(wanted, dr.select(towards.delta, 1.0, _heuristic(towards.pdf, pdf)) * value * power, 0.0)
 
     def _evaluate(self, *values: Any) -> None:

@@ -181,10 +181,6 @@ class Worn:
         through = _asked(partial(self._bsdf.method.transparency, self.fabric), looks)
         return np.asarray(1.0 - covered + covered * through)
 
-    def coverage(self, hits: RayHits) -> Float32:
-        """Return the share of view rays that do not leave the cloth again, (N,)."""
-        return self._seen(hits)[2]
-
     def _seen(self, hits: RayHits) -> _Known:
         """Return what is known of hits; a renderer calls several times with the same ones."""
         known = self._known

@@ -167,12 +167,7 @@ def bad_list(out: Path) -> Path:
 
 
 def _answers(
-    pool: Executor,
-    answerer: Answerer,
-    batch: Queries,
-    good: Mask,
-    summary: Summary,
-    progress: Callable[[int], None],
+    pool: Executor, answerer: Answerer, batch: Queries, good: Mask, summary: Summary, progress: Callable[[int], None]
 ) -> Answers:
     """Answer the good rows of a block, in runs of neighbours that are no longer than a chunk."""
     rows, before = len(good), summary.rows

@@ -131,13 +131,12 @@ class TruthOptions(UsualWalls):
     def _rays_have_one_model(self) -> TruthOptions:
         if self.parallax and (self.frame == "macro" or not self.shadows):
             raise ValueError("parallax needs frame 'ply' and shadows; say parallax = false for others")
-        if self.parallax and self.estimator == "quadrature":
-            known = self.walls == "left_out", self.footprint == "gaussian", self.normaliser == "visible"
-            if not all(known):
-                raise ValueError(
-                    "with parallax, quadrature needs walls 'left_out', footprint 'gaussian' and normaliser 'visible': "
-                    "take auto or owen"
-                )
+        known = (self.walls, self.footprint, self.normaliser) == ("left_out", "gaussian", "visible")
+        if self.parallax and self.estimator == "quadrature" and not known:
+            raise ValueError(
+                "with parallax, quadrature needs walls 'left_out', footprint 'gaussian' and normaliser 'visible': "
+                "take auto or owen"
+            )
         if self.walls != "left_out" and not self.parallax:
             raise ValueError("walls are met by view rays alone: parallax is needed")
         return self

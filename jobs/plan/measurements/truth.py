@@ -29,7 +29,7 @@ _UNTIMED: Final[tuple[StudyName, ...]] = ("stability", "calibration", "bias", "p
 _EVALUATED: Final[dict[StudyName, tuple[str, ...]]] = {  # what studies evaluate
     "footprint_colours": ("soft_nodes",),
     "measured_cloth": ("soft_nodes",),
-    "path_traced": ("fallback", "point_sampled", "soft_nodes"),
+    "path_traced": ("fallback", "mitsuba", "point_sampled", "soft_nodes"),
     "sampling": ("soft_nodes",),
     "throughput": ("fallback", "selvage", "soft_nodes"),
 }
@@ -194,7 +194,7 @@ class Study(Measurement):
 
     def versions(self) -> dict[str, int]:
         """Return the versions of its code and of the models that it evaluates."""
-        known = {"fallback": versions.FALLBACK, **versions.MODELS}
+        known = {"fallback": versions.FALLBACK, "mitsuba": versions.MITSUBA, **versions.MODELS}
         return super().versions() | {name: known[name] for name in _EVALUATED.get(self.study, ())}
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:

@@ -11,7 +11,9 @@ CHANGED = {
     "TRUTH": "",
     "TRAINING": "^train|woven|neumip|timing|frame time|^report",
     "BOUND": "^bench errors|timing|^report",
-    **dict.fromkeys(("FALLBACK", "SCENES", "SCENE_BENCH"), "scene|frame time|^report"),
+    **dict.fromkeys(("SCENES", "SCENE_BENCH"), "scene|frame time|^report"),
+    "FALLBACK": "scene|frame time|path_traced|^report",
+    "MITSUBA": "path_traced|^report",
     "VIEWER": "live|^report",
     "EXTREMES": "extremes|^report",
 }
@@ -21,7 +23,7 @@ CHANGED = {
     "version", ["BENCH", *(name for name in vars(versions) if name.isupper() and name != "MODELS")]
 )
 def test_a_version_changes_what_its_code_makes_and_what_is_made_of_it(files, monkeypatch, version):
-    more = 'bounds = true\nlive = { fabrics = ["denim"] }\nscenes = { names = ["sphere"] }'
+    more = 'studies = ["path_traced"]\nbounds = true\nlive = { fabrics = ["denim"] }\nscenes = { names = ["sphere"] }'
     path = files.exchange("frames = 4", f"frames = 4\n{more}").write()
     before = plan(load_recipe(path))
     module = catalogue if version == "BENCH" else versions

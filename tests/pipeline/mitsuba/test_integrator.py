@@ -104,22 +104,29 @@ def test_a_bounce_widens_the_footprint_and_a_rare_direction_no_more_than_an_even
 
 
 def test_light_transport_is_that_of_mitsubas_path_tracer(mi):
-    """Two diffuse floors, a point light and an even sky: means of 8 pictures each, a z-test at .1 %."""
-    lights = {"sky": {"type": "constant", "radiance": 0.3}, "lamp": LAMP}
+    """Two diffuse floors, a point light and an even sky: means of 8 pictures each, tests at .1 % together. Each emitter
+    is sampled, or a random one as it is weighted. Two lamps give the sum of their lights, without noise of a choice."""
     floors = {"floor": floor(mi, 2.0), "shelf": floor(mi, 0.5, 0.6)}
-    scene = mi.load_dict({"type": "scene", **floors, **lights, "sensor": sensor(mi)})
     means, errors = [], []
     # In evaluated loops `path` of Mitsuba 3.9.1 loses light.
     theirs = "path" if mi.variant().startswith("scalar") else "prb"
-    for kind, samples in (("twillight_path", 4), (theirs, 256)):
+    for kind, samples, weight in (("twillight_path", 4, 1.0), ("twillight_path", 4, 0.5), (theirs, 256, 1.0)):
+        sky = {"type": "constant", "radiance": 0.3, "sampling_weight": weight}
+        scene = mi.load_dict({"type": "scene", **floors, "sky": sky, "lamp": LAMP, "sensor": sensor(mi)})
         tracer = path(mi, kind, max_depth=4)
         with evaluated():  # cloth of other tests may still be in memory
             pictures = [mi.render(scene, integrator=tracer, spp=samples, seed=k) for k in range(8)]
         found = [float(np.asarray(picture).mean()) for picture in pictures]
         means.append(np.mean(found))
         errors.append(np.std(found, ddof=1) / math.sqrt(8))
-    assert abs(means[0] - means[1]) < 4.8 * math.hypot(*errors)  # t of 7 degrees of freedom at .1 %, two-sided
-    assert errors[0] < 0.1 * means[0]
+    for mean, error in zip(means[:2], errors[:2], strict=True):  # t of 7 degrees of freedom at .05 %, two-sided
+        assert abs(mean - means[2]) < 6.1 * math.hypot(error, errors[2])
+        assert error < 0.1 * mean
+    lamps = {"lamp": LAMP, "other": LAMP | {"position": [-1.0, 0.5, 2.0]}}
+    rooms = ({**floors, **lit, "sensor": sensor(mi, 1, 1)} for lit in (lamps, *({"lamp": x} for x in lamps.values())))
+    scenes = [mi.load_dict({"type": "scene", **room}) for room in rooms]
+    both, *alone = (mi.render(scene, integrator=path(mi, max_depth=2), seed=3) for scene in scenes)
+    np.testing.assert_allclose(both, np.sum(alone, axis=0), rtol=1e-5)
 
 
 @NEEDS_LLVM

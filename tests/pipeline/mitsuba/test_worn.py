@@ -117,12 +117,12 @@ def test_a_rim_covers_what_the_method_says_and_lets_the_rest_pass():
     query = Queries.round([0.62], [0.57], [0.3], light[None], hits.viewer)._replace(curvature=np.float32([0.1]))
     covered = bsdf.method.coverage(bsdf.fabric, query)
     assert 0.05 < covered[0] < 0.95
-    np.testing.assert_allclose(cloth.coverage(hits), covered, rtol=1e-6)
+    np.testing.assert_allclose(cloth._seen(hits)[2], covered, rtol=1e-6)
     np.testing.assert_allclose(cloth.eval(hits, light[None]), covered[0] * bsdf.eval(query), rtol=1e-5)
     through = bsdf.method.transparency(bsdf.fabric, query._replace(wi=query.wo), 0)
     np.testing.assert_allclose(cloth.transparency(hits), 1 - covered + covered * through, rtol=1e-5)
-    assert cloth.coverage(hits._replace(bend=np.zeros(1))) == 1.0
-    assert cloth.coverage(hits._replace(viewer=hits.viewer * [1, 1, -1])) == 1.0
+    assert cloth._seen(hits._replace(bend=np.zeros(1)))[2] == 1.0
+    assert cloth._seen(hits._replace(viewer=hits.viewer * [1, 1, -1]))[2] == 1.0
 
 
 def test_samples_at_a_rim_have_the_density_and_the_weight_of_their_lobe():
@@ -130,7 +130,7 @@ def test_samples_at_a_rim_have_the_density_and_the_weight_of_their_lobe():
     cloth, wi = worn_of("denim"), sphere(64, 128)
     many = at_a_rim(len(wi), 20.0)
     straight = 1.0 - cloth.pdf(many, wi).mean() * 4.0 * math.pi
-    covered = cloth.coverage(many)[0]
+    covered = cloth._seen(many)[2][0]
     flat = 1.0 - cloth.pdf(many._replace(bend=np.zeros(len(wi))), wi).mean() * 4.0 * math.pi
     assert straight == pytest.approx(1.0 - covered + covered * flat, abs=1e-3) and 0.1 < covered < 0.9
     count = 4000

@@ -48,10 +48,7 @@ def test_a_table_is_small_and_bounces_grow_with_every_colour(closed):
 
 @pytest.mark.parametrize(
     ("fabric", "least"),
-    [
-        pytest.param(CLOSED, 0.98, id="closed"),
-        pytest.param(LOPSIDED, 0.3, id="narrow", marks=pytest.mark.slow),
-    ],
+    [pytest.param(CLOSED, 0.98, id="closed"), pytest.param(LOPSIDED, 0.3, id="narrow", marks=pytest.mark.slow)],
 )
 def test_white_cloth_in_a_furnace_makes_no_light(fabric, least):
     """All bounces of white diffuse yarns: closed Lambertian cloth returns all light, others return less."""

@@ -6,15 +6,7 @@ import pytest
 from pipeline.models.fallback import fallback_answers
 from pipeline.models.selvage import errors
 from pipeline.models.selvage.cloth_numbers import FLOOR, GREY, NUMBERS, colours, numbers_of, probes
-from pipeline.models.selvage.errors import (
-    CASES,
-    OF_CLOTH,
-    RANGES,
-    TERMS,
-    coefficients_of,
-    expected,
-    squares_and_kinds,
-)
+from pipeline.models.selvage.errors import CASES, OF_CLOTH, RANGES, TERMS, coefficients_of, expected, squares_and_kinds
 from pipeline.models.selvage.model import Selvage
 from pipeline.truth.estimator import estimate
 from pipeline.truth.options import TruthOptions
