@@ -38,6 +38,8 @@ EDITS: Final = 5  # fabrics never seen before that a method is timed to prepare
 _LONGEST_EDITS: Final = 10_000.0  # milliseconds
 _FIRST: Final = 64  # queries that the truth answers, so that it has its tables
 
+_Sample = Sequence[tuple[Fabric, Queries]]
+
 
 class HeldOutFabric(NamedTuple):
     """Held-out queries about a fabric, with the truth's answers."""
@@ -114,13 +116,14 @@ def measure_timing(
     on one thread, where the system reports it (`reports.measure.memory`); `prepare_time`, the time until a fabric never
     seen before can be evaluated, where any fabric can be. Then `time` for each method and number of threads, the truth
     last, with every reading as `samples` and the queries a fabric as `note` (`reports.measure.timing.affordable`).
-    Methods that cover all `unseen` fabrics are timed on those alone too, on one thread, with the role ``unseen``.
+    Methods that cover all `unseen` fabrics are timed on those alone too, on the fewest threads: Records of `time`,
+    `processor_time`, `waited` and `energy` with the role ``unseen``.
     """
     sample, others = (
         [(cloth, queries.take(np.arange(options.timing_rows) % len(queries.u))) for cloth, queries, _ in part]
         for part in (fabrics, unseen)
     )
-    _prepare(methods, [*sample, *others], truth)
+    _prepare(methods, sample, others, truth)
     entries, records, edits = [], [], count(1)
     for index, method in enumerate(methods):
         progress(0.3 * index / len(methods))
@@ -165,8 +168,8 @@ def _times(
     return records
 
 
-def _prepare(methods: Sequence[Method], sample: Sequence[tuple[Fabric, Queries]], truth: TruthOptions) -> None:
-    """Prepare every fabric for every method, and the truth's tables, on all cores: only the clock needs them idle.
+def _prepare(methods: Sequence[Method], sample: _Sample, others: _Sample, truth: TruthOptions) -> None:
+    """Prepare all fabrics for methods, and those of `sample` for the truth, on all cores: the clock needs them idle.
 
     Code from outside has one thread.
     """
@@ -175,7 +178,7 @@ def _prepare(methods: Sequence[Method], sample: Sequence[tuple[Fabric, Queries]]
         started += [
             (theirs if isinstance(method, Guarded) else ours).submit(method.prepare, cloth)
             for method in methods
-            for cloth, _ in sample
+            for cloth, _ in (*sample, *others)
             if method.covers(cloth)
         ]
         for future in started:

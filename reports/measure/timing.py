@@ -1,11 +1,11 @@
 """Time of a query: all methods side by side in one process.
 
-All methods answer the same queries; they take turns, so that whatever else the machine does falls on all alike. Each is
-called a few times before the clock counts. A GPU is waited for before both readings of the clock. One call answers the
-queries of several fabrics in turn, because the cost of the point model depends on the weave. On several threads every
-thread makes that call, as a renderer gives each of its threads a tile of the picture; a method itself never uses more
-than one. Numbers of different machines are never compared. On one thread, time in which the processor did other work is
-waiting: on a quiet machine next to nothing.
+All methods answer the same queries, of fabrics with a name and apart from these of unseen ones. They take turns, so
+that whatever else the machine does falls on all alike. Each is called a few times before the clock counts. A GPU is
+waited for before both readings of the clock. One call answers the queries of several fabrics in turn, because the cost
+of the point model depends on the weave. On several threads every thread makes that call, as a renderer gives each of
+its threads a tile of the picture; a method itself never uses more than one. Numbers of different machines are never
+compared. On one thread, time in which the processor did other work is waiting: on a quiet machine next to nothing.
 
 The energy is that of all packages of the processor, cores that do nothing included, where Linux lets it be read. Its
 counters are those of RAPL, which begin again at their range. Some systems let only the administrator read them, some
@@ -69,10 +69,7 @@ class CallTiming(NamedTuple):
 
 
 def time_side_by_side(
-    contenders: Sequence[Contender],
-    repeats: int,
-    warm_up: int,
-    progress: Callable[[float], None] = lambda share: None,
+    contenders: Sequence[Contender], repeats: int, warm_up: int, progress: Callable[[float], None] = lambda share: None
 ) -> list[CallTiming]:
     """Time methods in turns: so many timed calls of each, after others to warm up.
 

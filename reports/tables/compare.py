@@ -161,7 +161,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 def _comparable(records: Iterable[Record]) -> dict[_Key, Record]:
     """Return times and errors by what they are of."""
     chosen = (r for r in records if r.metric in TIMES or (r.metric == "mse" and r.scene == "queries"))
-    parts = ((r, r.note if r.metric == "encode_time" else r.role) for r in chosen)
+    parts = ((r, {"encode_time": r.note, "time": r.role}.get(r.metric, "")) for r in chosen)
     return {(r.metric, r.method, r.setting, r.fabric, r.threads, part): r for r, part in parts}
 
 

@@ -72,11 +72,11 @@ def headline(method: str, setting: str, errors: pd.DataFrame, timing: pd.DataFra
     if not parts:
         return ""
     (first, where), *others = parts
-    more = "".join(f" and {ratio} on {fabrics}" for ratio, fabrics in others)
+    more = "".join(f", and {ratio} on {fabrics}" for ratio, fabrics in others)
     ratios = timing[(timing["method"] == method) & (timing["setting"] == setting)]["time_ratio"]
     cost = f", at {ratios.iloc[0]:.2g}× its time" if len(ratios) and math.isfinite(ratios.iloc[0]) else ""
     name = display(method, setting)
-    text = f"{name[0].upper()}{name[1:]} reaches {first} than point sampling at 2 points on {where}{more}{cost}"
+    text = f"{name[0].upper()}{name[1:]} reaches {first} than point sampling at 2 points on {where}{cost}{more}"
     text += " (one training)" if own["seeds"].iloc[0] == 1 else ""
     return f"{text}; {PAPER_SAYS}" if paper else f"{text}."
 
@@ -231,6 +231,7 @@ def facts(records: Sequence[Record], errors: pd.DataFrame, per_material: Collect
         "once": once and listed(once),
         "several": several and listed(several),
         "training_counts": several and listed(sorted({str(counts[name]) for name in several})),
+        "timed_apart": "unseen" if any(record.metric == "time" and record.role for record in records) else "",
         "one_unseen": "One" if unseen == 1 else "",
         "unseen_fabrics": int(unseen) if unseen > 1 else 0,
         "unranged": ", ".join(display(method, setting) for _, method, setting in sorted(unranged(errors))),

@@ -26,24 +26,24 @@ def tradeoff_table(errors: pd.DataFrame, timing: pd.DataFrame, aliasing: pd.Data
 
     The frames are from `summary.error_table`, `summary.timing_table` and `summary.aliasing_table`.
 
-    Columns: role, method, setting, fabrics; ns (median, a query; of unseen fabrics on these alone, if measured), error
-    (relative RMSE of the colour, mean over fabrics; NaN where it is lost in the noise of the truth), error_least and
-    error_most (range over trainings), bytes_stored, flicker (distance from the truth's); front (of error and time),
-    front_flicker (of flicker and time), front_bytes (of error and bytes).
+    Columns: role, method, setting, fabrics; ns (median, a query of the fabrics with a name; of unseen fabrics on these
+    alone, if any method was timed on them), error (relative RMSE of the colour, mean over fabrics; NaN where it is lost
+    in the noise of the truth), error_least and error_most (range over trainings), bytes_stored, flicker (distance from
+    the truth's); front (of error and time), front_flicker (of flicker and time), front_bytes (of error and bytes).
     """
     columns = ["role", "method", "setting", "fabrics", "ns", "error", "error_least", "error_most", "bytes_stored"]
     columns += ["flicker", *_FRONTS]
     if errors.empty or timing.empty:
         return pd.DataFrame(columns=columns)
     keys = ["method", "setting", "role"]
-    names = {"median_ns": "ns", "colour_rrmse": "error"}
-    names |= {f"colour_rrmse{end}": f"error{end}" for end in (LEAST, MOST)}
+    names = {"median_ns": "ns"} | {f"colour_rrmse{end}": f"error{end}" for end in ("", LEAST, MOST)}
     moving = aliasing if aliasing is not None and len(aliasing) else pd.DataFrame(columns=[*keys, "flicker"])
     parts: list[pd.DataFrame] = []
     for role, group in errors.groupby("role", sort=False):
         whole = group[group["fabrics"] == group["fabrics"].max()]
         part = whole.merge(timing[timing["method"] != TRUTH], on=["method", "setting"])
-        part["median_ns"] = part["unseen_ns" if role == "unseen" else "median_ns"].fillna(part["median_ns"])
+        if role == "unseen" and part["unseen_ns"].notna().any():
+            part["median_ns"] = part["unseen_ns"]
         part = part.merge(moving[[*keys, "flicker"]], on=keys, how="left").rename(columns=names)
         part["error"] = part["error"].where(part["error"] > 0)
         part["flicker"] = part["flicker"].astype(float).abs()

@@ -97,6 +97,7 @@ def made_up():
         subject = Record(method=method, setting=setting)
         time = 400 * count + 10 * index
         records.append(subject.of("time", time, 25, low=0.97 * time, high=1.05 * time))
+        records.append(subject.model_copy(update={"role": "unseen"}).of("time", 1.5 * time, 25))
         records.append(subject.of("bytes_stored", 2000.0 + index, 3))
     for fabric, role in fabrics:
         truth = Record(method="truth", fabric=fabric, role=role)

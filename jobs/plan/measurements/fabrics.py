@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from reports.record import Record
 
 
-_SECONDS_A_CALL = 0.15  # of a round of one row: all queries, then each of five classes of sizes
+_SECONDS_A_CALL = 0.025  # one row takes six calls a round, all queries and five classes of sizes; one more if unseen
 
 
 class _OnHeldOut(Measurement):
@@ -223,13 +223,14 @@ class TimedModel(Trained):
 
 
 class TimeOfMethods(Measurement):
-    """Times of all methods side by side, on queries of all sizes and by the size of footprints."""
+    """Times of all methods side by side, on all fabrics with a name and by the size of footprints; on unseen ones."""
 
     kind: Literal["timing of all methods"] = "timing of all methods"
     timed: ClassVar = True
     code: ClassVar = ("truth", "bench")  # the truth is timed too
     models: tuple[TimedModel, ...]
     dataset: HeldOutRows
+    unseen: tuple[str, ...]  # names of the fabrics that no method was trained on
     options: TimingOptions
 
     @classmethod
@@ -239,6 +240,7 @@ class TimeOfMethods(Measurement):
         yield cls(
             models=tuple(TimedModel(ways=model.run_options(bench), **dict(model)) for model in firsts),
             dataset=subjects.held_out(*(fabric for fabric, _ in subjects.recipe.tested)),
+            unseen=tuple(fabric.name for fabric, role in subjects.recipe.tested if role == "unseen"),
             options=options.select(TimingOptions, bench),
         )
 
@@ -247,7 +249,8 @@ class TimeOfMethods(Measurement):
         """Estimated seconds; a shard of test rows is about one fabric."""
         rows = sum(len(model.options.settings) or 1 for model in self.models)
         prepared = sum(model.seconds(0.0, len(self.dataset.rows), model.ways) for model in self.models)
-        return 5.0 + rows * self.options.timing_repeats * _SECONDS_A_CALL + 0.7 * prepared
+        calls = rows * self.options.timing_repeats * (6 + bool(self.unseen))
+        return 5.0 + calls * _SECONDS_A_CALL + 0.7 * prepared
 
     @property
     def threads(self) -> int:
@@ -257,20 +260,18 @@ class TimeOfMethods(Measurement):
         return max(thread_counts(self.options.threads))
 
     def measure(self, out: Path, progress: Progress) -> list[Record]:
-        """Time all queries, then queries by the size of their footprints."""
+        """Time all queries, those of unseen fabrics, then queries by the size of their footprints."""
         from pipeline.models.runtimes import not_run
         from reports.measure.by_size import measure_by_size
         from reports.measure.held_out import measure_timing
         from reports.record import Record
 
-        manifest = self.dataset.manifest(out)
-        truth = TruthOptions.model_validate(manifest.about["truth"])
+        truth = TruthOptions.model_validate(self.dataset.manifest(out).about["truth"])
         loaded = [(model, model.methods(out)) for model in self.models]
         methods = [method for _, own in loaded for method in own]
-        variants = [run for model, own in loaded for run in model.variants(own, model.ways)]
+        timed = [*methods, *(run for model, own in loaded for run in model.variants(own, model.ways))]
         rows = list(self.dataset.read(out, rows=self.options.rows))
-        unseen = list(self.dataset.read(out, manifest.names("unseen", "unseen_population"), self.options.rows))
-        timed = methods + variants
+        unseen = list(self.dataset.read(out, self.unseen, self.options.rows))
         records = measure_timing(timed, rows, truth, self.options, lambda share: progress(0.6 * share), unseen)
         for model, own in loaded:
             for method in own:  # those runtimes that this machine lacks

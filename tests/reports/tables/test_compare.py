@@ -102,7 +102,7 @@ def test_the_range_of_three_trainings_is_exceeded_by_chance_as_often_as_stated()
 
 
 def test_like_is_compared_with_like_and_nothing_in_common_is_bad_input():
-    """Threads, settings, fabrics and edits are kept apart; pictures and other metrics are left out."""
+    """Threads, settings, fabrics, edits and times of unseen fabrics are kept apart; other metrics are left out."""
     fast, slow = [1.0 + 0.01 * i for i in range(9)], [2.0 + 0.01 * i for i in range(9)]
     one, two = time_of("m", fast), time_of("m", slow).model_copy(update={"threads": 2})
     edits = [
@@ -110,9 +110,10 @@ def test_like_is_compared_with_like_and_nothing_in_common_is_bad_input():
         for note, times in (("a yarn", slow), ("a colour", fast))
     ]
     other = [error_of("m", 1.0, 0.1, scene="sphere"), Record(method="m").of("bytes_stored", 7.0, 1)]
-    a = [one, two, *edits, *other, error_of("m", 1.0, 0.1, "denim"), error_of("gone", 1.0, 0.1)]
+    other += [error_of("m", 1.0, 0.1, "denim"), error_of("gone", 1.0, 0.1)]
+    a = [one, two, time_of("m", slow, role="unseen"), *edits, *other]
     found = compare(a, [*reversed(a[:-1]), error_of("m", 5.0, 0.1, "basket"), time_of("new", fast)])
-    assert len(found.times) == 4 and len(found.errors) == 1
+    assert len(found.times) == 5 and len(found.errors) == 1
     assert all(row.a == row.b and row.result == "no difference shown" for row in (*found.times, *found.errors))
     assert (found.only_a, found.only_b) == (1, 2)
     assert "share no measurement" in refusal(compare, [error_of("m", 1.0, 0.1)], [error_of("n", 1.0, 0.1)])

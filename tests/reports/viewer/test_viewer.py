@@ -51,11 +51,7 @@ def assert_equal(found, wanted):
     assert (wanted[cloth].sum(axis=1) > 0.0).mean() > 0.4 and (apart[cloth] < 5e-5).mean() > 0.98
 
 
-PICTURES = [
-    ("Cloth", 8, (7, 14)),
-    ("Horizon", 1, (10, 8)),
-    ("Drape", 4, (12, 12)),
-]
+PICTURES = [("Cloth", 8, (7, 14)), ("Horizon", 1, (10, 8)), ("Drape", 4, (12, 12))]
 """Views, levels, and a lit pixel of each, row and column, that has to be equal."""
 
 
