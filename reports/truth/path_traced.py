@@ -4,9 +4,6 @@ Frames of shipped scenes by the integrator `twillight_path`; everything but the 
 mean squared error of linear RGB over the frame against frames that the ground truth renders, over the squared
 mean of these. There are two such frames r, s with different random numbers: (x - r)(x - s) has the squared error of x
 as its mean, whatever the noise of r and s is. Time is the processor's, of all threads.
-
-One point a sample at its limit is not the truth: a ratio of one point has no masking
-(pipeline.models.analytic.point_sampled).
 """
 
 import math
