@@ -37,10 +37,8 @@ def print_status(recipe: RecipeName, *, add: Add = NOTHING, out: Out = OUT) -> N
     """Print how many tasks of each stage are done, failed and missing, and the reason of each failure."""
     tasks, ledger = plan(load_recipe(recipe, add)), Ledger(out)
     states = {task.id: ledger.state(task) for task in tasks}
-    rows = []
-    for stage in STAGES:
-        if of_stage := [states[task.id] for task in tasks if task.stage == stage]:
-            rows.append((stage, *(of_stage.count(state) for state in ("done", "failed", "missing"))))
+    parts = ((stage, [states[task.id] for task in tasks if task.stage == stage]) for stage in STAGES)
+    rows = [(stage, *(part.count(state) for state in ("done", "failed", "missing"))) for stage, part in parts if part]
     failed = [f"{task.title}: {ledger.reason(task)}" for task in tasks if states[task.id] == "failed"]
     print_table(("stage", "done", "failed", "missing"), rows, caption="\n".join(failed))
 

@@ -164,11 +164,13 @@ class _Path:
     def __init__(self, scene: Any, sampler: Any, options: PathOptions) -> None:
         self._scene, self._sampler, self._options = scene, sampler, options
         emitters = scene.emitters()
-        self._to_light = [emitter.sample_direction for emitter in emitters]
-        if len(emitters) > MOST_EMITTERS or any(emitter.sampling_weight() != 1.0 for emitter in emitters):
-            self._to_light = [partial(scene.sample_emitter_direction, test_visibility=False)]
+        self._to_light = [partial(scene.sample_emitter_direction, test_visibility=False)]
+        if len(emitters) <= MOST_EMITTERS and all(emitter.sampling_weight() == 1.0 for emitter in emitters):
+            self._to_light = [emitter.sample_direction for emitter in emitters]
         self._scalar = str(mi.variant()).startswith("scalar")
         self._context = mi.BSDFContext()
+        # Flags that cloth alone has together.
+        self._cloth = int(mi.BSDFFlags.Null | mi.BSDFFlags.NonSymmetric | mi.BSDFFlags.DiffuseTransmission)
 
     def trace(self, ray: Any, active: Any) -> tuple[Any, Any]:
         """Return the radiance along rays with differentials, and whether they hit anything."""
@@ -210,7 +212,7 @@ class _Path:
 
     def _bend(self, si: Any, active: Any) -> Any:
         """Set the normal's derivatives where rays meet cloth; return how long a ray is inside that leaves it again."""
-        cloth = active & mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Null)
+        cloth = active & ((si.bsdf().flags() & self._cloth) == self._cloth)
         normal, step = si.sh_frame.n, _STEP * dr.norm(si.dp_du)
         viewer = si.to_world(si.wi)
         along = viewer - normal * dr.dot(viewer, normal)

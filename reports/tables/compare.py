@@ -95,8 +95,9 @@ def refuse_other_machine(a: Machine, b: Machine, allow: bool = False) -> list[st
 def compare(a: Sequence[Record], b: Sequence[Record]) -> Comparison:
     """Compare two benchmarks, measurement by measurement; BadInput if they share none.
 
-    Measurements of the same metric, method, setting, fabric, number of threads and edit are compared: times (`TIMES`)
-    and the MSE on held-out queries, the mean over trainings. Of several that are alike the last counts.
+    Measurements of the same metric, method, setting, fabric, number of threads and edit are compared: times (`TIMES`),
+    those of unseen fabrics apart, and the MSE on held-out queries, the mean over trainings. Of several that are alike
+    the last counts.
     """
     first, second = (_comparable(over_trainings(records)) for records in (a, b))
     extents = _extents(a, b)

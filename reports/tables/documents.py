@@ -97,9 +97,9 @@ def _woven(lines: Mapping[str, Sequence[str]]) -> list[str]:
     for setting, name in ((BOUNDED, "`woven` under the energy bound"), ("", "`woven`")):
         if line := lines.get(README_METHODS["woven", setting]):
             _, _, seen, unseen, _, time = line
-            others = f", {unseen} on unseen ones," if unseen != NONE else ""
-            ours = f"{name} has {seen} lower MSE than two points on seen fabrics{others} at {time}"
-            return [f"{ours} their time; {PAPER_SAYS}"]
+            others = f", and {unseen} on unseen ones" if unseen != NONE else ""
+            where = f"two points on seen fabrics at {time} their time{others}"
+            return [f"{name} has {seen} lower MSE than {where}; {PAPER_SAYS}"]
     return []
 
 

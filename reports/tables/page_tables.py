@@ -249,9 +249,7 @@ def _equal_time(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
 
 def _scenes(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
     """Return the table of every scene; its last row is what the noise of the truth alone scores."""
-    columns, tables = columns_for("scenes", values, frame.columns), []
-    if "fovvideovdp" in columns and frame["fovvideovdp"].isna().all():
-        del columns["fovvideovdp"]
+    columns, tables = _columns_but("fovvideovdp", "scenes", frame, values), []
     time = columns["frame_time"]
     columns["frame_time"] = Column(time.title, lambda row: TableCell(str(time.cell(row)), strong=bool(row.front)))
     floors = {"mse": "truth_noise"} | {name: f"{name}_floor" for name in columns if f"{name}_floor" in METRICS}
@@ -312,9 +310,15 @@ def _latents(records: Sequence[Record], frames: Frames, values: Values) -> list[
 
 def _timing(frame: pd.DataFrame, values: Values) -> ResultTable:
     few, many = (frame[name].max() if len(frame) else math.nan for name in ("threads", "most_threads"))
-    fewer = f", {few:.0f} threads" if few > 1 else ""
     more = f", {many:.0f} threads" if many > 1 else ", more threads"
-    return of_methods("timing", frame, {**values, "fewer": fewer, "more": more})
+    words = {**values, "fewer": f", {few:.0f} threads" if few > 1 else "", "more": more}
+    return of_methods("timing", frame, words, _columns_but("unseen_ns", "timing", frame, words))
+
+
+def _columns_but(optional: str, name: str, frame: pd.DataFrame, values: Values) -> dict[str, Column]:
+    """Return the columns of a table, without an optional one that was not measured."""
+    columns = columns_for(name, values, frame.columns).items()
+    return {key: column for key, column in columns if key != optional or (key in frame and frame[key].notna().any())}
 
 
 def entry_class(largest: float) -> str:

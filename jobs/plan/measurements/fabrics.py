@@ -230,7 +230,7 @@ class TimeOfMethods(Measurement):
     code: ClassVar = ("truth", "bench")  # the truth is timed too
     models: tuple[TimedModel, ...]
     dataset: HeldOutRows
-    unseen: tuple[str, ...]  # names of the fabrics that no method was trained on
+    unseen: tuple[str, ...]  # names of the fabrics that no general model was trained on
     options: TimingOptions
 
     @classmethod

@@ -155,6 +155,7 @@ def test_random_unseen_fabrics_are_measured_by_general_models_alone(files, tasks
     assert all({task.id for task in rows} <= set(one.needs) for one in errors)
     names = [fabric.name for fabric, role in planned[-1].fabrics if role == "unseen"]
     assert names == ["twill_4_4", "unseen_0_irregular", "unseen_1_irregular"]
+    assert [list(task.unseen) for task in planned if "timing" in task.title] == [names]
 
 
 BTF = '\n[[models]]\nmodel = "unified_btf"\ntexels_per_yarn = 2\nsamples = 60\n'

@@ -19,9 +19,8 @@ def test_the_viewer_is_mitsubas_wi_and_a_turned_cloth_is_the_cloth_seen_from_els
     viewer, light = unit(20.0, 15.0), unit(65.0, 130.0)
     cloth, bsdf = worn_of("cotton_twill"), PatchBSDF(load_fabric("cotton_twill"))
     value = cloth.eval(hits_of(viewer), light[None])
-    right, swapped = (
-        bsdf.eval(Queries.round([0.62], [0.57], [0.3], [i], [o])) for i, o in ((light, viewer), (viewer, light))
-    )
+    ways = ([light], [viewer]), ([viewer], [light])
+    right, swapped = (bsdf.eval(Queries.round([0.62], [0.57], [0.3], *way)) for way in ways)
     np.testing.assert_allclose(value, right, rtol=1e-5)
     assert np.abs(right / swapped - 1.0).min() > 0.2
     # Turned by 90 degrees, u runs along the warp's opposite: (u, v) is (v, -u) in yarns, and so are directions.

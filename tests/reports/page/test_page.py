@@ -79,6 +79,7 @@ def test_the_headline_and_the_front(folder, page):
         "Woven reaches 4.5× lower MSE than point sampling at 2 points on the 2 seen fabrics, at 4.3× its time, and "
         "4.5× lower MSE on one unseen fabric; the paper reports 4.1× at 0.83× without our changes, in a picture of its "
         "own scene, on a GPU.",
+        "On the fronts of unseen fabrics",
         "NeuMIP is trained on every fabric by itself",
         "Point sampling at 2 points answers 0 for 15% of the queries",
         "Front of error and time, seen fabrics",
