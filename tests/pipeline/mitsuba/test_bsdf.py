@@ -125,7 +125,6 @@ def test_a_context_chooses_lobes(mi):
         ("twillight", {"fabric": "denin"}, "did you mean 'denim'"),
         ("twillight", {}, "fabric"),
         ("twillight", {"fabric": "denim", "method": "soft_node"}, "did you mean 'soft_nodes'"),
-        ("twillight", {"fabric": "denim", "yarns": -1.0}, "yarns"),
         ("twillight", {"fabric": "denim", "bounces": 2}, "bounces = 2: "),
         ("twillight", {"fabric": "denim", "yarn": 1.0}, "did you mean 'yarns'"),
         ("twillight_path", {"max_dept": 3}, "did you mean 'max_depth'"),
