@@ -53,14 +53,14 @@ _STEP = 1e-3  # units of u
 
 
 class PathOptions(Frozen):
-    """Properties of the integrator; they mean what they mean for Mitsuba's `path`."""
+    """Properties of the integrator; they mean what they mean for Mitsuba's `path`, but for `hide_emitters`."""
 
     max_depth: int = Field(default=-1, ge=-1)
     """Longest path; 1 shows lights only, 2 light scattered once; -1: no limit."""
     rr_depth: int = Field(default=5, ge=1)
     """Length from which on paths end at random."""
     hide_emitters: bool = False
-    """True hides lights that the camera sees."""
+    """True hides the light of emitters that the camera sees; Mitsuba's `path` hides their surface too."""
 
 
 @contextmanager

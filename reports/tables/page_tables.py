@@ -249,7 +249,7 @@ def _equal_time(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
 
 def _scenes(frame: pd.DataFrame, values: Values) -> list[ResultTable]:
     """Return the table of every scene; its last row is what the noise of the truth alone scores."""
-    columns, tables = _columns_but("fovvideovdp", "scenes", frame, values), []
+    columns, tables = _measured_columns("fovvideovdp", "scenes", frame, values), []
     time = columns["frame_time"]
     columns["frame_time"] = Column(time.title, lambda row: TableCell(str(time.cell(row)), strong=bool(row.front)))
     floors = {"mse": "truth_noise"} | {name: f"{name}_floor" for name in columns if f"{name}_floor" in METRICS}
@@ -312,10 +312,10 @@ def _timing(frame: pd.DataFrame, values: Values) -> ResultTable:
     few, many = (frame[name].max() if len(frame) else math.nan for name in ("threads", "most_threads"))
     more = f", {many:.0f} threads" if many > 1 else ", more threads"
     words = {**values, "fewer": f", {few:.0f} threads" if few > 1 else "", "more": more}
-    return of_methods("timing", frame, words, _columns_but("unseen_ns", "timing", frame, words))
+    return of_methods("timing", frame, words, _measured_columns("unseen_ns", "timing", frame, words))
 
 
-def _columns_but(optional: str, name: str, frame: pd.DataFrame, values: Values) -> dict[str, Column]:
+def _measured_columns(optional: str, name: str, frame: pd.DataFrame, values: Values) -> dict[str, Column]:
     """Return the columns of a table, without an optional one that was not measured."""
     columns = columns_for(name, values, frame.columns).items()
     return {key: column for key, column in columns if key != optional or (key in frame and frame[key].notna().any())}
